@@ -29,16 +29,14 @@ demo: setup
 notebooks: setup
 	$(BIN)/marimo edit lab/notebooks
 
-# Side by side, a file in one process; what is in real time alone after that, as it needs the machine.
-BESIDE := $(BIN)/pytest --numprocesses $(WORKERS) --dist loadfile
+# Side by side: a process has all tests of a file, one has all that need the clock, and the longest begin first.
+BESIDE := $(BIN)/pytest --numprocesses $(WORKERS) --dist loadgroup --no-loadscope-reorder
 
 test: setup
-	$(BESIDE) --hypothesis-profile quick -m "not (slow or nightly or realtime)"
-	$(BIN)/pytest --hypothesis-profile quick -m "realtime and not (slow or nightly)"
+	$(BESIDE) --hypothesis-profile quick -m "not (slow or nightly)"
 
 test-all: setup
-	$(BESIDE) --hypothesis-profile $(PROFILE) -m "not (nightly or realtime)" --durations 20
-	$(BIN)/pytest --hypothesis-profile $(PROFILE) -m "realtime and not nightly" --durations 20
+	$(BESIDE) --hypothesis-profile $(PROFILE) -m "not nightly" --durations 20
 
 lint: setup
 	$(BIN)/ruff check
@@ -57,7 +55,7 @@ bench: setup
 # The tests that take minutes each, and a search for an hour of what `.ci/run` searches for a minute.
 soak: setup elsewhere
 	$(BIN)/pytest -m nightly
-	$(BIN)/tvist search --stops 2000 --streams 500 --changes 500 --sequences 3000 --flexible
+	$(BIN)/tvist search --stops 2000 --streams 500 --changes 500 --sequences 3000 --flexible --robot ur3e ur5e ur16e ur30 tests/plant/urdf/seven.urdf
 
 format: setup
 	$(BIN)/ruff check --fix

@@ -7,19 +7,34 @@ from pathlib import Path
 import pytest
 import tests.examples  # noqa: F401  registers the profiles
 from hypothesis import settings
+from tests.durations import Durations, arrange
 
 SYSTEM = Path(__file__).parent / "system"
 
 settings.load_profile("full")
 
 
-def pytest_collection_modifyitems(items):
-    """Mark what needs no mark of its own: see README.md."""
+def pytest_addoption(parser):
+    parser.addoption(
+        "--keep-durations", action="store_true", help="write how long tests took: durations.json"
+    )
+
+
+def pytest_configure(config):
+    if config.option.keep_durations and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Durations())
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Mark what needs no mark of its own, see README.md, and order what runs side by side."""
     for item in items:
         if SYSTEM in item.path.parents and not item.get_closest_marker("quick"):
             item.add_marker(pytest.mark.slow)
         if "realtime" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.realtime)
+    if hasattr(config, "workerinput"):
+        arrange(items)
 
 
 def pytest_sessionstart(session):

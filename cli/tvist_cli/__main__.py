@@ -1,5 +1,5 @@
 """`python -m tvist_cli` is `tvist`."""
 
-from tvist_cli.main import main
+from tvist_cli.main import program
 
-main()
+program()

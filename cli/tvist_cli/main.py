@@ -3,11 +3,12 @@
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from tvist_cli.overview import ABOUT, overview
-from tvist_server.ending import ending_signals
+from tvist_server.ending import end_like_interrupted, ending_signals
 
 if TYPE_CHECKING:
     import cyclopts
@@ -54,8 +55,18 @@ COMMANDS = {
 """The commands with their one-line help, in the order in which a new user meets them."""
 
 
+def program() -> None:
+    """Be the program `tvist`: see `main`."""
+    # Processes of ours import nothing from the folder that one happens to work in, which may be somebody else's.
+    os.environ["PYTHONSAFEPATH"] = "1"
+    main()
+
+
 def main() -> None:
-    """Run the program; Control+C ends it at any time, with exit code 130 and without a traceback."""
+    """Do what the command line says.
+
+    Control+C or another signal ends it at any time, with exit code 130 and without a traceback.
+    """
     try:
         _run()
     except KeyboardInterrupt:
@@ -90,6 +101,7 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
         help_format="markdown",  # joins the lines of a docstring
         default_parameter=cyclopts.Parameter(negative=(), validator=finite, show_default=_default),
         config=check_whole,
+        suppress_keyboard_interrupt=False,  # `main` says that it was interrupted
     )
     for place, (name, what) in enumerate(COMMANDS.items()):
         module = name.replace("-", "_")
@@ -109,6 +121,8 @@ def _run() -> None:
         for number in ending_signals():
             if number != signal.SIGINT:
                 signal.signal(number, lambda *_: os._exit(0))
+    else:
+        end_like_interrupted()
     if sys.argv[1:] in (["--help"], ["-h"]):
         try:
             print(overview(COMMANDS), flush=True)
@@ -125,14 +139,17 @@ def _run() -> None:
         )
     from tvist_cli.failure import Failure, told
     from tvist_cli.misuse import readable, sentence
+    from tvist_protocol.errors import harmless
 
+    # A sentence, without a line of ours.
+    warnings.formatwarning = lambda message, *_, **__: harmless(f"tvist: {message}\n")
     app = application(sys.argv[1:2])
     try:
         with told(OSError):  # a folder for figures that is none, mostly
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
-        print(f"tvist: {sentence(error, tuple(COMMANDS))}", file=sys.stderr)
+        print(harmless(f"tvist: {sentence(error, tuple(COMMANDS))}"), file=sys.stderr)
         sys.exit(2)
     except Failure as failure:
-        print(f"tvist: {failure}", file=sys.stderr)
+        print(harmless(f"tvist: {failure}"), file=sys.stderr)
         sys.exit(failure.code)

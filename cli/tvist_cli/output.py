@@ -7,28 +7,44 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import msgspec
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
 from tvist_cli.failure import interrupted
+from tvist_protocol.errors import HARMFUL, harmless
 
 WIDTH = 120
 """Number of columns when the output is not a terminal."""
-out = Console(highlight=False, emoji=False, width=None if sys.stdout.isatty() else WIDTH)
+
+
+class _Screen(Console):
+    """A terminal to which only the program gives commands, and no text that it shows, which may come from anywhere."""
+
+    def __init__(self, stream: TextIO, *, stderr: bool = False) -> None:
+        width = None if stream.isatty() else WIDTH
+        super().__init__(highlight=False, emoji=False, markup=False, stderr=stderr, width=width)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
+        for part in super().render(renderable, options):
+            yield part if part.control else Segment(harmless(part.text), part.style)
+
+
+out = _Screen(sys.stdout)
 """Results."""
-err = Console(stderr=True, highlight=False, emoji=False, width=None if sys.stderr.isatty() else WIDTH)
+err = _Screen(sys.stderr, stderr=True)
 """Progress and messages, on stderr so that they do not mix with `--json`."""
 
 
 def say(message: str) -> None:
     """Print a message in one line, however long, since it may go to a log or contain a path to copy."""
     try:
-        err.print(message, soft_wrap=True, markup=False)
+        err.print(message, soft_wrap=True)
     except OSError:
         # The terminal is closed. Without this, the unwritten rest would fail again when the process ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
@@ -50,7 +66,8 @@ def typed() -> str:
 
 def print_json(value: Any) -> None:
     """Print one JSON object and nothing else."""
-    print(msgspec.json.encode(value).decode())
+    text = msgspec.json.encode(value).decode()
+    print(HARMFUL.sub(lambda found: f"\\u{ord(found[0]):04x}", text))
 
 
 @contextmanager
@@ -74,7 +91,12 @@ def progress(
         done += steps
         bar.update(task, advance=steps, description=name or what)
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
         task = bar.add_task(what, total=total)
         try:

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import os
+import warnings
 from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ def serve_page(
     from tvist_view.stage import StageError, close_stage, open_stage
 
     logging.basicConfig(format="tvist: %(message)s", level=logging.WARNING)
+    warnings.filterwarnings("ignore", "Queued a .* on a closed connection")  # a browser left during a picture
     if hasattr(os, "nice"):
         os.nice(NICE)
     with told(StageError):

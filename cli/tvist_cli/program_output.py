@@ -5,6 +5,7 @@ import time
 from typing import TYPE_CHECKING
 
 from tvist_cli.output import err, say
+from tvist_protocol.errors import harmless
 
 if TYPE_CHECKING:
     from tvist_lab.programs.watch import ProgramWatch, Said
@@ -39,7 +40,7 @@ class Tell:
             place = f", line {watch.line}" if watch.line else ""
             move = f", move {len(watch.moves)}" if watch.moves else ""
             progress = f"{watch.name}: {watch.seconds:.1f} s{place}{move}"
-            sys.stderr.write(_CLEAR + progress[: max(err.width - 1, 1)])
+            sys.stderr.write(_CLEAR + harmless(progress)[: max(err.width - 1, 1)])
             sys.stderr.flush()
 
     def clear(self) -> None:
@@ -54,9 +55,9 @@ def _print(said: "Said") -> None:
     """Print a message on stdout, a warning on stderr."""
     match said.kind:
         case "text":
-            print(said.text, flush=True)
+            print(harmless(said.text), flush=True)
         case "popup":
             level = "" if said.level in {None, "message"} else f" ({said.level})"
-            print(f"popup{level}: {said.title}: {said.text}", flush=True)
+            print(harmless(f"popup{level}: {said.title}: {said.text}"), flush=True)
         case "warning":
             say(f"warning: {said.text}")

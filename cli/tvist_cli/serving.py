@@ -1,11 +1,12 @@
 """What the commands that serve a robot have in common."""
 
 import os
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from tvist_cli.failure import Failure
-from tvist_cli.output import say
+from tvist_cli.output import err, progress, say
 
 if TYPE_CHECKING:
     from tvist_controller.setup import Setup
@@ -14,17 +15,46 @@ if TYPE_CHECKING:
     from tvist_server.workers import Workers
 
 
-def compile_if_new() -> None:
-    """Compile what is not on disk yet, on all processors, and say so, since the start then takes long."""
-    from tvist_server.kernels import KernelsError, are_compiled, compile_ahead
+SAY_EVERY = 10.0
+"""Shortest time between two lines about progress where stderr is no terminal [s]."""
 
-    if are_compiled():
+
+def compile_if_new(tell: Callable[[int, int], None] = lambda *_: None) -> None:
+    """Compile what is not on disk yet, on all processors, and show how far that is, since it takes long.
+
+    Args:
+        tell: Called with the number of kernels that are compiled, and of all.
+    """
+    from tvist_server.kernels import KERNELS, KernelsError, compiled
+
+    done = compiled()
+    tell(done, len(KERNELS))
+    if done == len(KERNELS):
         return
-    say("compiling the arm's equations for this processor; this happens once and takes up to a minute")
+    say("compiling what a robot computes for this processor; this happens once and takes up to a minute")
     try:
-        compile_ahead()
+        compile_shown(None, tell)
     except KernelsError as error:  # the robot compiles for itself
         say(f"warning: the next start compiles again: {error}")
+
+
+def compile_shown(processes: int | None, tell: Callable[[int, int], None] = lambda *_: None) -> None:
+    """Compile ahead as `tvist_server.kernels` does, and show how far that is, as a bar or in lines."""
+    from tvist_server.kernels import KERNELS, compile_ahead
+
+    said, shown = time.monotonic(), 0
+    with progress(len(KERNELS), "kernels", "the next start continues") as advance:
+
+        def show(done: int, total: int) -> None:
+            nonlocal said, shown
+            tell(done, total)
+            advance(done - shown, None)
+            if not err.is_terminal and done > shown and time.monotonic() - said >= SAY_EVERY:
+                say(f"{done} of {total} kernels are compiled")
+                said = time.monotonic()
+            shown = done
+
+        compile_ahead(processes, show)
 
 
 def ur_ports(given: Sequence[str] | None) -> dict[str, int] | None:
@@ -58,8 +88,8 @@ def say_who_can_reach(server: "Server | Workers", config: "ServeConfig", robots:
     for address, ports in server.ur:
         listed = ", ".join(f"{interface} {port}" for interface, port in ports.items())
         say(f"UR's interfaces are open on {address}: {listed}")
-    if server.metrics is not None:
-        say(f"figures for Prometheus are on {server.metrics.page}")
+    if server.page is not None:
+        say(f"figures for Prometheus are on {server.page}")
     whom = "this robot" if robots == 1 else "these robots"
     for endpoint in config.endpoints if config.insecure else ():
         say(f"anyone who can reach {endpoint} can move {whom}")

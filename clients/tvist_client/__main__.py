@@ -1,12 +1,14 @@
 """`python -m tvist_client check`: for a machine that has the client alone."""
 
 import argparse
+import math
 import sys
 
 import msgspec
 
 from tvist_client.check import CheckReport, check
 from tvist_client.robot import ENDPOINT, NAME
+from tvist_protocol.errors import harmless
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -32,6 +34,15 @@ def main(arguments: list[str] | None = None) -> int:
         action="store_true",
         help="check only that the server answers and ticks, even if the robot has stopped (for orchestrators)",
     )
+    checking.add_argument(
+        "--wait",
+        metavar="SECONDS",
+        nargs="?",
+        type=float,
+        default=0.0,
+        const=math.inf,
+        help="try again for this long while no robot answers or it is starting; without SECONDS, until it is ready",
+    )
     checking.add_argument("--json", action="store_true", help="print one JSON object")
     chosen = parser.parse_args(arguments)
     report = check(
@@ -40,9 +51,11 @@ def main(arguments: list[str] | None = None) -> int:
         alive=chosen.alive,
         security=chosen.security,
         namespace=chosen.namespace,
+        wait=chosen.wait,
+        tell=lambda said: sys.stderr.write(f"{said}\n"),
     )
     text = msgspec.json.encode(report).decode() if chosen.json else describe(report)
-    sys.stdout.write(text + "\n")
+    sys.stdout.write(harmless(text) + "\n")
     return 0 if report.ok else 1
 
 

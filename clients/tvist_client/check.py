@@ -1,12 +1,14 @@
 """Check that a robot answers, works and is ready to move, with real commands rather than a port scan."""
 
 import asyncio
+import time
 from collections.abc import Callable
+from contextlib import suppress
 
 import msgspec
 
-from tvist_client.errors import ClientError, NotConnectedError, UnexpectedReplyError
-from tvist_client.readiness import Readiness, look, unlock_command
+from tvist_client.errors import ClientError, DeniedError, NotConnectedError, UnexpectedReplyError
+from tvist_client.readiness import RELIEVE, Readiness, look, unlock_command
 from tvist_client.robot import ENDPOINT, NAME, Robot
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.zenoh import robots_at
@@ -14,11 +16,17 @@ from tvist_protocol.commands import MoveJ
 from tvist_protocol.errors import RefusedError, TvistError
 from tvist_protocol.info import CalibrationInfo, StopReason
 from tvist_protocol.keys import check_robot_name
-from tvist_protocol.stream import State
+from tvist_protocol.stream import State, Telemetry
 from tvist_protocol.values import PROTOCOL_VERSION
 
-LISTEN_S = 0.5
+LISTEN_S = 1.0
 """Shortest time over which the rate of states is measured [s]."""
+TELEMETRY_S = 3.0
+"""Longest wait for telemetry, which comes once a second [s]."""
+TOO_SLOW = 0.5
+"""Share of the ticks due that must be seen to begin [-]: fewer are an overload whatever the telemetry says."""
+RETRY_S = 0.5
+"""Time between two tries while a robot is starting [s]."""
 STALE = "check"
 """A token that belongs to no lease."""
 
@@ -45,7 +53,7 @@ class CheckReport(msgspec.Struct, frozen=True):
     protocol: int | None
     """Version of the protocol that the robot uses; null if it did not answer."""
     state_rate_hz: float | None
-    """States per second, computed from their ticks [Hz]; null in lockstep, or if no state came."""
+    """States received per second of this machine's clock [Hz]; null in lockstep, or if no state came."""
     findings: list[Finding]
     """One result per step; a step that fails is the last one."""
     ready: bool | None
@@ -58,6 +66,12 @@ class CheckReport(msgspec.Struct, frozen=True):
     """The stop that keeps the robot from moving; null if there is none, or it is not known."""
     next: str | None
     """What to do to make the robot ready; null if nothing is known to be missing."""
+    overloaded: bool | None = None
+    """Whether the robot is overloaded, as telemetry defines it; null in lockstep, or if it was not checked."""
+    due_per_second: float | None = None
+    """Control periods due per second [1/s]; null in lockstep, or if no state came."""
+    starting: bool = False
+    """Whether the robot has answered that it is still starting; the last finding says how far it is."""
 
 
 def check(
@@ -67,6 +81,8 @@ def check(
     alive: bool = False,
     security: Folder | None = None,
     namespace: str = "",
+    wait: float = 0.0,
+    tell: Callable[[str], object] = str,
 ) -> CheckReport:
     """Connect to a robot, receive a state, have a command refused, and ask whether the robot may be moved.
 
@@ -79,8 +95,17 @@ def check(
             kill a robot that has stopped and is about to be unlocked.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
         namespace: Namespace of the robot.
+        wait: Longest time to try again while no robot answers, or it is starting [s].
+        tell: Called before each further try with what the one before has found, for people.
     """
-    return asyncio.run(_Check(endpoint, name, security, namespace, alive=alive).run())
+    deadline = time.monotonic() + wait
+    while True:
+        tried = _Check(endpoint, name, security, namespace, alive=alive)
+        report = asyncio.run(tried.run())
+        if not tried.early or time.monotonic() >= deadline:
+            return report
+        tell(report.findings[-1].said)
+        time.sleep(RETRY_S)
 
 
 class _Check:
@@ -93,6 +118,11 @@ class _Check:
         self.robots: list[str] = []
         self.protocol: int | None = None
         self.rate: float | None = None
+        self.due: float | None = None
+        self.overloaded: bool | None = None
+        self.missed = ""
+        self.early = self.starting = False
+        """Whether the robot may be there later, and whether it has said so."""
         self.findings: list[Finding] = []
 
     async def run(self) -> CheckReport:
@@ -108,11 +138,16 @@ class _Check:
                 self.passed(step, f"{self.name} at {self.endpoint}{self.beside()}")
                 steps = [("info", self.info), ("state", self.state)]
                 if not self.alive:
-                    steps += [("refusal", self.refusal), ("ready", self.ready)]
+                    steps += [("refusal", self.refusal), ("ready", self.ready), ("load", self.load)]
                 for step, run in steps:
                     self.passed(step, await run(robot))
         except TvistError as error:
-            self.findings.append(Finding(step, ok=False, said=str(error)))
+            self.starting = isinstance(error, RefusedError) and error.reply.code == "starting"
+            self.early = self.starting or (step == "connect" and isinstance(error, NotConnectedError))
+            if isinstance(error, RefusedError) and self.starting:
+                self.findings.append(Finding("start", ok=False, said=error.reply.why))
+            else:
+                self.findings.append(Finding(step, ok=False, said=str(error)))
         found = self.readiness
         return CheckReport(
             ok=all(finding.ok for finding in self.findings),
@@ -127,6 +162,9 @@ class _Check:
             safety_mode=None if found is None else found.safety_mode,
             stop=None if found is None else found.stop,
             next=None if found is None else found.next or None,
+            overloaded=self.overloaded,
+            due_per_second=self.due,
+            starting=self.starting,
         )
 
     def beside(self) -> str:
@@ -152,8 +190,27 @@ class _Check:
             if (await robot.info()).tick == 0:
                 return "none yet, since a client must step the time and none has done so"
             return f"tick {(await robot.state()).tick}; no rate, since a client steps the time"
-        self.rate = await _rate(robot)
-        return f"{self.rate:.1f} Hz"
+        heard: list[Telemetry] = []
+        stop = robot.on_telemetry(heard.append)
+        try:
+            self.rate, ticks = await _rate(robot)
+            with suppress(TimeoutError):
+                async with asyncio.timeout(TELEMETRY_S):
+                    while not heard:
+                        await robot.advance(1)
+        finally:
+            stop()
+        last = heard[-1] if heard else None
+        self.due = (await robot.info()).rate_hz if last is None else last.due_per_second
+        if self.due is None:  # an older server, whose speed is not known
+            return f"{self.rate:.1f} Hz"
+        self.overloaded = ticks < TOO_SLOW * self.due or (last is not None and last.overloaded)
+        said = f"{self.rate:.1f} Hz of {self.due:g} due"
+        if last is not None and last.due_ticks:
+            self.missed = (
+                f"; since its start it has missed {last.missed_ticks} of {last.due_ticks} control periods"
+            )
+        return f"{said}{self.missed}"
 
     async def refusal(self, robot: Robot) -> str:
         # Move to the present posture: even a server that obeyed would move nothing. Before the first tick nothing
@@ -167,11 +224,7 @@ class _Check:
             if error.reply.code in {"stale_token", "no_control"}:
                 return f"a command without control is refused: {error.reply.code}"
             raise
-        except NotConnectedError:
-            # Access control drops what is not allowed, and a query that reaches no one ends at once.
-            if self.security is None:
-                raise
-            await robot.info()  # the robot is still there, so only this client is denied
+        except DeniedError:
             return "commands are not delivered: this certificate has the role viewer"
         raise ClientError("a command with an invalid token was accepted: the server does not check control")
 
@@ -184,6 +237,17 @@ class _Check:
             return "as far as is known before its first tick"
         return f"robot_mode {found.robot_mode}, safety_mode {found.safety_mode}"
 
+    async def load(self, robot: Robot) -> str:
+        del robot  # the state's step has measured
+        if self.overloaded is None:
+            return "not told: a client steps the time, or the server is older"
+        if self.overloaded:
+            raise ClientError(
+                f"it is overloaded: {self.rate:.1f} states/s received of {self.due:g} due{self.missed}. Next: "
+                f"{RELIEVE}"
+            )
+        return "not overloaded"
+
 
 def _doubt(calibration: CalibrationInfo | None) -> str:
     """Return a warning about the calibration in use; empty if it is in order."""
@@ -195,8 +259,8 @@ def _doubt(calibration: CalibrationInfo | None) -> str:
     return ""
 
 
-async def _rate(robot: Robot) -> float:
-    """Return the ticks per second between two states that are at least `LISTEN_S` apart."""
+async def _rate(robot: Robot) -> tuple[float, float]:
+    """Return the states received and the robot's ticks, per second, between two states at least `LISTEN_S` apart."""
     loop = asyncio.get_running_loop()
     seen: list[tuple[int, float]] = []
 
@@ -211,4 +275,4 @@ async def _rate(robot: Robot) -> float:
     finally:
         stop()
     (first, began), (last, ended) = seen[0], seen[-1]
-    return (last - first) / (ended - began)
+    return (len(seen) - 1) / (ended - began), (last - first) / (ended - began)

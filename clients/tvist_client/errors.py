@@ -5,6 +5,7 @@ TvistError
 ├── ProtocolError            a value cannot be sent, such as a NaN or an invalid name (of `tvist_protocol`)
 └── ClientError
     ├── NotConnectedError    no server or robot answers; also a ConnectionError
+    ├── DeniedError          the certificate does not allow a command; also a PermissionError
     ├── AnswerTimeoutError   the robot is connected but does not answer; also a TimeoutError
     ├── StoppedError         the robot ended something, and gave the reason in an event
     │   ├── MotionStoppedError   a motion ended before its target
@@ -25,6 +26,10 @@ class ClientError(TvistError):
 
 class NotConnectedError(ClientError, ConnectionError):
     """There is no robot to talk to, or the connection was lost."""
+
+
+class DeniedError(ClientError, PermissionError):
+    """The robot takes no commands from this client, whose certificate is not an operator's."""
 
 
 class AnswerTimeoutError(ClientError, TimeoutError):

@@ -16,7 +16,7 @@ from zenoh.handlers import Callback
 
 from tvist_client.across import Across
 from tvist_client.errors import ClientError, NotConnectedError
-from tvist_client.readiness import readiness
+from tvist_client.readiness import RELIEVE, readiness
 from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
@@ -83,12 +83,17 @@ class FleetRobot(msgspec.Struct, frozen=True):
     silent_s: float | None
     """Time since its last telemetry, which comes once a second [s]."""
     missed_ticks: int | None
+    """Control periods missed since its start, of `due_ticks`."""
     late_p99_us: float | None
     """99th percentile of the lateness of its ticks in its last second [µs]."""
     load: float | None
     """Share of its last second in which the thread that ticks worked for this robot [-]."""
     said: str
-    """What keeps it from being moved, or why it is not known; empty if it is ready."""
+    """What keeps it from being moved, or why it is not known, or that it is overloaded; empty if all is well."""
+    due_ticks: int | None = None
+    """Control periods that were due since its start; null in lockstep, or from an older server."""
+    overloaded: bool | None = None
+    """Whether it is overloaded, as telemetry defines it; null if it has sent none."""
 
 
 class StopReport(msgspec.Struct, frozen=True):
@@ -185,14 +190,15 @@ class Fleet(Across):
                 answer.set_result(outcome)
 
         def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None:
-                wake(self._loop, partial(settle, reply.ok.payload.to_bytes()))
+            late = NotConnectedError(
+                f"it does not answer within {ANSWER_S:g} s: it hangs, or needs more time"
+            )
+            wake(self._loop, partial(settle, late if reply.ok is None else reply.ok.payload.to_bytes()))
 
         def on_end() -> None:
-            why = "it does not answer"
-            if place in self.places:
-                why += f" within {ANSWER_S:g} s, although it is on the network: it hangs, or it denies this client"
-            wake(self._loop, partial(settle, NotConnectedError(why)))
+            denied = place in self.places and self._security is not None
+            why = "it takes no commands from this client: use an operator's certificate (`tvist keys --operator`)"
+            wake(self._loop, partial(settle, NotConnectedError(why if denied else "it does not answer")))
 
         self._session.get(
             place.key(leaf), Callback(on_reply, on_end, indirect=False), payload=data, timeout=ANSWER_S
@@ -217,8 +223,17 @@ class Fleet(Across):
             missed_ticks=None if telemetry is None else telemetry.missed_ticks,
             late_p99_us=None if telemetry is None else telemetry.late_p99_us,
             load=None if telemetry is None else telemetry.load,
-            said=said if stands is None else stands.sentence if not stands.ready else "",
+            said=said if stands is None else stands.sentence if not stands.ready else _load(telemetry),
+            due_ticks=None if telemetry is None else telemetry.due_ticks,
+            overloaded=None if telemetry is None else telemetry.overloaded,
         )
+
+
+def _load(telemetry: Telemetry | None) -> str:
+    if telemetry is None or not telemetry.overloaded:
+        return ""
+    due = telemetry.due_per_second or 0.0
+    return f"overloaded: {telemetry.ticks_per_second:.0f} of {due:g} ticks/s. Next: {RELIEVE}"
 
 
 def _info(answer: bytes | NotConnectedError) -> tuple[Info | None, str]:

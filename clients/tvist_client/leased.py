@@ -35,4 +35,6 @@ class Leased:
             raise UnexpectedReplyError(
                 f"{tag(type(command))} was answered by {reply}, without the id of a motion"
             )
-        return self.robot.motions.motion(reply.id)
+        motion = self.robot.motions.motion(reply.id)
+        motion.limited = reply.limited
+        return motion

@@ -18,6 +18,7 @@ class Motion:
         id: The robot's number for it.
         started: Tick at which it began; None until then.
         done: Tick at which its shaped reference came to rest at the target; None until then, or if it never did.
+        limited: Why it is slower than asked, or which limit it will exceed, in a sentence; None if it is as asked.
         stopped: The event that reports its end before the target; None if there is none.
     """
 
@@ -25,6 +26,7 @@ class Motion:
         self.id = id
         self.started: int | None = None
         self.done: int | None = None
+        self.limited: str | None = None
         self.stopped: Event | None = None
         self._pass_time = pass_time
         self._error: ClientError | None = None

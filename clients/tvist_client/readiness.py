@@ -21,6 +21,11 @@ _NEXT: dict[int, str] = {
     SafetyMode.VIOLATION: "run {unlock} --power-on, which restarts the safety system",
     SafetyMode.FAULT: "run {unlock} --power-on, which restarts the safety system",
 }
+RELIEVE = (
+    "end other programs, serve fewer robots in its process, or start it with more --workers or with "
+    "--realtime-priority"
+)
+"""What to do about an overloaded robot."""
 _POWER = "run {unlock} --power-on"
 
 

@@ -7,7 +7,7 @@ from typing import Self
 
 from tvist_client.arm import Arm, hold_control
 from tvist_client.commanded import Answer
-from tvist_client.errors import MisuseError, NotConnectedError
+from tvist_client.errors import MisuseError, NotConnectedError, UnexpectedReplyError
 from tvist_client.kinematics import Kinematics
 from tvist_client.motion import Motion, MotionsByNumber
 from tvist_client.published import STATE_S, Published
@@ -74,6 +74,7 @@ class Robot(Published, Kinematics):
         Raises:
             NotConnectedError: No server listens there, the certificate is rejected, or no robot of that name is there
                 or visible.
+            RefusedError: The robot is still starting, code `starting`.
         """
         robot = cls(await ZenohTransport.open(endpoint, name, security, namespace))
         try:
@@ -106,8 +107,18 @@ class Robot(Published, Kinematics):
     # ------------------------------------------------------------------ description and messages
 
     async def info(self) -> Info:
-        """Request the robot's description and settings."""
-        info = understood(decode_info, await self._transport.info())
+        """Request the robot's description and settings.
+
+        Raises:
+            RefusedError: The robot is still starting; the message says how far that is.
+        """
+        data = await self._transport.info()
+        try:
+            info = understood(decode_info, data)
+        except UnexpectedReplyError:
+            if isinstance(reply := understood(decode_reply, data), Refused):
+                raise RefusedError(reply) from None
+            raise
         self._clock = info.clock
         return info
 
@@ -147,6 +158,7 @@ class Robot(Published, Kinematics):
         Raises:
             RefusedError: The robot refused it, which changed nothing.
             NotConnectedError: The robot does not answer.
+            DeniedError: This client's certificate is not an operator's.
             AnswerTimeoutError: No answer came in time.
             ProtocolError: The command contains a value that cannot be sent.
         """

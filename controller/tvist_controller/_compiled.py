@@ -4,11 +4,10 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from tvist_shaping.compiling import compiled as compile_function
-from tvist_shaping.compiling import is_cached
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-__all__ = ["compiled", "compiled_for_ticks", "is_cached"]
+__all__ = ["compiled", "compiled_for_ticks"]
 
 
 def compiled(function: F) -> F:

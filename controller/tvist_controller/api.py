@@ -5,7 +5,6 @@ The modules behind it may change; `tvist_lab` imports nothing else of this packa
 
 from tvist_controller.about import info_of
 from tvist_controller.ahead import resting_after
-from tvist_controller.boxes import BOXES, Box, Place
 from tvist_controller.calibrations import available as calibrations
 from tvist_controller.calibrations import default_for as default_calibration
 from tvist_controller.calibrations import estimator_of
@@ -45,12 +44,10 @@ from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, 
 from tvist_controller.whole_motion import Driven, DrivenLine, respond
 
 __all__ = [
-    "BOXES",
     "CLEARANCE",
     "FAR",
     "STILL",
     "TORQUE_SHARE",
-    "Box",
     "CollisionModel",
     "ControlCycle",
     "Controller",
@@ -66,7 +63,6 @@ __all__ = [
     "ModeSource",
     "MotionLimits",
     "OwnShaper",
-    "Place",
     "PlannedMotion",
     "Presence",
     "Programme",

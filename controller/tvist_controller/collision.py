@@ -19,6 +19,8 @@ FAR = 0.05
 """Distance above which checks may be far apart [m]."""
 SHORT = 0.004
 """Travel of the arm's points between two checks where bodies are as close as permitted [m]."""
+ROUNDING = 1e-9
+"""Changes of a distance below this are rounding errors [m]."""
 PAYLOAD = "payload"
 FLOOR = "floor"
 
@@ -33,7 +35,10 @@ class Meeting:
     """Distance between their surfaces; negative if they overlap [m]."""
 
     def __str__(self) -> str:
-        return f"{self.first} and {self.second} would be {1e3 * self.distance:.0f} mm apart"
+        pair, distance = f"{self.first} and {self.second}", 1e3 * self.distance
+        if distance < 0.0:
+            return f"{pair} would overlap by {-distance:.1f} mm"
+        return f"{pair} would be {distance:.1f} mm apart"
 
 
 class CollisionModel:
@@ -75,34 +80,48 @@ class CollisionModel:
         """
         return self._nearest(q) if self._within(self._fine, q) else None
 
+    def misplaced(self, q: Floats, *payloads: Payload) -> str | None:
+        """Say which bodies would meet if the arm were put at a posture with one of these payloads; None if none would.
+
+        Args:
+            q: Joint positions, shape (n,) [rad].
+            payloads: The declared payload, and others that the arm might carry there.
+        """
+        before = self.carried
+        for payload in payloads:
+            self.carry(payload)
+            met = self.meeting(q)
+            self.carry(before)
+            if met is not None:
+                posture = ", ".join(f"{angle:.4g}" for angle in q)
+                return f"at q = [{posture}] {met}, and at least {1e3 * CLEARANCE:g} mm are required"
+        return None
+
     def on_way(self, way: Way, *, before: Floats | None = None) -> tuple[float, Meeting] | None:
         """Find the first meeting on a way, in long steps where everything is far apart and short ones elsewhere.
 
         Args:
             way: Joint positions along the path, as `Path.whole` and `Path.way` return them.
-            before: Posture from which the way begins, shape (n,) [rad]: bodies that are too close there may move
-                apart. None: the beginning of the way itself.
+            before: Posture from which the way begins, shape (n,) [rad]. Bodies that are too close there may move apart,
+                but none of these pairs may come closer again. None: the beginning of the way itself.
 
         Returns:
             Share of the way, and the pair; None if the way is clear.
         """
-        travel = self.travel(way.turned)
-        share, escaping = 0.0, self.meeting(way.at(0.0) if before is None else before)
+        travel, share = self.travel(way.turned), 0.0
+        begin = way.at(0.0) if before is None else before
+        least = np.minimum(self._gaps(begin), CLEARANCE) if self._within(self._fine, begin) else CLEARANCE
         while True:
             q = way.at(share)
             step = FAR - CLEARANCE
             if self._within(self._coarse, q):
-                nearest = self._nearest(q)
-                step = max(nearest.distance - CLEARANCE, SHORT)
-                if nearest.distance >= CLEARANCE:
-                    escaping = None
-                # Bodies that are too close already may move apart.
-                elif escaping is None or nearest.distance < escaping.distance:
-                    return share, nearest
-                else:
-                    escaping = nearest
+                gaps = self._gaps(q)
+                if (gaps < least - ROUNDING).any():
+                    return share, self._meeting_of(gaps, int(np.argmin(gaps - least)))
+                least = np.maximum(np.minimum(gaps, CLEARANCE), least)
+                step = max(float(gaps.min()) - CLEARANCE, SHORT)
             else:
-                escaping = None
+                least = CLEARANCE
             if share >= 1.0:
                 return None
             share = 1.0 if travel <= 0.0 else min(share + step / travel, 1.0)
@@ -133,13 +152,20 @@ class CollisionModel:
         return bool(pin.computeCollisions(self._model, self._data, self._geometry, margin, q, True))
 
     def _nearest(self, q: Floats) -> Meeting:
+        gaps = self._gaps(q)
+        return self._meeting_of(gaps, int(np.argmin(gaps)))
+
+    def _gaps(self, q: Floats) -> Floats:
+        """Distance of each pair of bodies at a posture [m]."""
         pin.computeDistances(self._model, self._data, self._geometry, self._distances, q)
-        distances = np.array([result.min_distance for result in self._distances.distanceResults])
+        gaps = np.array([result.min_distance for result in self._distances.distanceResults])
         if not self._loaded:
-            distances[self._with_payload] = np.inf
-        number = int(np.argmin(distances))
+            gaps[self._with_payload] = np.inf
+        return gaps
+
+    def _meeting_of(self, gaps: Floats, number: int) -> Meeting:
         pair = self._pairs[number]
-        return Meeting(self._names[pair.first], self._names[pair.second], float(distances[number]))
+        return Meeting(self._names[pair.first], self._names[pair.second], float(gaps[number]))
 
     def _add(self, body: Body, description: RobotDescription) -> None:
         start, end = np.array(body.start), np.array(body.end)

@@ -9,9 +9,10 @@ from typing import Any, Unpack
 import numpy as np
 
 from tvist_controller.authority import Authority
-from tvist_controller.collision import CollisionModel
+from tvist_controller.collision import CLEARANCE, CollisionModel
 from tvist_controller.command_row import Call, Row
 from tvist_controller.command_table import CommandTable, Order
+from tvist_controller.control.differentiator import Floats
 from tvist_controller.counters import Counters
 from tvist_controller.cycle import ControlCycle, Sample
 from tvist_controller.declared_payload import DeclaredPayload
@@ -328,11 +329,12 @@ class Controller:
         """Place the simulated arm somewhere at rest."""
         command, chosen = call.command, call.planned()
         check_content(command, self.setup.description)
+        q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
+        carried = None if command.payload is None else body(command.payload)
+        self._check_place(command, q)
         self.programs.end("simulation.reset")
         self.motion.abandon("simulation.reset")
         self._faults.clear()
-        q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
-        carried = None if command.payload is None else body(command.payload)
         if chosen is not None:
             self.filters.use(chosen)
         if command.seed is not None:
@@ -346,6 +348,17 @@ class Controller:
         self._reporter.forget_modes()
         self.programs.steadiness.forget()
         return Done(tick=self.tick_number)
+
+    def _check_place(self, command: SimulationReset, q: Floats) -> None:
+        """Refuse to put the arm, or another payload on it, where two bodies would be nearer than permitted."""
+        payloads = [] if command.payload is None else [body(command.payload)]
+        if command.q is not None:
+            payloads = [self.motion.collisions.carried, *(payloads or [self.cycle.plant.payload])]
+        met = self.motion.collisions.misplaced(q, *payloads)
+        if met is not None:
+            where = "payload" if command.q is None else "q"
+            why = f"{met}: choose a posture in which the arm and its payload are clear"
+            raise RefusalError("collision", where, why, CLEARANCE)
 
     def _check_step(self, call: Call[SimulationStep]) -> Reply:
         """Check that a client may advance time; the host then does so."""

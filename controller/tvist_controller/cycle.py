@@ -16,6 +16,7 @@ from tvist_controller.line_filter import LineFilter
 from tvist_controller.look_ahead import LookAhead, Obstacle
 from tvist_controller.safety import StreamTorqueRoom, arm_limits
 from tvist_controller.trajectory import (
+    Guided,
     JointLine,
     JointStop,
     MotionLimits,
@@ -231,6 +232,10 @@ class ControlCycle:
             self.line_filter.begin(tvist, self.reference)
         else:
             self.line_filter.use(tvist)
+            if isinstance(self.trajectory, SetpointStream):
+                self.trajectory.slow_down(self.spared(self.trajectory.limits))
+            elif isinstance(self.trajectory, Guided):
+                self.trajectory.adopt(self.spared(arm_limits(self.description)))
 
     def _settle(self, reference: Floats, target: Target) -> None:
         """Detect the end of a motion: its trajectory is finished and the shaped reference has come to rest on it."""
@@ -267,13 +272,25 @@ class ControlCycle:
         """
         return quickest_motion(JointLine(self.reference, target), limits, PERIOD, speed)
 
+    def spared(self, limits: MotionLimits) -> MotionLimits:
+        """Return the limits of a reference whose shaped reference keeps these limits and those of the arm."""
+        faster, harder = (1.0 + more for more in self.tvist.surplus)
+        arms = arm_limits(self.description)
+        return MotionLimits(
+            min(limits.velocity, arms.velocity / faster),
+            min(limits.acceleration, arms.acceleration / harder),
+            limits.jerk,
+        )
+
     def stream(self, stream_period: float, limits: MotionLimits) -> SetpointStream:
         """Start to follow set-points; the arm must be at rest."""
         self.tvist.aim(None)
         reach = np.array(self.description.limits.position)
         torque = StreamTorqueRoom(self.description, self.inverse_dynamics)
         return self.start(
-            SetpointStream(self.reference, stream_period, limits, PERIOD, reach=reach, torque=torque)
+            SetpointStream(
+                self.reference, stream_period, self.spared(limits), PERIOD, reach=reach, torque=torque
+            )
         )
 
     def start(self, trajectory: T) -> T:

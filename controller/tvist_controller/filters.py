@@ -87,7 +87,8 @@ class Filters:
                 code="payload_mismatch",
                 why=f"calibration {calibration.name!r} was made with "
                 f"{calibration.payload.mass:g} kg; {declared.mass:g} kg is declared: "
-                "frequencies will be off",
+                "the shaper's frequencies will be wrong. Take a modal calibration, which knows any payload, or "
+                "identify the arm with this one",
             )
 
     def _warn_of_arm(self) -> None:
@@ -109,12 +110,18 @@ class Filters:
         clipped = self._cycle.tvist.clipped
         if clipped and not self._clipped:
             name = self._cycle.tvist.name
-            why = f"{name} cannot meet its specification here: it needs a longer delay line, or leaves more vibration"
+            why = (
+                f"{name} cannot meet its specification here: it needs a longer delay line, or leaves more vibration. "
+                "Choose another shaper for these poses, or a pose in which the arm is stiffer"
+            )
             self._emit("warning", code="out_of_range", why=why)
         self._clipped = clipped
         limited = sample.motors is not None and sample.motors.limited
         if limited and not self._limited and not (self._cycle.stopping or self._cycle.at_rest):
-            why = "the torque limits keep the motors from leading enough: the arm will vibrate more after this motion"
+            why = (
+                "the torque limits keep the motors from leading enough: the arm will vibrate more after this motion. "
+                "Move with less acceleration, or choose a shaper without feed-forward, such as auto"
+            )
             self._emit("warning", code="limit_torque", why=why)
             self._limited = True
         self._limited = self._limited and not self._cycle.at_rest

@@ -44,6 +44,7 @@ def plan_from_rest(
         speed=1.0,
         slowest=None,
         excess=tvist.excess,
+        surplus=tvist.surplus,
         tcp=tuple(tcp),
         carried=body(setup.payload),
         bodies=InverseDynamics(setup.description, body(setup.payload)).bodies,

@@ -9,7 +9,7 @@ from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.motion import MotionControl
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import GENTLEST_STOP, GuidedTorqueRoom, arm_limits
-from tvist_controller.trajectory import Guided, JointSpeed, Servo, ToolSpeed
+from tvist_controller.trajectory import Guided, JointSpeed, MotionLimits, Servo, ToolSpeed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.transitions import Activity
 
@@ -32,6 +32,7 @@ class Guidance:
         self._reach = np.array(motion.cycle.description.limits.position)
         self._torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.inverse_dynamics)
         self._tcp, self._kinematics = motion.tcp, ToolKinematics(motion.cycle.description)
+        self._kinematics.rehearse(PERIOD)
 
     def servo(self, q: Floats, lookahead: float, gain: float, *, shaped: bool) -> int:
         """Follow a posture, see `Servo`; return the motion's number.
@@ -42,7 +43,7 @@ class Guidance:
         self._check("servo_j", shaped)
         servo = self._present(Servo, shaped)
         if servo is None:
-            servo = Servo(self._start(shaped), self._limits, self._reach, self._torque, PERIOD)
+            servo = Servo(self._start(shaped), self._most(shaped), self._reach, self._torque, PERIOD)
         servo.aim(q, lookahead, gain)
         return self._follow("servo_j", servo, shaped)
 
@@ -53,10 +54,12 @@ class Guidance:
             RefusalError: See `servo`.
         """
         self._check("speed_j", shaped)
-        speed = self._present(JointSpeed, shaped)
+        speed, most = self._present(JointSpeed, shaped), self._most(shaped)
         if speed is None:
             rate = self._motion.motions.speed
-            speed = JointSpeed(self._start(shaped), self._limits, self._torque, PERIOD, rate=rate)
+            speed = JointSpeed(self._start(shaped), most, self._torque, PERIOD, rate=rate)
+        if shaped:
+            qd = qd * min(1.0, most.velocity / max(float(np.abs(qd).max()), most.velocity))
         speed.aim(qd, acceleration)
         return self._follow("speed_j", speed, shaped)
 
@@ -72,7 +75,7 @@ class Guidance:
         speed, tool = self._present(ToolSpeed, shaped), self._tool
         if speed is None or speed.kinematics is not tool:
             rate = self._motion.motions.speed
-            speed = ToolSpeed(self._start(shaped), self._limits, tool, self._torque, PERIOD, rate=rate)
+            speed = ToolSpeed(self._start(shaped), self._most(shaped), tool, self._torque, PERIOD, rate=rate)
         speed.aim(twist, acceleration, angular_acceleration)
         return self._follow("speed_l", speed, shaped)
 
@@ -127,6 +130,10 @@ class Guidance:
             self._tcp = self._motion.tcp
             self._kinematics = self._kinematics.with_tool(self._tcp)
         return self._kinematics
+
+    def _most(self, shaped: bool) -> MotionLimits:
+        """Limits of a reference."""
+        return self._cycle.spared(self._limits) if shaped else self._limits
 
     def _check(self, trigger: str, shaped: bool) -> None:
         """Refuse a command that the present activity does not allow."""

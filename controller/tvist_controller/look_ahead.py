@@ -172,9 +172,10 @@ class LookAhead:
         if self._carried is not collisions.carried:
             self._carried, self._centre = collisions.carried, None
         way = collisions.travel(turned)
-        if self._centre is not None and way + collisions.travel(q - self._centre) < self._room:
+        moved = np.inf if self._centre is None else collisions.travel(q - self._centre)
+        if way + moved < self._room:
             return True
-        if self._centre is not q:
+        if moved > 0.0:
             self._centre, self._room = q, collisions.room(q)
         return way < self._room
 

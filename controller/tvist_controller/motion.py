@@ -92,6 +92,7 @@ class MotionControl:
             speed=self.motions.wanted_speed,
             slowest=self.motions.slowest,
             excess=cycle.tvist.excess,
+            surplus=cycle.tvist.surplus,
             tcp=self.tcp,
             carried=self.collisions.carried,
             bodies=cycle.inverse_dynamics.bodies,

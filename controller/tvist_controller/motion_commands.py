@@ -4,6 +4,7 @@ from typing import Any
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.motion import MotionControl
+from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.plan import MOTIONS
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.refusal import check_content, check_motion
@@ -44,7 +45,9 @@ class MotionCommands:
         check_content(call.command, self._description)
         trigger = tag(type(call.command))
         self._motion.check(trigger)
-        return Accepted(id=self._motion.move(call.planned(), trigger))
+        planned: PlannedMove = call.planned()
+        limited = None if planned.limited is None else planned.limited[1]
+        return Accepted(id=self._motion.move(planned, trigger), limited=limited)
 
     def _servo_start(self, call: Call[c.ServoStart]) -> None:
         command = call.command

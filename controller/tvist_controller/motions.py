@@ -49,8 +49,9 @@ class Motions:
         number = self._begin(RunningMove(planned, self._cycle))
         for why in planned.skipped:
             self._emit("warning", id=number, code="blend_skipped", why=why)
-        if planned.excess_of_torque is not None:
-            self._emit("warning", id=number, code="limit_torque", why=planned.excess_of_torque)
+        if planned.limited is not None:
+            code, why = planned.limited
+            self._emit("warning", id=number, code=code, why=why)
         return number
 
     def guide(self, trajectory: Guided) -> int:

@@ -1,5 +1,6 @@
 """A planned motion in progress: its parts, its rate and its pause."""
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -42,6 +43,7 @@ class RunningMove:
     def __init__(self, planned: PlannedMove, cycle: ControlCycle) -> None:
         self._velocity, self._cycle = planned.velocity, cycle
         self._window, self._peak = planned.window, planned.peak
+        self._room, self._surplus = planned.room, planned.surplus
         self._held = False
         self._parts = len(planned.parts)
         self._trajectory, *coming = planned.parts
@@ -61,9 +63,14 @@ class RunningMove:
         self._cycle.tvist.aim(self._trajectory.path.end, quiet=self._trajectory.quiet)
 
     def _rate(self, speed: float, slowest: float | None) -> float:
-        """Rate of its time [-]: lower if it was not planned for a shaper as slow or as peaked as the present one."""
+        """Rate of its time [-]: lower if it was planned for a shaper that is less slow, peaked or uneven."""
         tvist = self._cycle.tvist
         room = min(_fitting(self._window, tvist.delay), _fitting(self._peak, tvist.peak))
+        if tvist.surplus != self._surplus:
+            (velocity, acceleration), (more_velocity, more_acceleration) = self._room, tvist.surplus
+            room = min(
+                room, velocity / (1.0 + more_velocity), math.sqrt(acceleration / (1.0 + more_acceleration))
+            )
         return min(rate_of(speed, self._velocity, slowest), room)
 
     @property

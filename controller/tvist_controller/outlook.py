@@ -1,6 +1,7 @@
 """Forecast of the control line's motion, and the quickest way to end it."""
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from tvist_controller.ahead import MAX_AHEAD, Ahead
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.stops import StopPlan, StopPlanner
-from tvist_controller.trajectory import Forecast, JointStop, PathStop, Trajectory
+from tvist_controller.trajectory import Forecast, JointStop, PathStop, StuckError, Trajectory
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
@@ -43,10 +44,11 @@ class Outlook:
 
         Returns:
             The last two shaped references played and the future ones until they come to rest, one for each tick,
-            shape (k, n) [rad]; None if that takes more than `MAX_AHEAD` ticks.
+            shape (k, n) [rad]; None if that takes more than `MAX_AHEAD` ticks, or the trajectory cannot go on.
         """
         ahead = self._ahead(tvist, trajectory)
-        ahead.until(MAX_AHEAD)
+        with suppress(StuckError):
+            ahead.until(MAX_AHEAD)
         return np.array(ahead.references) if ahead.rests else None
 
     def _ahead(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Ahead:

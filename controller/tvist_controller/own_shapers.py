@@ -14,15 +14,19 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 from msgspec import Struct
 
 from tvist_plant.user_file import read_bytes
 from tvist_shaping.errors import ShaperFailureError, ShapingError
+from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.fir_shaper import FirShaper
 from tvist_shaping.named import AnyShaper, Registry
-from tvist_shaping.own import TRIED_F_D, check_shaper, shaper_of
+from tvist_shaping.own import check_range, check_shaper, shaper_of
 from tvist_shaping.shaper import Shaper
 
+_POSTURES, _MARGIN = 64, 1.1
+"""Number of postures in which an arm's modes are looked at, and the factor beyond them that a shaper has to support."""
 _FILE = re.compile(r"(?P<file>.*\.py)(?::(?P<attribute>.*))?", re.DOTALL)
 
 
@@ -115,11 +119,32 @@ def load_own(place: str) -> OwnShaper:
         shaper = _shaper(found, attribute, place)
         Registry([shaper])
     except ShaperFailureError as error:
-        limits = f"{TRIED_F_D[0]:g} to {TRIED_F_D[1]:g} Hz and any damping ratio below its zeta_max"
-        raise OwnShaperError(f"shaper {place} {error.why}; it must support {limits}") from error
+        raise OwnShaperError(f"shaper {place} {error.why}") from error
     except ShapingError as error:
         raise OwnShaperError(f"shaper {place}: {error}") from error
     return OwnShaper(file, attribute, sha256, shaper)
+
+
+def check_for(own: OwnShaper, estimator: Estimator, joints: int) -> None:
+    """Try a shaper with the modes that an arm has anywhere, and a tenth beyond.
+
+    Args:
+        own: The shaper.
+        estimator: The modes as functions of q.
+        joints: Number of joints of the arm.
+
+    Raises:
+        OwnShaperError: It fails for one of them.
+    """
+    looking = estimator.fork()
+    anywhere = np.random.default_rng(0).uniform(-np.pi, np.pi, (_POSTURES, joints))
+    f_d, zeta = np.array([looking.settle(q) for q in anywhere])[:, :, 0].T
+    low, high = max(f_d.min() / _MARGIN, estimator.f_d_min), f_d.max() * _MARGIN
+    damped = zeta.min() / _MARGIN, min(zeta.max() * _MARGIN, max(estimator.zeta_max, zeta.max()))
+    try:
+        check_range(own.shaper, (low, high), damped, "this arm")
+    except ShaperFailureError as error:
+        raise OwnShaperError(f"shaper {own.place} {error.why}") from error
 
 
 def _run(content: bytes, place: str, file: str, sha256: str) -> ModuleType:

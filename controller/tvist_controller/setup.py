@@ -6,7 +6,9 @@ from functools import cached_property
 from typing import Any
 
 import msgspec
+import numpy as np
 
+from tvist_controller.collision import CollisionModel
 from tvist_controller.mode_source import ModeSource, first_source
 from tvist_controller.own_shapers import OwnShaper
 from tvist_plant.description import Payload as Body
@@ -80,6 +82,11 @@ class Setup:
         if self.carried is not None and not is_real_body(self.carried.inertia):
             inertia = list(self.carried.inertia)
             raise ValueError(f"payload.inertia is {inertia}: no body has these moments of inertia")
+        declared = body(self.payload)
+        collisions = CollisionModel(self.description, declared)
+        met = collisions.misplaced(np.array(self.q), declared, body(self.carried or self.payload))
+        if met is not None:
+            raise ValueError(f"start: {met}: choose a posture in which the arm and its payload are clear")
         self.registry.check(self.shaper)
 
     def source(self) -> ModeSource:

@@ -88,7 +88,7 @@ class WayAhead:
         return self._on(self._outlook.foresee(trajectory=end))
 
     def rest_of_way(self, tvist: Filter | None) -> Meeting | None:
-        """Return the meeting that would occur on the rest of the motion, if any; for a stream, in the quickest stop.
+        """Return the meeting that would occur on the rest of the motion, if any; if that is unknown, in a stop.
 
         Args:
             tvist: A new filter; None for the present one.
@@ -98,17 +98,16 @@ class WayAhead:
         if cycle.at_rest:
             return self._first(coming)
         trajectory = cycle.trajectory
-        if not trajectory.foreseeable:
-            guard = self._guard if cycle.guard is None else cycle.guard
-            stop = self._outlook.stops.by_joints(cycle.newest, None, guard.clear)
-            if stop is None:
-                return guard.met
-            guard.take(cycle.newest, stop)
-            return None
-        forecast = trajectory.forecast
-        if forecast is None:
-            return self._on(self._outlook.foresee(tvist))
-        return self._first([forecast.path.way(cycle.along.position, forecast.end), *coming])
+        if (forecast := trajectory.forecast) is not None:
+            return self._first([forecast.path.way(cycle.along.position, forecast.end), *coming])
+        if trajectory.foreseeable and (ahead := self._outlook.foresee(tvist)) is not None:
+            return self._on(ahead)
+        guard = self._guard if cycle.guard is None else cycle.guard
+        stop = self._outlook.stops.by_joints(cycle.newest, None, guard.clear)
+        if stop is None:
+            return guard.met
+        guard.take(cycle.newest, stop)
+        return None
 
     def _first(self, ways: Sequence[Way]) -> Meeting | None:
         """Return the first meeting on several ways, one after the other."""

@@ -8,8 +8,8 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
-from tvist_client.errors import ClientError
 from tvist_client.robot import Robot
+from tvist_protocol.errors import TvistError
 
 _BIND = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); os.execv(sys.argv[2], sys.argv[2:])"
 """Binds its process to a processor, and then executes the program given after it."""
@@ -106,7 +106,7 @@ async def _connect(
     while True:
         try:
             return await Robot.connect(endpoint, name)
-        except ClientError as error:
+        except TvistError as error:  # it is not there, or says that it is starting
             if process.returncode is not None:
                 raise ServedError(
                     f"tvist serve ended with exit code {process.returncode}: {_last(told)}"

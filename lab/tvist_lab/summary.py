@@ -11,7 +11,7 @@ from tvist_lab.recordings.description import ordered
 from tvist_lab.recordings.units import meaning_of
 
 
-def summary(path: str | os.PathLike[str]) -> dict[str, Any]:
+def summary(path: str | os.PathLike[str], columns: str | None = None) -> dict[str, Any]:
     """Describe a file that `tvist_lab.recordings.read` reads.
 
     Returns:
@@ -28,7 +28,7 @@ def summary(path: str | os.PathLike[str]) -> dict[str, Any]:
         content = mcap_file.read(path)
         recording = content.recording
     except mcap_file.RecordingFileError:
-        recording = read(path)
+        recording = read(path, columns)
     info = recording.info
     return {
         "file": str(path),

@@ -8,7 +8,7 @@ from msgspec import Struct
 from tvist_protocol.commands import Command, Setpoint
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io
-from tvist_protocol.replies import Reply
+from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 
@@ -104,15 +104,15 @@ CHANNELS = (
         key="tvist/{robot}/info",
         kind="queryable",
         by="client",
-        answers=(Info,),
-        meaning="description and current settings of the robot; the query has no payload",
+        answers=(Info, Refused),
+        meaning="description and current settings of the robot, `refused` while it starts; the query has no payload",
     ),
     Channel(
         name="alive",
         key="tvist/{robot}/alive",
         kind="liveliness",
         by="server",
-        meaning="exists as long as the server runs",
+        meaning="exists from when the robot is ready until its server ends",
     ),
     Channel(
         name="client",

@@ -36,6 +36,8 @@ def parse_json(data: bytes) -> Any:
     except json.JSONDecodeError as error:
         why = f"it is not valid JSON: line {error.lineno}, column {error.colno}: {error.msg}"
         raise ProtocolError("malformed", "", why) from error
+    except ValueError as error:
+        raise ProtocolError("malformed", "", "it is not valid JSON: a number has too many digits") from error
     except RecursionError as error:
         raise ProtocolError("malformed", "", "it is nested too deeply") from error
 

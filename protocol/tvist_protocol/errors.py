@@ -5,10 +5,17 @@ TvistError
 └── RefusedError    the message is valid, but the robot refused it
 """
 
+import re
+from typing import Final
+
 from tvist_protocol.replies import Code, Refused
 
 SHOWN = 60
 """Largest number of characters of a sender's text that a message repeats."""
+HARMFUL: Final = re.compile(
+    r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+)
+"""Control characters, as they begin a terminal's commands; those that turn the direction of text; no characters."""
 
 
 class TvistError(Exception):
@@ -51,6 +58,11 @@ class RefusedError(TvistError):
 
     def __str__(self) -> str:
         return f"{self.reply.code}: {self.reply.why}"
+
+
+def harmless(text: str) -> str:
+    """Make a text that may contain parts of a file or of a sender safe for a terminal; lines and tabs remain."""
+    return HARMFUL.sub("\N{REPLACEMENT CHARACTER}", text)
 
 
 def short(text: str) -> str:

@@ -58,8 +58,9 @@ def place(key: str) -> tuple[str, str] | None:
     """Namespace (empty if there is none) and name of the robot that a key belongs to; None if it is no robot's."""
     above, prefix, rest = f"/{key}".rpartition(f"/{PREFIX}/")
     robot, slash, leaf = rest.partition("/")
+    namespace = above.removeprefix("/")
     sound = prefix and slash and leaf and _ROBOT.match(robot)
-    return (above.removeprefix("/"), robot) if sound else None
+    return (namespace, robot) if sound and (not namespace or _NAMESPACE.match(namespace)) else None
 
 
 def check_client_name(name: str) -> str:

@@ -37,7 +37,7 @@ RING = "ring"
 """Entry of that metadata in a recording that forgets its beginning: how many ticks it keeps at least."""
 BEHAVIOUR = "behaviour"
 """Entry of that metadata: the number of the robot's behaviour, see `THIS_BEHAVIOUR`; 1 where it is missing."""
-THIS_BEHAVIOUR = 2
+THIS_BEHAVIOUR = 3
 """Number of the present behaviour. It rises with every deliberate change of the bits that a robot computes:
 
 1: recordings without this number.
@@ -50,10 +50,16 @@ _Some = TypeVar("_Some", bound=Recorded)
 _ENCODER = msgspec.json.Encoder()
 
 
-def earlier_name(name: str) -> str:
-    """Return the name of the file with the older part of a ring: `run.earlier.mcap` for `run.mcap`."""
+def earlier_name(name: str, run: int | None = None) -> str:
+    """Return the name of the file with the older part of a ring: `run.earlier.mcap` for `run.mcap`.
+
+    Args:
+        name: Name of the recording.
+        run: Number of an earlier run, whose recording is kept as `run.earlier-3.mcap`.
+    """
+    word = "earlier" if run is None else f"earlier-{run}"
     stem, dot, ending = name.rpartition(".")
-    return f"{stem}.earlier.{ending}" if dot and stem else f"{name}.earlier"
+    return f"{stem}.{word}.{ending}" if dot and stem else f"{name}.{word}"
 
 
 def topics(robot: str) -> dict[type[msgspec.Struct], str]:

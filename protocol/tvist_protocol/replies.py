@@ -32,6 +32,7 @@ Code = Literal[
     "payload_mismatch",
     "unsupported_version",
     "script_error",
+    "starting",
 ]
 """Reason of a refusal or of an event."""
 
@@ -62,6 +63,7 @@ CODE_MEANINGS: dict[Code, str] = {
     "payload_mismatch": "the calibration was made with a payload other than the declared one",
     "unsupported_version": "the server does not speak this version of the protocol",
     "script_error": "the text of a program is not valid; `where` is `text:LINE:COLUMN`",
+    "starting": "the robot is not ready yet, as after an installation, when a start compiles; `why` says how far it is",
 }
 
 
@@ -76,6 +78,8 @@ class Accepted(
     """Token of the lease or of the clock just taken; every command that needs it must contain it."""
     lease_s: float | None = None
     """Duration of the granted lease [s]; absent for the clock, which does not expire."""
+    limited: str | None = None
+    """Why the motion is slower than asked, or which limit it will exceed, for people; absent for one as asked."""
 
 
 class Done(Struct, frozen=True, kw_only=True, tag_field="type", tag="done", omit_defaults=True, gc=False):

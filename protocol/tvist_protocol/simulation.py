@@ -14,11 +14,11 @@ class SimulationReset(ClientMessage, frozen=True, kw_only=True, tag="simulation.
     token: Token
     """Token of the lease."""
     q: Joints | None = None
-    """Configuration to put the arm into, one angle per joint [rad]."""
+    """Configuration to put the arm into, one angle per joint [rad]; refused if bodies would meet there."""
     seed: Seed | None = None
     """New seed of the sensors' noise."""
     payload: Payload | None = None
-    """Payload that the arm carries, independent of the declared one."""
+    """Payload that the arm carries, independent of the declared one; refused if it would meet a body."""
     mode: ResetMode | None = None
     """Robot mode to set; this ends protective, safeguard and emergency stops, violations and faults."""
     shaper: Name | None = None

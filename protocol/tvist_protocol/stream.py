@@ -93,7 +93,7 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     shaper_delay: float
     """Time of the shaper's last impulse [s]."""
     missed_ticks: int
-    """Number of control periods since the start that began too late."""
+    """Number of control periods since the start that were missed: see `telemetry`."""
     shaper_clipped: bool = False
     """Whether the shaper cannot meet its specification: it would need a longer delay line, or leaves more vibration."""
     unshaped_q: list[float] | None = None
@@ -179,12 +179,22 @@ class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc
 
 
 class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="telemetry", gc=False):
-    """Timing and counters of the server, once a second. Counters count from the start of the server."""
+    """Timing and counters of the server, once a second. Counters count from the start of the server.
+
+    These definitions hold wherever the words appear. A control period is due at a fixed distance from the one before,
+    on the wall clock. It either begins, at its deadline or later, or is left out, when the robot is more than 50
+    periods behind. The lateness of a period is its beginning minus its deadline. A period is missed if it begins a
+    period late or more, or is left out; so no more are missed than were due. The rate is the periods that have begun,
+    or the states that were received, per second of the clock of whoever counts them. The load is the time from the
+    beginning to the end of the periods, with the commands carried out between them, per second of the wall clock.
+    The robot is overloaded once a fifth of the periods due were missed in each of two seconds in a row, until less
+    than a twentieth were in each of five. With a client that steps time, nothing is due.
+    """
 
     tick: int
     """Number of the control period."""
     ticks_per_second: float
-    """Measured control periods in the last second [1/s]."""
+    """Rate: control periods that have begun in the last second [1/s]."""
     late_p50_us: float
     """Median lateness of a tick in the last second [µs]."""
     late_p99_us: float
@@ -192,7 +202,7 @@ class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="teleme
     late_max_us: float
     """Largest lateness of a tick in the last second [µs]."""
     missed_ticks: int
-    """Number of control periods that began too late."""
+    """Number of control periods missed, of `due_ticks`."""
     dropped_states: int
     """Number of states that the server could not pass to the network in time; losses in the network are not counted."""
     recorder_dropped: int
@@ -212,4 +222,10 @@ class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="teleme
     refused: int
     """Number of commands refused."""
     load: float | None = None
-    """Share of the last second in which the thread that ticks worked for this robot [-]; null: a client steps time."""
+    """Load in the last second [-]; null: a client steps time."""
+    due_ticks: int | None = None
+    """Number of control periods that were due: those that have begun, and those left out; null: a client steps time."""
+    due_per_second: float | None = None
+    """Control periods due per second of the wall clock [1/s]; null: a client steps time, or an older server."""
+    overloaded: bool = False
+    """Whether the robot is overloaded; a `warning` tells when this begins and ends."""

@@ -37,6 +37,8 @@ class Filter(ABC):
         zeta: Damping ratios in use [-], shape (modes,).
         excess: Share by which the shaped acceleration may exceed the reference's, if such a bound is known and small
             [-]. The generator of the reference can stay below its limit by this share.
+        surplus: Shares by which the shaped velocity and acceleration may exceed those of a reference at the arm's
+            limits, anywhere [-]; who knows the arm sets them, see `mean_delay_of`.
         clipped: Whether the filter was limited at the last tick: a delay exceeded the buffer, or a mode was outside
             its estimator's bounds.
         feed_forward: Feed-forward that the drives need for the filter to work as designed.
@@ -51,6 +53,7 @@ class Filter(ABC):
     f_d: Floats
     zeta: Floats
     excess: float
+    surplus: tuple[float, float]
     clipped: bool
     feed_forward: FeedForward
     fault: str | None
@@ -75,6 +78,7 @@ class Filter(ABC):
         self.name, self.estimator = name, estimator
         self.joints, self.period = joints, period
         self.excess, self.clipped, self.fault = 0.0, False, None
+        self.surplus = (0.0, 0.0)
         self.feed_forward = "rigid"
         self._line = DelayLine(joints, capacity)
         self._reach = capacity
@@ -92,6 +96,17 @@ class Filter(ABC):
     @abstractmethod
     def mean_delay(self) -> float:
         """Mean delay of the last tick's weights [s], which is the lag behind a reference of constant velocity."""
+
+    def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:  # noqa: ARG002  unless overridden
+        """Mean delay of the weights for modes [s]; None if it is the same for all.
+
+        While it shrinks at a rate Ḋ, the shaped velocity is 1 - Ḋ times the reference's.
+
+        Args:
+            f_d: Damped frequencies [Hz], shape (modes,).
+            zeta: Damping ratios [-], shape (modes,).
+        """
+        return None
 
     @property
     def peak(self) -> float:

@@ -26,9 +26,3 @@ def compiled(function: F, *, nogil: bool = False) -> F:
     # As njit(cache=True) does, with a cache of our own.
     dispatcher._cache = KernelCache(dispatcher.py_func)  # noqa: SLF001
     return cast("F", dispatcher)
-
-
-def is_cached(function: Callable[..., Any]) -> bool:
-    """Return whether machine code of a compiled function is on disk; otherwise its first call takes seconds."""
-    cache = getattr(function, "_cache", None)
-    return cache is None or cache.holds()  # without numba there is nothing to compile

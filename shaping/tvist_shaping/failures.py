@@ -1,5 +1,7 @@
 """Failures of a shaper's function, and their descriptions."""
 
+from pathlib import Path
+from traceback import walk_tb
 from typing import Final
 
 from tvist_shaping._types import Floats
@@ -9,6 +11,7 @@ FAILURES: Final = (Exception, SystemExit)
 """Exceptions that a user's function may raise; Control+C is not among them."""
 ROUNDING: Final = 1e-6
 """Share by which a value may exceed its shaper's declaration, because of rounding [-]."""
+_HERE: Final = Path(__file__).parent
 
 
 def failure(error: BaseException, f_d: Floats, zeta: Floats) -> str:
@@ -29,4 +32,14 @@ def words(error: BaseException) -> str:
         return error.why
     said = " ".join(str(error).split())[:200]
     name = type(error).__name__
-    return f"raises {name}: {said}" if said else f"raises {name}"
+    return f"raises {name}{f': {said}' if said else ''}{_place(error)}"
+
+
+def _place(error: BaseException) -> str:
+    """Return where the user's file raised an error, as a phrase: the last line of the first file that is not ours."""
+    lines: dict[str, int] = {}
+    for frame, line in walk_tb(error.__traceback__):
+        file = frame.f_code.co_filename
+        if Path(file).parent != _HERE:
+            lines[file] = line
+    return next((f" in line {line} of {Path(file).name}" for file, line in lines.items()), "")

@@ -14,10 +14,39 @@ from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.polynomial import Polynomial, evaluate
 from tvist_shaping.failures import FAILURES, ROUNDING, failure
 from tvist_shaping.impulses import F_D_RANGE, UNSHAPED, Impulses, decay, product
+from tvist_shaping.own import longest as longest_of
 from tvist_shaping.shaper import Shaper
 
 Integers = npt.NDArray[np.int64]
 LOWEST, HIGHEST = F_D_RANGE
+EASE = 40.0
+"""Natural frequency of the low-pass through which modes pass that may change abruptly [1/s]."""
+QUICKEST = (1.0, 0.2)
+"""Largest relative rate of change of the frequency behind it, and largest rate of change of ζ [1/s]."""
+
+
+@compiled
+def eased(
+    f_d: Floats, zeta: Floats, ease: float, quickest: tuple[float, float], period: float, state: Floats
+) -> None:
+    """Advance a critically damped low-pass of second order by one tick; its rates of change are limited.
+
+    Args:
+        f_d: Damped frequencies [Hz], shape (modes,).
+        zeta: Damping ratios [-], shape (modes,).
+        ease: Its natural frequency [1/s].
+        quickest: See `QUICKEST`.
+        period: Tick [s].
+        state: Damped frequencies and damping ratios that follow them, and their rates of change, shape (4, modes);
+            changed.
+    """
+    for k in range(f_d.shape[0]):
+        for row in range(2):
+            goal = f_d[k] if row == 0 else zeta[k]
+            most = 2.0 / ease * (quickest[0] * state[0, k] if row == 0 else quickest[1])
+            apart = min(max(goal - state[row, k], -most), most)
+            state[2 + row, k] += period * ease * (ease * apart - 2.0 * state[2 + row, k])
+            state[row, k] += period * state[2 + row, k]
 
 
 @compiled
@@ -189,21 +218,23 @@ class TvistFilter(Filter):
         if not 0.0 < max_delay < math.inf:
             raise FilterError("max_delay", max_delay, "a finite number of seconds above 0")
         longest = estimator.modes * shaper.duration_periods / estimator.f_d_min
+        if longest > max_delay and estimator.modes * longest_of(shaper, estimator.f_d_min) <= max_delay:
+            longest = max_delay
         if longest > max_delay:
             raise FilterError(
                 "duration",
                 longest,
                 f"at most max_delay = {max_delay:g} s",
-                f"shaper {shaper.name!r} lasts {shaper.duration_periods:g} periods a mode, and {estimator!r} "
-                f"has {estimator.modes} mode(s) that may go down to {estimator.f_d_min:g} Hz: take a larger "
-                "max_delay, a shorter shaper or an estimator with a higher lowest frequency",
+                f"shaper {shaper.name!r} lasts {shaper.duration_periods:g} periods a mode, and f_d of the estimator's "
+                f"{estimator.modes} mode(s) may go down to {estimator.f_d_min:g} Hz: take a shorter shaper, whose "
+                "times are in seconds, a larger max_delay or an estimator with a higher lowest frequency",
             )
         if estimator.zeta_max >= shaper.zeta_max:
             raise FilterError(
                 "zeta_max",
                 estimator.zeta_max,
                 f"less than {shaper.zeta_max:g}, as shaper {shaper.name!r} demands",
-                "take another shaper or an estimator with a lower highest damping",
+                "take a shaper with a higher zeta_max or an estimator with a lower highest damping",
             )
         # One tick more than max_delay, for rounding of τ/h; the others are for interpolation.
         super().__init__(shaper.name, estimator, joints, period, math.ceil(max_delay / period) + 5)
@@ -212,6 +243,7 @@ class TvistFilter(Filter):
         self.shaper = shaper
         self.max_delay = max_delay
         self._impulses: Impulses | None = UNSHAPED
+        self._eased: Floats = np.zeros((4, estimator.modes))
         train = shaper.train if estimator.modes == 1 else None
         self._train = None if train is None else np.array(train)
         self._work: Floats = np.zeros((3, 1 if train is None else len(train.a)))
@@ -240,6 +272,11 @@ class TvistFilter(Filter):
     def mean_delay(self) -> float:
         """Mean delay of the last tick's impulses [s]."""
         return self.impulses.mean_delay
+
+    def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:
+        """See `Filter.mean_delay_of`: the modes' mean delays add up."""
+        give = self.shaper.impulses
+        return sum(give(f, z).mean_delay for f, z in zip(f_d.tolist(), zeta.tolist(), strict=True))
 
     @property
     def peak(self) -> float:
@@ -272,7 +309,20 @@ class TvistFilter(Filter):
         return changed
 
     def _start(self) -> None:
-        self._suppress(self.estimator.settle(self._angles(self._q_star)))
+        modes = self.estimator.settle(self._angles(self._q_star))
+        self._eased[:2], self._eased[2:] = modes, 0.0
+        self._suppress(modes)
+
+    def _modes(self) -> tuple[Floats, Floats]:
+        """See `Filter._modes`; modes that may change abruptly are followed gradually, which keeps the limits."""
+        modes = super()._modes()
+        if not self.estimator.abrupt:
+            return modes
+        if self.settled:
+            self._eased[:2], self._eased[2:] = modes, 0.0
+            return modes
+        eased(*modes, EASE, QUICKEST, self.period, self._eased)
+        return self._eased[0].copy(), self._eased[1].copy()
 
     def _suppress(self, modes: tuple[Floats, Floats]) -> None:
         """Set the impulses for these modes."""
@@ -333,4 +383,4 @@ class TvistFilter(Filter):
 
     def _part(self) -> None:
         super()._part()
-        self._work = self._work.copy()
+        self._work, self._eased = self._work.copy(), self._eased.copy()

@@ -70,19 +70,22 @@ class FirShaper:
         """
         given = np.array(self.function(f_d.copy(), zeta.copy()), dtype=float)
         if given.ndim != 1 or not 1 <= given.size <= self.taps:
-            raise ShaperFailureError(
-                self.name, f"returns taps of shape {given.shape}, but must return 1 to {self.taps}"
-            )
+            why = f"returns taps of shape {given.shape}, but must return 1 to {self.taps}"
+            more = given.ndim == 1 and self.taps < given.size <= MAX_TAPS
+            raise ShaperFailureError(self.name, f"{why} (give FirShaper taps={given.size})" if more else why)
         if not np.isfinite(given).all():
             raise ShaperFailureError(self.name, "returns taps that are not finite")
         if abs(given.sum() - 1.0) >= 1e-9:
             raise ShaperFailureError(
-                self.name, f"returns taps that sum to {float(given.sum())!r}, but must sum to 1 within 1e-9"
+                self.name,
+                f"returns taps that sum to {float(given.sum())!r}, but must sum to 1 within 1e-9 "
+                "(divide them by their sum)",
             )
         if (most := float(np.abs(given).sum())) > self.peak * (1.0 + ROUNDING):
             raise ShaperFailureError(
                 self.name,
-                f"returns taps whose magnitudes sum to {most:g}, more than its peak of {self.peak:g}",
+                f"returns taps whose magnitudes sum to {most:g}, more than its peak of {self.peak:g} "
+                f"(give FirShaper peak={most:g})",
             )
         return np.pad(given, (0, self.taps - given.size))
 
@@ -116,10 +119,6 @@ class _Weights(Design):
     def __repr__(self) -> str:
         return f"{self.name!r}"
 
-    def copy(self) -> "_Weights":
-        """Return this object itself, since it has no state."""
-        return self
-
     def fork(self) -> Self:
         """Return this object itself, since it has no state."""
         return self
@@ -132,3 +131,7 @@ class _Weights(Design):
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:  # noqa: ARG002
         """Compute the taps for these modes; see `Design.go_on`."""
         return self.start(f_d, zeta, taps)
+
+    def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float:
+        """See `Filter.mean_delay_of`."""
+        return float(self._shaper.weights(f_d, zeta) @ np.arange(self.taps)) * self.period

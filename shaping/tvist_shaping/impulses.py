@@ -52,9 +52,13 @@ class Impulses:
             if not np.isfinite(values).all():
                 raise ImpulseError(f"{name} is {values.tolist()}, but must be finite")
         if tau[0] != 0.0 or (np.diff(tau) < 0.0).any():
-            raise ImpulseError(f"tau is {tau.tolist()}, but must ascend from 0")
+            raise ImpulseError(
+                f"tau is {tau.tolist()}, but must ascend from 0 (sort the impulses by time, and subtract the first)"
+            )
         if abs(A.sum() - 1.0) >= 1e-9:
-            raise ImpulseError(f"A sums to {float(A.sum())!r}, but must sum to 1 within 1e-9")
+            raise ImpulseError(
+                f"A sums to {float(A.sum())!r}, but must sum to 1 within 1e-9 (divide A by its sum)"
+            )
         self._hold(A, tau)
 
     def _hold(self, A: Floats, tau: Floats) -> None:

@@ -10,14 +10,13 @@ ever renewed, and it appears whole.
 # mypy: disable-error-code="no-untyped-call,attr-defined"
 
 import contextlib
-
-# mypy: disable-error-code="no-untyped-call,attr-defined"
-# The types of numba are not whole.
 import hashlib
+import multiprocessing
 import os
 import pickle
 import sys
 import uuid
+import warnings
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
@@ -31,14 +30,23 @@ from numba.core.registry import cpu_target
 from numba.core.serialize import dumps
 from numba.misc.appdirs import AppDirs
 
+from tvist_shaping import trust
 from tvist_shaping.kernel_sources import digest
 
 DIGITS = 16
 """Hexadecimal digits of each hash in a file's name."""
 CHECKSUM_BYTES = 32
 
+kernels: "list[KernelCache]" = []
+"""Those of all functions that this process has imported so far."""
 unkept: dict[str, str] = {}
 """Why machine code could not be kept in any folder, by the folder that was tried last."""
+_said: set[str] = set()
+"""Warnings that were given."""
+
+
+class DistrustWarning(UserWarning):
+    """Machine code on disk is not used, since somebody else may have put it there."""
 
 
 class KernelCache(_Cache):
@@ -50,9 +58,11 @@ class KernelCache(_Cache):
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
-        self._name = f"{function.__module__}.{function.__qualname__}".replace("<locals>", "_")
+        self.name = f"{function.__module__}.{function.__qualname__}".replace("<locals>", "_")
+        """Module and name of the function."""
         self._content = _Content(function)
         self._enabled = True
+        kernels.append(self)
 
     @cached_property
     def _sources(self) -> str:
@@ -70,20 +80,24 @@ class KernelCache(_Cache):
 
     def holds(self) -> bool:
         """Return whether there is machine code of this kernel for this processor, for any types."""
-        pattern = f"{self._name}.{self._sources}-{_machine(cpu_target.target_context)}-*.kernel"
-        return any(True for folder in self._folders for _ in folder.glob(pattern))
+        start = f"{self.name}.{self._sources}-{_machine(cpu_target.target_context)}-"
+        for folder in self._folders:
+            with contextlib.suppress(OSError):
+                names = [name for name in os.listdir(folder) if name.startswith(start)]  # noqa: PTH208  fast
+                if any(name.endswith(".kernel") and _read(folder / name) is not None for name in names):
+                    return True
+        return False
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
         """Return the kernel for types of arguments; None if there is none on disk, or the file is damaged."""
         target_context.refresh()
         name = self._file(sig, target_context)
         for folder in self._folders if self._enabled else ():
-            with contextlib.suppress(OSError):
-                content = (folder / name).read_bytes()
-                checksum, code = content[:CHECKSUM_BYTES], content[CHECKSUM_BYTES:]
-                if hashlib.sha256(code).digest() == checksum:
-                    _cache_log("[cache] data loaded from %r", str(folder / name))  # with NUMBA_DEBUG_CACHE=1
-                    return self._content.rebuild(target_context, pickle.loads(code))  # noqa: S301  written by us
+            content = _read(folder / name) or b""
+            checksum, code = content[:CHECKSUM_BYTES], content[CHECKSUM_BYTES:]
+            if hashlib.sha256(code).digest() == checksum:
+                _cache_log("[cache] data loaded from %r", str(folder / name))  # with NUMBA_DEBUG_CACHE=1
+                return self._content.rebuild(target_context, pickle.loads(code))  # noqa: S301  ours, or root's
         return None
 
     def save_overload(self, sig: object, data: Any) -> None:
@@ -115,17 +129,18 @@ class KernelCache(_Cache):
     def flush(self) -> None:
         """Remove this kernel's machine code for all sources, processors and types."""
         for folder in self._folders:
-            _remove(folder.glob(f"{self._name}.*.kernel"))
+            with contextlib.suppress(OSError):
+                _remove(trust.real_folder(folder).glob(f"{self.name}.*.kernel"))
 
     def _file(self, sig: object, target_context: Any) -> str:
-        return f"{self._name}.{self._sources}-{_machine(target_context)}-{_short(str(sig))}.kernel"
+        return f"{self.name}.{self._sources}-{_machine(target_context)}-{_short(str(sig))}.kernel"
 
     def _forget_older(self, folder: Path, name: str) -> None:
         """Remove what this kernel was before its sources changed, on this machine."""
         machine = name.split("-")[-2]
         older = (
             file
-            for file in folder.glob(f"{self._name}.*-{machine}-*.kernel")
+            for file in folder.glob(f"{self.name}.*-{machine}-*.kernel")
             if self._sources not in file.name
         )
         _remove(older)
@@ -148,10 +163,18 @@ def folders(sources: Path) -> list[Path]:
         sources: Folder of the modules with the kernels.
     """
     below = f"{sources.name}-{_short(str(sources))}"
-    if config.CACHE_DIR:  # NUMBA_CACHE_DIR
-        return [Path(config.CACHE_DIR) / below]
-    user = Path(AppDirs(appname="tvist", appauthor=False).user_cache_dir)
-    return [sources / "__pycache__", user / "kernels" / below]
+    user = Path(AppDirs(appname="tvist", appauthor=False).user_cache_dir) / "kernels" / below
+    if not config.CACHE_DIR:  # NUMBA_CACHE_DIR
+        return [sources / "__pycache__", user]
+    named = Path(config.CACHE_DIR) / below
+    try:
+        trust.real_folder(named)
+    except trust.DistrustError as error:
+        _warn(f"{error}, or give NUMBA_CACHE_DIR another folder; until then {user.parent} is used instead")
+        return [user]
+    except OSError:  # there is nothing to read; what is to be kept meets it again
+        pass
+    return [named]
 
 
 def _machine(target_context: Any) -> str:
@@ -160,11 +183,37 @@ def _machine(target_context: Any) -> str:
     return _short(repr((target_context.codegen().magic_tuple(), versions)))
 
 
+def _read(file: Path) -> bytes | None:
+    """Return what is in a file; None if there is none, or somebody else may have written it."""
+    try:
+        file.lstat()
+        return trust.read_file(trust.real_folder(file.parent) / file.name)
+    except trust.DistrustError as error:
+        _warn(f"{error}, or delete {file.parent}; until then another folder is used")
+    except OSError:
+        pass
+    return None
+
+
+def _warn(why: str) -> None:
+    """Say once that machine code is not used; processes that help leave it to the one that they help."""
+    if why not in _said and multiprocessing.parent_process() is None:
+        _said.add(why)
+        warnings.warn(
+            f"compiled kernels are not loaded where somebody else can have put them: {why}",
+            DistrustWarning,
+            stacklevel=2,
+        )
+
+
 def _write(file: Path, content: bytes) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
+    file = trust.make_folder(file.parent) / file.name
     draft = file.with_name(f"{uuid.uuid4().hex}.draft")
     try:
-        draft.write_bytes(content)
+        # Whatever the umask, nobody else can write it.
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+        with open(os.open(draft, flags, 0o644), "wb") as stream:  # noqa: PTH123  a descriptor
+            stream.write(content)
         os.replace(draft, file)  # noqa: PTH105  whole, or not at all
     except OSError:
         _remove(iter([draft]))

@@ -1,9 +1,11 @@
 """The user's own shapers: created from a function, and checked before anything moves."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
+from tvist_shaping._types import Floats
 from tvist_shaping.errors import DesignError, ShaperFailureError
 from tvist_shaping.failures import FAILURES, ROUNDING, failure
 from tvist_shaping.fir_shaper import FirShaper
@@ -11,7 +13,9 @@ from tvist_shaping.impulses import Impulses
 from tvist_shaping.shaper import Shaper
 
 TRIED_F_D = (0.1, 200.0)
-"""Range of damped frequencies for which a shaper is checked [Hz]: all that a client may send to a robot."""
+"""Range of damped frequencies with which a shaper is tried [Hz]: all that a client may send to a robot."""
+_USUAL = (10.0, 0.1)
+"""Mode that is tried first: damped frequency [Hz], damping ratio [-]."""
 _F_D = np.geomspace(*TRIED_F_D, 23)
 _SHARES = np.array([*np.linspace(0.0, 1.0, 24, endpoint=False), 0.99])
 """Damping ratios to check, as shares of the highest one that a shaper supports [-]."""
@@ -35,16 +39,15 @@ def shaper_of(
 
     Args:
         function: (f_d [Hz], ζ [-]) -> impulses of one mode. It is called at every tick and in several threads, so it
-            must be fast, and always return the same result for the same mode. Its times must be proportional to
-            1/f_d; for times that are not, use a `FirShaper`.
+            must be fast, and always return the same result for the same mode.
         name: Name of the shaper; "" for the function's name.
         description: Description of the shaper; "" for the first line of the function's docstring.
         zeta_max: Damping ratios must stay below this [-], above 0 and at most 1.
 
     Raises:
         DesignError: zeta_max is out of range.
-        ShaperFailureError: The function raises an exception, or does not return impulses, for a mode of 0.1 to 200 Hz
-            and a damping ratio below zeta_max.
+        ShaperFailureError: The function raises an exception, or does not return impulses, for every mode of 0.1 to
+            200 Hz and a damping ratio below zeta_max. A robot demands that it works for all modes of its arm.
     """
     if not 0.0 < zeta_max <= 1.0:
         raise DesignError("zeta_max", zeta_max, "above 0 and at most 1")
@@ -52,7 +55,7 @@ def shaper_of(
     lines = str(function.__doc__ or "").strip().splitlines()
     what = description or (lines[0] if lines else "a shaper of your own")
     trial = Shaper(called, what, function, np.inf, zeta_max, np.inf)
-    duration, peak = _tried(trial)
+    duration, peak, _ = _tried(trial)
     return Shaper(called, what, function, duration, zeta_max, peak if peak > 1.0 + ROUNDING else 1.0)
 
 
@@ -61,48 +64,105 @@ def check_shaper(shaper: Shaper | FirShaper) -> None:
 
     Raises:
         DesignError: Its declaration is invalid.
-        ShaperFailureError: Its function raises an exception, or returns weights whose sum is not 1 or that violate
-            the declaration.
+        ShaperFailureError: Its function fails for all of them, or violates the declaration for one.
     """
     if isinstance(shaper, Shaper):
         for field, low, high, limit in _DECLARED:
             value = getattr(shaper, field)
             if not (isinstance(value, int | float) and low <= value <= high):
                 raise DesignError(field, value, limit)
-        _tried(shaper)
-        return
-    ratios = _APART ** np.arange(shaper.modes)
-    for f_d in _F_D:
-        for share in _SHARES:
-            modes = f_d * ratios, np.full(shaper.modes, share)
-            try:
-                shaper.weights(*modes)
-            except FAILURES as error:
-                raise ShaperFailureError(shaper.name, failure(error, *modes)) from error
+    _tried(shaper)
 
 
-def _tried(shaper: Shaper) -> tuple[float, float]:
-    """Return the longest duration in damped periods, and the largest sum of magnitudes.
+def check_range(
+    shaper: Shaper | FirShaper, f_d: tuple[float, float], zeta: tuple[float, float], whose: str
+) -> None:
+    """Try a shaper with all modes that an arm may have.
+
+    Args:
+        shaper: The shaper.
+        f_d: Lowest and highest damped frequency [Hz].
+        zeta: Lowest and highest damping ratio [-].
+        whose: Whose modes these are, for the message.
 
     Raises:
-        ShaperFailureError: The function fails, or violates the shaper's declaration.
+        ShaperFailureError: Its function fails for one of them.
     """
-    longest, most = 0.0, 0.0
-    for f_d in _F_D.tolist():
-        for zeta in (shaper.zeta_max * _SHARES).tolist():
+    for one in np.geomspace(*f_d, 25).tolist():
+        for other in np.linspace(*zeta, 10).tolist():
             try:
-                impulses = shaper.impulses(f_d, zeta)
-            except FAILURES as error:
-                why = failure(error, np.array([f_d]), np.array([zeta]))
-                raise ShaperFailureError(shaper.name, why) from error
-            longest = max(longest, impulses.duration * f_d)
-            most = max(most, float(np.abs(impulses.A).sum()))
-    for what, found, declared in (
-        ("duration_periods", longest, shaper.duration_periods),
-        ("peak", most, shaper.peak),
-    ):
-        if found > declared * (1.0 + ROUNDING):
+                _evaluated(shaper, one, other)
+            except ShaperFailureError as error:
+                limits = f"{f_d[0]:.3g} to {f_d[1]:.3g} Hz with ζ = {zeta[0]:.2g} to {zeta[1]:.2g}"
+                raise ShaperFailureError(
+                    shaper.name,
+                    f"{error.why}; it must support the modes of {whose}, {limits}: extend what it is defined over, or "
+                    "clip f_d and zeta to that",
+                ) from error
+
+
+def longest(shaper: Shaper, f_d_min: float) -> float:
+    """Return the largest time of the last impulse of one mode [s], for the modes from a frequency on that it supports.
+
+    It is shorter than `duration_periods` says if the times are not proportional to 1/f_d, as those from a table.
+
+    Args:
+        shaper: The shaper.
+        f_d_min: Lowest damped frequency [Hz].
+    """
+    undeclared = replace(shaper, duration_periods=np.inf, peak=np.inf)
+    return _tried(undeclared, np.geomspace(f_d_min, max(f_d_min, TRIED_F_D[1]), _F_D.size))[2]
+
+
+def _tried(shaper: Shaper | FirShaper, tried: Floats = _F_D) -> tuple[float, float, float]:
+    """Return the longest duration in damped periods, the largest sum of magnitudes, and the longest duration [s].
+
+    They are those of the modes for which the function works.
+
+    Raises:
+        ShaperFailureError: The function works nowhere, or violates the shaper's declaration.
+    """
+    zeta_max = shaper.zeta_max if isinstance(shaper, Shaper) else 1.0
+    undeclared = shaper if isinstance(shaper, Shaper) else replace(shaper, peak=1e300)
+    modes = [(f_d, zeta) for f_d in tried.tolist() for zeta in (zeta_max * _SHARES).tolist()]
+    found = []
+    first = None
+    for f_d, zeta in ((max(_USUAL[0], tried[0]), min(_USUAL[1], 0.5 * zeta_max)), *modes):
+        try:
+            impulses = _evaluated(undeclared, f_d, zeta)
+        except ShaperFailureError as error:
+            first = first or error
+            continue
+        found.append((impulses.duration * f_d, float(np.abs(impulses.A).sum()), impulses.duration))
+    if not found:
+        assert first is not None
+        raise first
+    periods, most, seconds = map(max, zip(*found, strict=True))
+    declared = {"peak": (most, shaper.peak)}
+    if isinstance(shaper, Shaper):
+        declared["duration_periods"] = (periods, shaper.duration_periods)
+    for what, (value, limit) in declared.items():
+        if value > limit * (1.0 + ROUNDING):
             raise ShaperFailureError(
-                shaper.name, f"has a {what} of {found:g}, more than the declared {declared:g}"
+                shaper.name,
+                f"has a {what} of {value:g}, more than the declared {limit:g}: give {what}={value:.9g} to "
+                f"{type(shaper).__name__}, or change the function",
             )
-    return longest, most
+    return periods, most, seconds
+
+
+def _evaluated(shaper: Shaper | FirShaper, f_d: float, zeta: float) -> Impulses:
+    """Return the impulses for a mode; for a FIR filter of several, the others are above it.
+
+    Raises:
+        ShaperFailureError: The function fails.
+    """
+    count = 1 if isinstance(shaper, Shaper) else shaper.modes
+    modes = np.array([f_d * _APART**mode for mode in range(count)]), np.full(count, zeta)
+    try:
+        if isinstance(shaper, Shaper):
+            return shaper.impulses(f_d, zeta)
+        weights = shaper.weights(*modes)
+        return Impulses(weights, shaper.period * np.arange(float(weights.size)))
+    except FAILURES as error:
+        raise ShaperFailureError(shaper.name, failure(error, *modes)) from error

@@ -45,7 +45,10 @@ class Shaper:
         """
         impulses = self.function(f_d, zeta)
         if not isinstance(impulses, Impulses):
-            raise ShaperFailureError(self.name, f"returns {type(impulses).__name__} instead of Impulses")
+            kind = type(impulses).__name__
+            raise ShaperFailureError(
+                self.name, f"returns {kind} instead of Impulses(A, tau) of tvist_shaping"
+            )
         return impulses
 
     def band(self, V: float = 0.05, zeta: float = 0.0) -> tuple[float, float]:

@@ -69,6 +69,10 @@ class Design(ABC):
             Whether the taps are as required; False if a delay was clipped.
         """
 
+    def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:  # noqa: ARG002  unless overridden
+        """See `Filter.mean_delay_of`."""
+        return None
+
 
 class ProductDesign(Design):
     """The modes' zero-vibration shapers in series, delayed to a constant mean delay."""
@@ -256,6 +260,10 @@ class SteadyFilter(Filter):
     def mean_delay(self) -> float:
         """Mean delay of the taps of the last tick [s]."""
         return float(self._taps @ self._delays) * self.period
+
+    def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:
+        """See `Filter.mean_delay_of`: the design's own."""
+        return self.design.mean_delay_of(f_d, zeta)
 
     @property
     def peak(self) -> float:

@@ -1,5 +1,5 @@
 """Compile the functions of the plant."""
 
-from tvist_shaping.compiling import compiled, is_cached
+from tvist_shaping.compiling import compiled
 
-__all__ = ["compiled", "is_cached"]
+__all__ = ["compiled"]

@@ -28,11 +28,11 @@ def in_words(error: msgspec.ValidationError, content: Any) -> str:
             value = value[int(index) if index else name]
         except (TypeError, LookupError):
             value = None
-    key = key.replace("[...]", ".<one of its keys>")
+    key = key.replace("[...]", ".<one of its keys>")[:200]
     for pattern, words in _RULES:
         if found := re.fullmatch(pattern, said):
             return words(key, value, *found.groups())
-    return f"{key or 'the file'}: {said.replace('`', '')}"
+    return f"{key or 'the file'}: {said.replace('`', ''):.300}"
 
 
 def _missing(key: str, _: Any, name: str) -> str:
@@ -40,11 +40,11 @@ def _missing(key: str, _: Any, name: str) -> str:
 
 
 def _unknown(key: str, _: Any, name: str) -> str:
-    return f"{_joined(key, name)} is not a key of a robot file"
+    return f"{_joined(key, name):.200} is not a key of a robot file"
 
 
 def _bound(key: str, value: Any, relation: str, limit: str) -> str:
-    return f"{key} is {value!r}: must be {_RELATIONS[relation]} {float(limit):g}"
+    return f"{key} is {value!r:.60}: must be {_RELATIONS[relation]} {float(limit):g}"
 
 
 def _length(key: str, value: Any, relation: str, limit: str) -> str:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from tvist_plant._compiled import is_cached
 from tvist_plant.arm_memory import ENCODER_STEP, GRAVITY, LAST, NOW, SUBSTEPS, memory_for, parts
 from tvist_plant.arm_memory import PERIOD as PERIOD_AT
 from tvist_plant.arm_tick import evaluate, move, play, tick
@@ -26,11 +25,6 @@ SUBSTEPS_OF_A_PERIOD = 4
 """Substeps per period. From Q1 to Q3, four agree with eight to within 0.02 m/s² of tool acceleration, two to within
 0.09; most of that is the ripple of the gears.
 """
-
-
-def is_compiled() -> bool:
-    """Return whether the arm's equations are compiled; otherwise the first tick compiles them, for seconds."""
-    return is_cached(tick)
 
 
 class FlexibleArm:

@@ -13,6 +13,7 @@ from tvist_plant.robot_tables import (
     Tensor,
 )
 from tvist_plant.units import check_limits
+from tvist_plant.user_file import LONGEST_NAME, is_name
 
 
 def check(description: RobotDescription, source: str | Path) -> None:
@@ -22,6 +23,7 @@ def check(description: RobotDescription, source: str | Path) -> None:
         RobotFileError: Something is wrong; the message names the file, the key and what is allowed.
         UserFileError: A limit is probably in degrees.
     """
+    _check_names(description, source)
     _check(description, source)
     check_limits(description.limits.position, description.limits.velocity, f"robot file {source}")
     _check_bodies(description, source)
@@ -33,6 +35,21 @@ def is_real_body(inertia: Tensor) -> bool:
     xx, xy, xz, yy, yz, zz = inertia
     least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return bool(least >= -1e-9 * most and most <= (least + middle) * (1.0 + 1e-6))
+
+
+def _check_names(description: RobotDescription, source: str | Path) -> None:
+    """Check that names, which go to terminals, pages and other programs, can be shown there."""
+    robot, bodies = description.robot, description.collision.bodies
+    names = {"robot.name": [robot.name], "robot.model": [robot.model], "robot.joints": robot.joints}
+    names |= {"collision.bodies": [body.name for body in bodies], "poses": list(description.poses)}
+    names["provenance"] = list(description.provenance)
+    for key, found in names.items():
+        for name in found:
+            if not is_name(name):
+                raise RobotFileError(
+                    f"robot file {source}: {key} has the name {name!r:.{LONGEST_NAME}}: "
+                    f"must be at most {LONGEST_NAME} printable characters"
+                )
 
 
 def _check(description: RobotDescription, source: str | Path) -> None:
@@ -129,6 +146,6 @@ def _check_provenance(description: RobotDescription, source: str | Path) -> None
         kind, colon, words = origin.partition(":")
         if kind not in ORIGINS or not colon or not words.strip():
             raise RobotFileError(
-                f"robot file {source}: provenance.{key} is {origin!r}: "
+                f"robot file {source}: provenance.{key} is {origin!r:.200}: "
                 f"must be one of {', '.join(ORIGINS)}, a colon and the source"
             )

@@ -6,6 +6,7 @@ meets the height of the URDF's root link; that axis must be vertical.
 """
 
 import math
+from collections import Counter, defaultdict
 from pathlib import Path
 from typing import Any, Final
 from xml.etree.ElementTree import Element
@@ -13,6 +14,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import numpy.typing as npt
 
+from tvist_plant.robot_tables import MAX_JOINTS
 from tvist_plant.urdf_elements import (
     TURNING,
     Body,
@@ -25,6 +27,7 @@ from tvist_plant.urdf_elements import (
     origin_of,
     parsed,
 )
+from tvist_plant.user_file import LONGEST_NAME
 
 Floats = npt.NDArray[np.float64]
 
@@ -51,14 +54,26 @@ def read_urdf(path: str | Path) -> dict[str, Any]:
     for joint in joints:
         for link in (joint.parent, joint.child):
             if link not in links:
-                raise UrdfError(f"{where}: joint {joint.name}: there is no link {link!r}")
-    chain = _chain(_root(links, joints, where), joints, where)
-    return _content(str(root.get("name") or Path(path).stem), Path(path), links, joints, chain, where)
+                raise UrdfError(f"{where}: joint {joint.name}: there is no link {link!r:.{LONGEST_NAME}}")
+    base = _root(links, joints, where)
+    tree = _Tree(joints)
+    chain = _chain(base, tree, where)
+    return _content(str(root.get("name") or Path(path).stem), Path(path), links, tree, chain, where)
+
+
+class _Tree:
+    """Joints by the links that they connect, found without looking at all of them."""
+
+    def __init__(self, joints: list[Joint]) -> None:
+        self.to = {joint.child: joint for joint in joints}
+        self.of: defaultdict[str, list[Joint]] = defaultdict(list)
+        for joint in joints:
+            self.of[joint.parent].append(joint)
 
 
 def _root(links: dict[str, Element], joints: list[Joint], where: str) -> str:
-    children = [joint.child for joint in joints]
-    twice = next((name for name in children if children.count(name) > 1), None)
+    children = Counter(joint.child for joint in joints)
+    twice = next((name for name, count in children.items() if count > 1), None)
     if twice is not None:
         raise UrdfError(f"{where}: link {twice} is the child of two joints: closed chains are not supported")
     roots = [name for name in links if name not in children]
@@ -67,19 +82,18 @@ def _root(links: dict[str, Element], joints: list[Joint], where: str) -> str:
     return roots[0]
 
 
-def _chain(root: str, joints: list[Joint], where: str) -> list[Joint]:
+def _chain(root: str, tree: _Tree, where: str) -> list[Joint]:
     """Return the movable joints from the base on.
 
     Raises:
-        UrdfError: The chain branches, or a joint is of a kind that is not supported.
+        UrdfError: The chain branches, has too many joints, or a joint is of a kind that is not supported.
     """
     chain: list[Joint] = []
     at: str | None = root
     while at is not None:
-        rigid = _rigid(at, joints)
-        ways = [joint for joint in joints if joint.parent in rigid and joint.kind != "fixed"]
+        ways = [joint for link in _rigid(at, tree) for joint in tree.of[link] if joint.kind != "fixed"]
         if len(ways) > 1:
-            names = ", ".join(joint.name for joint in ways)
+            names = ", ".join(joint.name for joint in ways[:MAX_JOINTS])
             raise UrdfError(
                 f"{where}: the chain branches after link {at}, into the joints {names}: only one chain is supported; "
                 "make the others fixed or remove them"
@@ -88,33 +102,35 @@ def _chain(root: str, joints: list[Joint], where: str) -> list[Joint]:
         for joint in ways:
             if joint.kind not in TURNING:
                 raise UrdfError(
-                    f"{where}: joint {joint.name} is {joint.kind}: must be {', '.join(TURNING)} or fixed"
+                    f"{where}: joint {joint.name} is {joint.kind:.60}: must be {', '.join(TURNING)} or fixed"
                 )
             chain.append(joint)
             at = joint.child
+        if len(chain) > MAX_JOINTS:
+            raise UrdfError(f"{where}: more than {MAX_JOINTS} joints turn: 1 to {MAX_JOINTS} are supported")
     if not chain:
         raise UrdfError(f"{where}: it has no joint that turns")
     return chain
 
 
-def _rigid(link: str, joints: list[Joint]) -> dict[str, Floats]:
+def _rigid(link: str, tree: _Tree) -> dict[str, Floats]:
     """Return the links that are fixed to a link, itself included, with their frames in its frame."""
     found = {link: np.eye(4)}
     waiting = [link]
     while waiting:
         at = waiting.pop()
-        for joint in joints:
-            if joint.parent == at and joint.kind == "fixed" and joint.child not in found:
+        for joint in tree.of[at]:
+            if joint.kind == "fixed" and joint.child not in found:
                 found[joint.child] = found[at] @ joint.placement
                 waiting.append(joint.child)
     return found
 
 
 def _content(
-    name: str, path: Path, links: dict[str, Element], joints: list[Joint], chain: list[Joint], where: str
+    name: str, path: Path, links: dict[str, Element], tree: _Tree, chain: list[Joint], where: str
 ) -> dict[str, Any]:
     turns = [_about_z(joint.axis) for joint in chain]
-    frames = [_in_previous(joint, joints) for joint in chain]
+    frames = [_in_previous(joint, tree) for joint in chain]
     first = frames[0] @ turns[0]
     if first[2, 2] < 1.0 - UPRIGHT:
         raise UrdfError(f"{where}: the axis of joint {chain[0].name} must point straight up from the base")
@@ -122,9 +138,9 @@ def _content(
     for number, joint in enumerate(chain):
         back = np.asarray(np.linalg.inv(turns[number]), dtype=np.float64)
         last = number == len(chain) - 1
-        after = _flange(joint.child, joints) if last else frames[number + 1] @ turns[number + 1]
+        after = _flange(joint.child, tree) if last else frames[number + 1] @ turns[number + 1]
         placement: Floats = back @ after
-        bodies.append(_body(joint.child, links, joints, placement, back, where))
+        bodies.append(_body(joint.child, links, tree, placement, back, where))
         if number == 0:  # turning about the first axis and moving along it change places with the joint
             upright = first.copy()
             upright[:2, 3] = 0.0
@@ -166,27 +182,23 @@ def _about_z(axis: Floats) -> Floats:
     return frame
 
 
-def _in_previous(joint: Joint, joints: list[Joint]) -> Floats:
+def _in_previous(joint: Joint, tree: _Tree) -> Floats:
     """Return the frame of a joint in that of the link which the joint before it moves, or of the base."""
     placement, at = joint.placement, joint.parent
-    while (
-        before := next((one for one in joints if one.child == at and one.kind == "fixed"), None)
-    ) is not None:
+    while (before := tree.to.get(at)) is not None and before.kind == "fixed":
         placement, at = before.placement @ placement, before.parent
     return placement
 
 
-def _flange(link: str, joints: list[Joint]) -> Floats:
-    rigid = _rigid(link, joints)
+def _flange(link: str, tree: _Tree) -> Floats:
+    rigid = _rigid(link, tree)
     return next((rigid[name] for name in FLANGES if name in rigid), rigid[link])
 
 
-def _body(
-    link: str, links: dict[str, Element], joints: list[Joint], end: Floats, back: Floats, where: str
-) -> Body:
+def _body(link: str, links: dict[str, Element], tree: _Tree, end: Floats, back: Floats, where: str) -> Body:
     """Return the bodies that a joint moves up to the next one, in the frame at their end."""
     whole, into = Body(), np.linalg.inv(end) @ back
-    for name, placement in _rigid(link, joints).items():
+    for name, placement in _rigid(link, tree).items():
         inertial = links[name].find("inertial")
         if inertial is None:
             continue

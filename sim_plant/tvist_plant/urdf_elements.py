@@ -2,22 +2,23 @@
 
 import math
 from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
 from typing import Final
-from xml.etree.ElementTree import Element, ParseError, iterparse
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import numpy.typing as npt
 
 from tvist_plant.robot_tables import RobotFileError
-from tvist_plant.user_file import DEEPEST, UserFileError, read_text
+from tvist_plant.user_file import LONGEST_NAME, UserFileError, is_name, read_text, xml
 
 Floats = npt.NDArray[np.float64]
 
 TURNING: Final = ("revolute", "continuous")
 UPRIGHT: Final = 1e-6
 """Cosine of pitch below which roll and yaw are not unique [-]."""
+LARGEST: Final = 1e7
+"""Largest number, as in other robot files."""
 
 
 class UrdfError(RobotFileError):
@@ -69,19 +70,11 @@ def parsed(path: str | Path, where: str) -> Element:
         OSError: The file cannot be read.
     """
     text = read_text(path, "robot file")
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise UrdfError(f"{where}: it has a document type, which no URDF needs: remove it")
-    depth = 0
-    root: Element | None = None
     try:
-        for event, element in iterparse(BytesIO(text.encode()), ("start", "end")):  # noqa: S314  entities are refused above
-            root = element if root is None else root
-            depth += 1 if event == "start" else -1
-            if depth > DEEPEST:
-                raise UserFileError(f"{where} is nested too deeply: at most {DEEPEST} levels are supported")
-    except ParseError as error:
-        raise UrdfError(f"{where}: it is not valid XML: {error}") from error
-    if root is None or root.tag != "robot":
+        root = xml(text.encode())
+    except UserFileError as error:
+        raise UrdfError(f"{where}: {error}") from error
+    if root.tag != "robot":
         raise UrdfError(f"{where}: it is no URDF: its outermost element must be <robot>; expand xacro first")
     return root
 
@@ -91,6 +84,11 @@ def named(element: Element, where: str) -> str:
     name = element.get("name")
     if not name:
         raise UrdfError(f"{where}: a <{element.tag}> has no name")
+    if not is_name(name):
+        raise UrdfError(
+            f"{where}: a <{element.tag}> has the name {name!r:.{LONGEST_NAME}}: "
+            f"must be at most {LONGEST_NAME} printable characters"
+        )
     return name
 
 
@@ -120,8 +118,8 @@ def numbers(element: Element, key: str, default: tuple[float, ...], here: str) -
         found = np.array(default if text is None else [float(word) for word in text.split()])
     except ValueError:
         found = np.zeros(0)
-    if len(found) != len(default) or not np.isfinite(found).all():
-        raise UrdfError(f"{here}: {key} is {text!r}: must be {len(default)} numbers")
+    if len(found) != len(default) or not (np.abs(found) <= LARGEST).all():
+        raise UrdfError(f"{here}: {key} is {text!r:.60}: must be {len(default)} numbers within ±{LARGEST:g}")
     return found
 
 

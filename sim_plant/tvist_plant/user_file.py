@@ -11,13 +11,16 @@ import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, TypeVar
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 LARGEST: Final = 4 << 20
 """Largest size of a file [bytes]: a hundred times the largest useful one."""
 DEEPEST: Final = 100
-"""Largest number of levels of brackets, or of parts of a dotted key, in a TOML file, which needs five. The parser's
-time grows with the square of the parts.
+"""Largest number of levels of brackets, or of parts of a dotted key, in a TOML file, which needs five, and of elements
+in an XML file. The parser's time grows with the square of the parts of a key.
 """
+LONGEST_NAME: Final = 100
+"""Largest number of characters of a name in a file."""
 
 Content = TypeVar("Content")
 
@@ -39,7 +42,7 @@ def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
     """
     # Check before opening, since opening a device may already have an effect, and again afterwards, since the path
     # may refer to another file by then. Open without blocking, since that may be a pipe.
-    _check_kind(path, what, Path(path).stat())
+    check_is_file(path, what)
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with open(descriptor, "rb") as stream:  # noqa: PTH123  a descriptor, not a path
         _check_kind(path, what, os.fstat(descriptor))
@@ -92,6 +95,57 @@ def toml(text: str) -> dict[str, Any]:
         raise
     except ValueError as error:
         raise tomllib.TOMLDecodeError("a number has too many digits") from error
+
+
+def xml(data: bytes) -> Element:
+    """Parse XML without a document type, since its entities could grow without end.
+
+    Raises:
+        UserFileError: The data is not valid XML, has a document type, or more than `DEEPEST` levels.
+    """
+    parser = XMLParser(target=_Tree())  # noqa: S314  see `_Tree`
+    try:
+        parser.feed(data)
+        root: Element = parser.close()
+    except UserFileError:
+        raise
+    except (ParseError, LookupError, ValueError) as error:  # the last two: of an unknown encoding
+        raise UserFileError(f"it is not valid XML: {error}") from error
+    return root
+
+
+class _Tree(TreeBuilder):
+    """Elements of an XML file, as far as they are accepted."""
+
+    depth = 0
+
+    def start(self, tag: str, attrs: dict[str, str]) -> Element:
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise UserFileError(f"it is nested too deeply: at most {DEEPEST} levels are supported")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str) -> Element:
+        self.depth -= 1
+        return super().end(tag)
+
+    def doctype(self, *_: object) -> None:
+        raise UserFileError("it has a document type, which it does not need: remove it")
+
+
+def is_name(text: str) -> bool:
+    """Return whether a text can be shown as a name anywhere: printable, and not too long."""
+    return len(text) <= LONGEST_NAME and text.isprintable()
+
+
+def check_is_file(path: str | os.PathLike[str], what: str) -> None:
+    """Check that a path names a regular file.
+
+    Raises:
+        UserFileError: It names something else.
+        OSError: There is nothing.
+    """
+    _check_kind(path, what, Path(path).stat())
 
 
 def parsed(path: str | os.PathLike[str], what: str, parse: Callable[[], Content]) -> Content:

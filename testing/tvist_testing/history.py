@@ -14,14 +14,18 @@ LONGEST = 300_000
 """Largest number of rows that are kept; ten minutes of simulation."""
 EVENTS = 10_000
 """Largest number of events that are kept."""
+EARLY = 256
+"""Largest number of truths that wait for the state of their tick."""
 
 
 class Row:
     """Measured values at a tick."""
 
-    __slots__ = ("acceleration", "moment", "moving", "pose", "q", "qd", "qdd", "tick", "time", "tool_speed")
+    __slots__ = (
+        "acceleration", "moment", "moving", "pose", "q", "qd", "qdd", "tick", "time", "tool_speed", "true",
+    )  # fmt: skip
 
-    def __init__(self, state: "State", truth: "Truth | None") -> None:
+    def __init__(self, state: "State") -> None:
         self.tick = state.tick
         self.time = state.timestamp
         """Simulation time [s]."""
@@ -37,10 +41,19 @@ class Row:
         """Measured joint torques [N m]."""
         self.tool_speed = array("d", state.actual_TCP_speed)
         """Velocity of the tool centre point [m/s], and its angular velocity [rad/s]."""
-        self.pose = array("d", truth.flange_pose if truth else state.actual_TCP_pose)
-        """Pose of the flexible arm's flange, else of the measured tool: x y z [m], rotation vector [rad]."""
-        self.acceleration = array("d", truth.tool_acceleration if truth else state.actual_tool_accelerometer)
-        """Specific force at the flange, without noise if there is truth, in its own frame [m/s²]."""
+        self.true = False
+        """Whether the truth of this tick is known."""
+        self.pose = array("d", state.actual_TCP_pose)
+        """Pose of the flexible arm's flange if that is known, else of the measured tool: x y z [m], rotation vector
+        [rad]."""
+        self.acceleration = array("d", state.actual_tool_accelerometer)
+        """Specific force at the flange, without noise if the truth is known, in its own frame [m/s²]."""
+
+    def know(self, truth: "Truth") -> None:
+        """Replace what was measured by what is true at this tick."""
+        self.true = True
+        self.pose = array("d", truth.flange_pose)
+        self.acceleration = array("d", truth.tool_acceleration)
 
 
 class History:
@@ -56,30 +69,44 @@ class History:
         self.period = 0.002
         self.rows: deque[Row] = deque(maxlen=LONGEST)
         self.events: deque[Event] = deque(maxlen=EVENTS)
-        self._truth: Truth | None = None
+        self._early: deque[Truth] = deque(maxlen=EARLY)
 
     def on_truth(self, truth: "Truth") -> None:
-        """Take what a real robot cannot measure; it comes after the state of its tick."""
-        self._truth = truth
-        if self.rows and self.rows[-1].tick == truth.tick:
-            self.rows[-1].pose = array("d", truth.flange_pose)
-            self.rows[-1].acceleration = array("d", truth.tool_acceleration)
+        """Take what a real robot cannot measure; it may come before the state of its tick, or after later ones."""
+        for row in reversed(self.rows):
+            if row.tick <= truth.tick:
+                if row.tick == truth.tick:
+                    row.know(truth)
+                    return
+                break
+        self._early.append(truth)
 
     def on_state(self, state: "State") -> None:
         """Take a state; that before the first tick, which measures nothing, is left out."""
-        if state.tick > 0:
-            truth = self._truth if self._truth is not None and self._truth.tick == state.tick else None
-            self.rows.append(Row(state, truth))
+        if state.tick == 0:
+            return
+        row = Row(state)
+        for truth in self._early:
+            if truth.tick == row.tick:
+                row.know(truth)
+        while self._early and self._early[0].tick <= row.tick:
+            self._early.popleft()
+        self.rows.append(row)
 
     def on_event(self, event: "Event") -> None:
         """Take an event."""
         self.events.append(event)
 
     def since_rest(self) -> list[Row]:
-        """Return the rows after the one in which the shaped reference came to rest last; all if it never moved."""
+        """Return the rows after the one in which the shaped reference came to rest last; all if it never moved.
+
+        The flange of the flexible arm and the measured tool are different points. So where the truth of any of these
+        ticks is known, those without it are left out.
+        """
         rows: list[Row] = []
         for row in reversed(self.rows):
             if row.moving:
                 break
             rows.append(row)
-        return rows[::-1]
+        known = [row for row in rows if row.true]
+        return (known or rows)[::-1]

@@ -2,14 +2,13 @@
 
 import itertools
 import json
-import shutil
-import tempfile
 from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
 
 from tvist_protocol.errors import TvistError
+from tvist_server.own_folder import OwnFolder
 from tvist_testing.fixture_robot import FixtureRobot
 from tvist_testing.kept import RobotOfTest, folder_of
 from tvist_testing.markers import MarkerError, combined
@@ -32,7 +31,7 @@ class Serving:
     """
 
     def __init__(self, kept: Path, seed: int) -> None:
-        self._folder = Path(tempfile.mkdtemp(prefix="tvist-"))
+        self._own = OwnFolder()
         self._kept = kept
         self._seed = seed
         self._robots = Robots()
@@ -41,7 +40,7 @@ class Serving:
     def close(self) -> None:
         """End the process that makes robots, and remove the files of robots whose tests were interrupted."""
         self._robots.close()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._own.close()
 
     def robot(self, kind: type[R], item: pytest.Item, *, ur: bool = False) -> tuple[R, RobotOfTest]:
         """Make a test's robot; a robot that cannot be made fails the test with one sentence.
@@ -74,7 +73,7 @@ class Serving:
     def _made(
         self, kind: type[R], item: pytest.Item, name: str, number: int, *, ur: bool = False
     ) -> tuple[R, RobotOfTest]:
-        folder = self._folder / str(next(self._numbers))
+        folder = self._own.path / str(next(self._numbers))
         folder.mkdir()
         recording, log = folder / f"{name}.mcap", folder / f"{name}.log"
         failure = ""

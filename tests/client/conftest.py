@@ -14,9 +14,10 @@ from tvist_client import LoopbackTransport, Robot
 from tvist_protocol.codec import decode_command, decode_setpoint, encode
 from tvist_protocol.info import Info, Limits
 from tvist_protocol.replies import Accepted, Done, Posture, Refused, ToolPose
-from tvist_protocol.stream import Event, State, Truth
+from tvist_protocol.stream import Event, State, Telemetry, Truth
 from tvist_protocol.values import Payload
 from tvist_server.gateways.network import Network
+from tvist_server.gateways.starting import Starting
 
 JOINTS = 6
 MOVE_TICKS = 120
@@ -44,7 +45,7 @@ class FakeRobot:
 
     def __init__(self, clock="free"):
         self.clock = clock
-        self.protocol = 1
+        self.protocol, self.rate_hz = 1, 500.0
         self.tick = 0
         self.q = [0.0] * JOINTS
         self.token = None
@@ -53,6 +54,8 @@ class FakeRobot:
         self.motion = None
         self.modes = (7, 1)
         """Robot mode and safety mode."""
+        self.promised = {"due_per_second": 10.0}
+        """What its telemetry says of its load; ten ticks a second any machine achieves."""
         self.told = {}
         """Optional fields of `info`."""
         self.streaming = False
@@ -84,7 +87,7 @@ class FakeRobot:
                 version="0",
                 model="UR5e",
                 joints=[f"j{i}" for i in range(JOINTS)],
-                rate_hz=500.0,
+                rate_hz=self.rate_hz,
                 clock=self.clock,
                 limits=LIMITS,
                 payload=PAYLOAD,
@@ -203,6 +206,12 @@ class FakeRobot:
             self.motion = None
         self.put("state", self.state())
         self.put("truth", self.truth())
+        if self.promised is not None and self.tick % 20 == 0:
+            self.put("telemetry", self.telemetry())
+
+    def telemetry(self):
+        zero = dict.fromkeys(set(Telemetry.__struct_fields__) - {"load", "due_ticks", "overloaded"}, 0)
+        return Telemetry(**{**zero, "tick": self.tick, "due_ticks": 60 * self.tick, **self.promised})
 
     def state(self, tick=None):
         return State(
@@ -231,7 +240,7 @@ class FakeRobot:
 class Served:
     """A `FakeRobot` behind a real Zenoh gateway, with one thread that owns it."""
 
-    def __init__(self, robot, endpoint):
+    def __init__(self, robot, endpoint, *, ready=True):
         self.robot = robot
         self.endpoint = endpoint
         self._jobs = queue.SimpleQueue()
@@ -239,8 +248,15 @@ class Served:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._network = Network([endpoint])
+        self.starting = Starting()
+        self._network.expect(["ur5e"], self.starting)
+        if ready:
+            self.get_ready()
+
+    def get_ready(self):
+        robot = self.robot
         gateway = self._network.gateway("ur5e", self, lockstep=robot.clock != "realtime", truth=True)
-        for topic in ("state", "event", "truth"):
+        for topic in ("state", "event", "truth", "telemetry"):
             robot.subscribe(topic, lambda data, topic=topic: gateway.publish(topic, None, data))
         self._thread.start()
 
@@ -292,8 +308,8 @@ class Served:
 
 
 @contextmanager
-def serve(clock, endpoint):
-    served = Served(FakeRobot(clock), endpoint)
+def serve(clock, endpoint, *, ready=True):
+    served = Served(FakeRobot(clock), endpoint, ready=ready)
     try:
         yield served
     finally:
@@ -320,6 +336,13 @@ def realtime(endpoint):
 @pytest.fixture
 def lockstep(endpoint):
     with serve("lockstep", endpoint) as served:
+        yield served
+
+
+@pytest.fixture
+def starting(endpoint):
+    """A robot that is starting until the test says that it is ready."""
+    with serve("lockstep", endpoint, ready=False) as served:
         yield served
 
 

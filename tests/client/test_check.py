@@ -1,15 +1,27 @@
 """`python -m tvist_client check`: tells a robot that works from one that does not."""
 
 import json
+import math
+from contextlib import ExitStack
 
+import msgspec
 import pytest
 
+from tvist_cli.commands.check import check as check_command
+from tvist_cli.commands.watch import _load
+from tvist_cli.failure import Failure
+from tvist_client import check as checking
 from tvist_client.__main__ import main
 from tvist_client.check import check
-from tvist_protocol.codec import encode
+from tvist_client.fleet import Fleet
+from tvist_protocol.codec import decode_info, encode
 from tvist_protocol.info import StopReason
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Done, Refused
+
+from .conftest import FakeRobot, serve
+
+STEPS = ["connect", "info", "state", "refusal", "ready", "load"]
 
 
 def test_a_robot_that_works_is_well_and_unchanged(realtime, endpoint):
@@ -17,7 +29,8 @@ def test_a_robot_that_works_is_well_and_unchanged(realtime, endpoint):
     assert report.ok
     assert (report.robot, report.protocol) == ("ur5e", 1)
     assert report.state_rate_hz > 0.0
-    assert [finding.what for finding in report.findings] == ["connect", "info", "state", "refusal", "ready"]
+    assert [finding.what for finding in report.findings] == STEPS
+    assert (report.overloaded, report.due_per_second) == (False, 10.0)
     assert {type(command).__name__ for command in realtime.robot.commands} == {"MoveJ"}
     assert realtime.robot.motions == 0
 
@@ -38,9 +51,18 @@ def test_json_is_one_object_with_what_is_promised(realtime, endpoint, capsys):
 def test_a_person_reads_a_line_a_step(realtime, endpoint, capsys):
     assert main(["check", endpoint]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[:2] for line in lines] == [
-        ["ok", step] for step in ("connect", "info", "state", "refusal", "ready")
-    ]
+    assert [line.split()[:2] for line in lines] == [["ok", step] for step in STEPS]
+
+
+def test_what_a_robot_says_of_itself_gives_a_terminal_no_commands(realtime, endpoint, capsys, monkeypatch):
+    described = realtime.robot.info
+
+    def hostile():
+        return encode(msgspec.structs.replace(decode_info(described()), model="\x1b]0;owned\x07"))
+
+    monkeypatch.setattr(realtime.robot, "info", hostile)
+    assert main(["check", endpoint]) == 0
+    assert not set(capsys.readouterr().out) & set("\x1b\x07")
 
 
 def test_nobody_there_is_a_failure_that_says_what_to_check(endpoint, capsys):
@@ -151,3 +173,132 @@ def test_a_robot_that_stands_still_is_not_alive(realtime, endpoint, monkeypatch)
     monkeypatch.setattr("tvist_client.robot.STATE_S", 0.1)
     monkeypatch.setattr(realtime.robot, "pass_tick", lambda: None)
     assert not check(endpoint, alive=True).ok
+
+
+@pytest.mark.parametrize(
+    "promised",
+    [
+        {"due_per_second": 10.0, "overloaded": True, "missed_ticks": 40, "due_ticks": 50},
+        {"due_per_second": 1e6, "missed_ticks": 40, "due_ticks": 50},
+    ],
+    ids=["it says so", "it says nothing, and its ticks show it"],
+)
+def test_an_overloaded_robot_is_alive_and_not_well_and_the_sentence_has_the_rate_measured_here(
+    realtime, endpoint, promised, capsys
+):
+    realtime.robot.promised = promised
+    report = check(endpoint)
+    assert (report.ok, report.ready, report.overloaded) == (False, True, True)
+    said = report.findings[-1].said
+    assert report.findings[-1].what == "load"
+    assert f"{report.state_rate_hz:.1f} states/s received of {promised['due_per_second']:g} due" in said
+    assert "missed 40 of 50 control periods. Next:" in said
+    assert main(["check", endpoint]) == 1
+    assert check(endpoint, alive=True).ok
+    capsys.readouterr()
+
+
+def test_the_rate_counts_states_received_and_not_their_numbers(realtime, endpoint, monkeypatch):
+    """A robot whose numbers run eight times as fast as its states come, as on a network that loses most of them."""
+    tick = realtime.robot.pass_tick
+
+    def leap():
+        realtime.robot.tick += 7
+        tick()
+
+    monkeypatch.setattr(realtime.robot, "pass_tick", leap)
+    seen, measure = [], checking._rate
+
+    async def noted(robot):
+        seen.append(await measure(robot))
+        return seen[-1]
+
+    monkeypatch.setattr(checking, "_rate", noted)
+    report = check(endpoint)
+    ((rate, ticks),) = seen
+    assert report.state_rate_hz == rate == pytest.approx(ticks / 8)
+
+
+def test_a_robot_that_tells_nothing_of_its_load_is_judged_by_the_ticks_it_promises(
+    realtime, endpoint, monkeypatch
+):
+    monkeypatch.setattr("tvist_client.check.TELEMETRY_S", 0.01)
+    realtime.robot.promised, realtime.robot.rate_hz = None, 1e6
+    assert check(endpoint).overloaded
+    realtime.robot.rate_hz = 10.0
+    assert check(endpoint).ok
+
+
+async def test_the_fleet_s_table_says_which_robot_is_overloaded(realtime, endpoint):
+    realtime.robot.promised = {"due_per_second": 500.0, "ticks_per_second": 60.0, "overloaded": True}
+    async with Fleet(endpoint) as fleet:
+        await fleet.listen()
+        (row,) = await fleet.look()
+    assert (row.overloaded, row.ready) == (True, True)
+    assert row.due_ticks > 0
+    assert row.said.startswith("overloaded: 60 of 500 ticks/s. Next: ")
+
+
+def test_watch_shows_rate_missed_of_due_lateness_load_and_overload():
+    telemetry = FakeRobot().telemetry()
+    given = {"missed_ticks": 3, "due_ticks": 9, "late_p99_us": 7.0, "load": 0.25, "ticks_per_second": 60.0}
+    shown = [
+        str(_load([msgspec.structs.replace(telemetry, **given, overloaded=over)])) for over in (False, True)
+    ]
+    assert shown[0] == "60.0 ticks/s   missed 3 of 9   late p99 7 µs   load 25.0 %"
+    assert shown[1] == f"{shown[0]}   overloaded"
+
+
+def test_a_robot_that_is_starting_is_not_ready_and_says_how_far_it_is(starting, endpoint, capsys):
+    starting.starting.note(45, 102)
+    report = check(endpoint)
+    assert (report.ok, report.starting, report.ready) == (False, True, None)
+    assert report.findings[-1].said == "the robot is starting: 45 of 102 kernels are compiled; try again"
+    assert main(["check", endpoint, "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["starting"] is True
+    assert not check(endpoint, alive=True).ok  # an orchestrator waits for it, too
+    with pytest.raises(Failure, match=r"^the robot is starting: 45 of 102"):
+        check_command(endpoint)
+
+
+def test_check_waits_for_a_robot_that_starts_and_tells_what_it_hears(starting, endpoint):
+    heard = []
+
+    def tell(said):
+        heard.append(said)
+        starting.starting.note(45 + len(heard), 102)
+        if len(heard) == 3:
+            starting.get_ready()
+
+    report = check(endpoint, wait=math.inf, tell=tell)
+    assert report.ok, report
+    shares = ["", "46 of 102 kernels are compiled; ", "47 of 102 kernels are compiled; "]
+    assert heard == [f"the robot is starting: {share}try again" for share in shares]
+
+
+@pytest.mark.parametrize("wait", [0.0, 1e-9])
+def test_it_waits_no_longer_than_it_may(starting, endpoint, wait):
+    assert check(endpoint, wait=wait).starting
+
+
+def test_it_does_not_wait_for_a_robot_that_has_stopped(realtime, endpoint):
+    realtime.robot.told = {"robot_mode": 7, "safety_mode": 3, "stop": STOPPED}
+    told = []
+    assert not check(endpoint, wait=math.inf, tell=told.append).ready
+    assert told == []
+
+
+def test_it_waits_for_a_server(endpoint):
+    with ExitStack() as stack:
+        report = check(
+            endpoint, wait=math.inf, tell=lambda _: stack.enter_context(serve("lockstep", endpoint))
+        )
+        assert report.ok, report
+
+
+def test_a_command_line_that_waits_without_a_number_waits_until_it_is_ready(
+    starting, endpoint, capsys, monkeypatch
+):
+    monkeypatch.setattr(checking.time, "sleep", lambda _: starting.get_ready())
+    assert main(["check", endpoint, "--wait"]) == 0
+    assert capsys.readouterr().err == "the robot is starting: try again\n"

@@ -3,6 +3,7 @@
 import asyncio
 
 import pytest
+import zenoh
 
 from tvist_client import (
     AnswerTimeoutError,
@@ -15,7 +16,9 @@ from tvist_client import (
     StreamStoppedError,
     ZenohTransport,
 )
+from tvist_client.fleet import Fleet, Place
 from tvist_client.robot import CHUNK
+from tvist_client.transports.zenoh import robots_at
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import KeepAlive
 from tvist_protocol.stream import Event
@@ -55,6 +58,19 @@ async def test_nobody_listening_is_said_at_once(endpoint):
 async def test_another_robots_endpoint_is_said_to_be_that(realtime, endpoint):
     with pytest.raises(NotConnectedError, match=r"no robot 'ur3' .*; the robots there are ur5e: check name"):
         await Robot.connect(endpoint, "ur3")
+
+
+async def test_a_token_whose_name_is_none_is_no_robot(endpoint):
+    config = zenoh.Config.from_json5(f'{{mode: "router", listen: {{endpoints: ["{endpoint}"]}}}}')
+    with zenoh.open(config) as other:
+        tokens = [
+            other.liveliness().declare_token(key)
+            for key in ("tvist/\x1b[2J/alive", "a\x1b/tvist/ur5e/alive", "tvist/ur3/alive")
+        ]
+        assert await robots_at(endpoint) == ["ur3"]
+        async with Fleet(endpoint) as fleet:
+            assert fleet.places == {Place("", "ur3")}
+        assert len(tokens) == 3
 
 
 async def test_what_is_no_endpoint_or_no_name_is_said_to_be_none():

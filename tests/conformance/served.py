@@ -45,10 +45,6 @@ class Served:
     """What Python runs."""
 
     def __init__(self, *options, name="ur5e", endpoint=None, router=None, around=()):
-        beside_others = "PYTEST_XDIST_WORKER" in os.environ and self.needs_the_machine(options)
-        assert not beside_others, (
-            "a robot in real time needs the machine: mark the test `realtime`, run it without -n"
-        )
         self.name, self.endpoint = name, router or endpoint or free_endpoint()
         self.lines = []
         where = "--listen" if router is None else "--connect"
@@ -63,10 +59,6 @@ class Served:
         )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-
-    def needs_the_machine(self, options):
-        """True if time passes by itself in this process."""
-        return "lockstep" not in options
 
     def wait_until_ready(self):
         """Wait until it says that it listens."""

@@ -7,7 +7,7 @@ from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
-from tvist_lab.safety.stops import SHAPERS
+from tvist_lab.safety.draws import SHAPERS
 from tvist_lab.safety.subject import Subject
 from tvist_protocol import commands as c
 
@@ -21,7 +21,7 @@ BACK = 1e-6
 """By so much interpolation in the filter may undershoot where a motion hardly moves, on straight lines too [rad]."""
 EXCESS = 1.01
 """Share of a limit that a filter whose weights vary may reach [-]."""
-POSITIVE = [name for name in SHAPERS if not name.startswith("um_")]
+POSITIVE = [name for name in SHAPERS if not (name.startswith("um_") or name.endswith("_exact"))]
 
 
 def free(curve) -> bool:

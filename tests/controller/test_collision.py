@@ -9,11 +9,12 @@ import pytest
 from tvist_controller.collision import CLEARANCE, CollisionModel
 from tvist_controller.trajectory import JointLine
 from tvist_lab.workspace import WORKSPACE
-from tvist_plant.description import Payload
+from tvist_plant.description import Payload, load
 from tvist_plant.model import link_frame, rigid_model
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.simulation import SimulationReset
+from tvist_protocol.values import Payload as Carried
 
 from .robots import UR5E, Robot
 
@@ -52,8 +53,8 @@ def distance(one, other):
     return np.linalg.norm(a[:, None] - b[None], axis=2).min() - one[2] - other[2]
 
 
-def nearest(q):
-    """Least distance of pairs that can meet, and to the floor."""
+def gaps(q):
+    """Distances of the pairs that can meet, the floor among them."""
     bodies = capsules(q)
     names = list(bodies)
     apart = {frozenset(pair) for pair in UR5E.collision.apart}
@@ -63,7 +64,11 @@ def nearest(q):
         if j - i > 1 and frozenset((a, b)) not in apart
     ]
     floor = [min(bodies[name][0][2], bodies[name][1][2]) - bodies[name][2] for name in names[2:]]
-    return min(pairs + floor)
+    return np.array(pairs + floor)
+
+
+def nearest(q):
+    return gaps(q).min()
 
 
 def test_meetings_are_those_of_an_independent_geometry(model):
@@ -111,12 +116,114 @@ def test_a_move_that_would_collide_is_refused_with_the_pair_and_the_time():
     assert robot.send(c.MoveJ, q=tuple(Q2)) == Accepted(id=1)
 
 
-def test_an_arm_that_is_in_a_meeting_may_move_out_of_it_and_not_further_in():
+def turned_wrists(number):
+    posture = WORKSPACE.random(1, 6, seed=number)[0]
+    posture[4:] = np.random.default_rng(number).uniform(-2, 2, 2)
+    return posture
+
+
+@pytest.mark.parametrize("number", [7, 13, 26, 28, 60, 124, 235, 302, 425, 509])
+def test_a_way_out_of_a_meeting_brings_no_pair_of_bodies_nearer(model, number):
+    """The nearest pair may move apart while another one, that meets as well, would come nearer."""
+    start = turned_wrists(number)
+    assert model.meeting(start) is not None
+    way = JointLine(start, start + np.random.default_rng([number, 1]).uniform(-0.5, 0.5, 6)).whole
+    depth = np.minimum([gaps(way.at(share)) for share in np.linspace(0.0, 1.0, 11)], CLEARANCE)
+    nearer = (np.maximum.accumulate(depth) - depth).max()
+    # Brute force is no finer than a millimetre.
+    assert nearer < 1e-3 if model.on_way(way) is None else nearer > 0.0
+
+
+def test_bodies_that_meet_may_turn_together(model):
+    """The distance of the payload from the wrist is the same all along the way, but for rounding."""
+    model.carry(Payload(mass=3.0, com=(0.0, 0.3, 0.0)))
+    start = np.array([0.0, -1.5, 0.0, -1.57, 0.0, 0.0])
+    assert model.meeting(start).second == "payload"
+    for number in range(20):
+        turn = np.append(np.random.default_rng(number).uniform(-0.5, 0.5, 2), np.zeros(4))
+        assert model.on_way(JointLine(start, start + turn).whole) is None
+    model.carry(UR5E.payload)
+
+
+PAYLOADS = {
+    "none": {"mass": 0.0, "com": (0.0, 0.0, 0.0)},
+    "the paper's": {"mass": 5.0, "com": UR5E.payload.com},
+    "far out": {"mass": 2.0, "com": (0.1, -0.2, 0.2)},
+}
+INERTIA = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
+
+
+@pytest.mark.parametrize("name", ["ur3e", "ur5e", "ur16e", "ur30"])
+@pytest.mark.parametrize("payload", list(PAYLOADS))
+def test_a_reset_into_a_meeting_is_refused_with_the_posture_and_the_bodies(name, payload):
+    arm, robot = load(name), Robot(description=load(name))
+    declared = PAYLOADS[payload] | {"mass": min(PAYLOADS[payload]["mass"], arm.limits.payload)}
+    assert robot.send(c.SetPayload, **declared, inertia=INERTIA) == Done()
+    model = CollisionModel(arm, Payload(**declared, inertia=INERTIA))
+    refused = 0
+    for number in range(40):
+        q = turned_wrists(number)
+        before, met = robot.controller.cycle.position, model.meeting(q)
+        # The carried payload is the robot file's, a short disc.
+        plain = CollisionModel(arm, robot.controller.cycle.plant.payload).meeting(q)
+        reply = robot.send(SimulationReset, q=tuple(q), seed=number)
+        if met is None and plain is None:
+            assert isinstance(reply, Done)
+            continue
+        refused += 1
+        assert (reply.code, reply.where, reply.limit) == ("collision", "q", CLEARANCE)
+        for part in (str(met or plain), f"[{q[0]:.4g}, {q[1]:.4g}"):
+            assert part in reply.why
+        assert (robot.controller.cycle.position == before).all()
+    assert 1 < refused < 39
+
+
+def test_a_refused_reset_leaves_a_motion_running_and_changes_nothing():
+    robot, plain = Robot(), Robot()
+    for one in (robot, plain):
+        one.send(c.MoveJ, q=tuple(Q2))
+        one.tick(50)
+    reply = robot.send(SimulationReset, q=tuple(DOWN), seed=7, mode="IDLE", shaper="ei")
+    assert (reply.code, reply.where) == ("collision", "q")
+    far = {"mass": 3.0, "com": (0.3, 0.0, 0.3), "inertia": INERTIA}
+    low = robot.send(SimulationReset, q=(0.0, -0.3, 0.0, -1.57, 0.0, 0.0), payload=Carried(**far))
+    assert (low.code, "payload and floor" in low.why) == ("collision", True)
+    for one in (robot, plain):
+        one.until_rest()
+    assert robot.states == plain.states
+    assert robot.events == plain.events
+
+
+def test_a_payload_that_would_meet_something_is_not_put_on_the_arm():
     robot = Robot()
-    assert isinstance(robot.send(SimulationReset, q=tuple(DOWN)), Done)
-    deeper = DOWN + np.array([0.0, 0.2, 0.0, 0.0, 0.0, 0.0])
-    assert robot.send(c.MoveJ, q=tuple(deeper)).code == "collision"
-    assert robot.send(c.MoveJ, q=(0.0, -0.5, 0.0, -1.57, 0.0, 0.0)) == Accepted(id=1)
+    robot.send(SimulationReset, q=(0.0, -0.3, 0.0, -1.57, 0.0, 0.0))
+    far = Carried(mass=3.0, com=(0.3, 0.0, 0.3), inertia=INERTIA)
+    reply = robot.send(SimulationReset, payload=far)
+    assert (reply.code, reply.where) == ("collision", "payload")
+    assert "payload and floor would overlap by" in reply.why
+
+
+def test_no_robot_starts_in_a_meeting():
+    with pytest.raises(ValueError, match=r"start: at q = \[0, 0.6, .*wrist_2 and floor would overlap by"):
+        Robot(q=tuple(DOWN))
+    far = Carried(mass=3.0, com=(0.3, 0.0, 0.3), inertia=INERTIA)
+    with pytest.raises(ValueError, match="payload and floor"):
+        Robot(q=(0.0, -0.3, 0.0, -1.57, 0.0, 0.0), carried=far)
+    Robot(q=(0.0,) * 6, description=UR5E.without_floor())
+
+
+def test_an_arm_in_a_meeting_may_be_put_at_rest_again_and_move_out_of_it_and_not_further_in():
+    robot, low = Robot(), np.array([0.0, -0.3, 0.0, -1.57, 0.0, 0.0])
+    robot.send(SimulationReset, q=tuple(low))
+    assert robot.send(c.SetPayload, mass=3.0, com=(0.3, 0.0, 0.3), inertia=INERTIA) == Done()
+    assert robot.controller.motion.collisions.meeting(low) is not None
+    assert isinstance(robot.send(SimulationReset, mode="RUNNING"), Done)
+    deeper = low + np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
+    reply = robot.send(c.MoveJ, q=tuple(deeper))
+    assert (reply.code, "payload and floor would overlap" in reply.why) == ("collision", True)
+    assert robot.send(c.MoveJ, q=(0.0, -0.9, 0.0, -1.57, 0.0, 0.0)) == Accepted(id=1)
+    robot.until_rest()
+    assert robot.controller.motion.collisions.meeting(robot.controller.cycle.position) is None
 
 
 def test_a_stream_that_would_collide_is_stopped_before_it_does():

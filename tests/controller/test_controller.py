@@ -191,6 +191,7 @@ def test_a_calibration_for_another_payload_is_a_warning_and_stands_in_info():
     robot = Robot(calibration=calibration(mass=2.0))
     robot.tick()
     assert [(e.kind, e.code) for e in robot.events] == [("warning", "payload_mismatch")]
+    assert "Take a modal calibration" in robot.events[0].why
     assert not info_of(robot.controller).calibration.fits_payload
     robot.send(c.SetPayload, mass=2.0, com=DISC.com, inertia=DISC.inertia)
     robot.tick()
@@ -489,7 +490,7 @@ def test_counters_go_on_from_stream_to_stream_and_fit_the_wire():
     late, lost, _ = robot.controller.motion.streams.counters()
     assert late == 2
     assert 0 < lost <= 4000
-    counts = dict.fromkeys(Telemetry.__struct_fields__, 0)
+    counts = dict.fromkeys(Telemetry.__struct_fields__, 0) | {"overloaded": False}
     check(Telemetry(**(counts | {"setpoints_lost": lost, "setpoints_late": late})))
 
 

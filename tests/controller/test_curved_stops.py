@@ -9,9 +9,10 @@ from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
-from tvist_lab.safety import sequences
+from tvist_lab.safety import draws, sequences
+from tvist_lab.safety.draws import SHAPERS
 from tvist_lab.safety.sequences import Sequence
-from tvist_lab.safety.stops import KINDS, PAUSES, SHAPERS
+from tvist_lab.safety.stops import KINDS, PAUSES
 from tvist_lab.safety.subject import Subject, torques
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
@@ -105,7 +106,7 @@ class OnCurves(Sequence):
             if (np.abs(curve.posture(curve.end)) < np.array(UR5E.limits.position)).all():
                 break
         try:
-            start(self.robot, curve, MotionLimits(**self._limits()))
+            start(self.robot, curve, MotionLimits(**draws.limits(UR5E, self._random)))
         except RefusalError as refusal:
             return refusal.reply
         self.curve = curve

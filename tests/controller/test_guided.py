@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.control.kinematics import ForwardKinematics
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.tool import ToolKinematics, turn
 from tvist_controller.trajectory import JointSpeed, MotionLimits
 from tvist_controller.trajectory.servo import _step
 from tvist_protocol import commands as c
@@ -366,7 +366,7 @@ def test_the_jacobian_is_the_derivative_of_the_pose():
         (before, p), (after, r) = (
             kinematics.pose(HOME + sign * step * np.eye(6)[joint]) for sign in (-1.0, 1.0)
         )
-        found = np.concatenate((r - p, kinematics.turn(before, after))) / (2 * step)
+        found = np.concatenate((r - p, turn(before, after))) / (2 * step)
         assert found == pytest.approx(column, abs=1e-8)
 
 

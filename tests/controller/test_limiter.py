@@ -222,3 +222,24 @@ def test_a_limit_that_falls_in_motion_is_kept_to_what_jerk_needs(seed):
         excess = max(excess, qdd - torque.limit())
         before = before[1], q
     assert excess <= 0.05
+
+
+class Weak:
+    """Torque that permits a tenth of the acceleration limit."""
+
+    def allows(self, _q, _qd, qdd):
+        return np.abs(qdd).max() <= 4.0
+
+    def acceleration(self, _q, _qd):
+        return 4.0
+
+
+@pytest.mark.parametrize("speed", [0.3, 1.0, 2.5])
+def test_a_joint_whose_torque_is_low_still_stops_inside_its_range(speed):
+    """Its stop is judged by the acceleration that the torque permits, which is what it stops with."""
+    reach = 2.0
+    limiter = Limiter(np.zeros(2), MotionLimits(3.0, 40.0, 2000.0), H, reach=np.full(2, reach), torque=Weak())
+    ramp = np.minimum(speed * H * np.arange(4000), reach)
+    out = followed(limiter, np.column_stack((ramp, -ramp)))
+    assert np.abs(out).max() <= reach
+    assert np.abs(out[-1]).min() == pytest.approx(reach, abs=1e-3)

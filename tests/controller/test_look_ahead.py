@@ -10,11 +10,13 @@ from tvist_controller.ahead import MAX_AHEAD, resting_after
 from tvist_controller.collision import CLEARANCE, CollisionModel
 from tvist_controller.cycle import STILL
 from tvist_controller.outlook import Outlook
+from tvist_controller.trajectory import StuckError
 from tvist_lab.safety import changes, streams
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
+from tvist_protocol.motions import SpeedL, StopL
 from tvist_protocol.replies import Accepted, Done, Refused
-from tvist_protocol.simulation import SimulationReset
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 
 from .robots import FITTING, PAPER, Q3, UR5E, H, Robot, without_arm
 
@@ -52,6 +54,26 @@ def test_a_pause_and_a_change_of_the_filter_are_foreseen_too():
         assert cycle_.position == pytest.approx(expected, abs=1e-12)
     assert not cycle_.at_rest
     assert np.abs(cycle_.position - ahead[-1]).max() < 1e-6
+
+
+def test_a_motion_that_will_get_stuck_is_not_foreseen_and_a_stop_on_it_is_reported():
+    """A stop of the tool that is under way may end before its time, near a singular posture."""
+    robot = Robot(q=(0.0, -1.2, 1.5, -1.8, -1.57, 0.0))
+    robot.send(SpeedL, xd=(0.1, 0.0, 0.0, 0.0, 0.0, 0.0), acceleration=1.0)
+    robot.tick(100)
+    robot.send(StopL, acceleration=0.5)
+    robot.tick(2)
+
+    class Stuck(type(robot.controller.cycle.trajectory)):
+        def next(self):
+            raise StuckError("near a singular posture")
+
+    robot.controller.cycle.trajectory.__class__ = Stuck
+    assert robot.controller.motion.outlook.foresee() is None
+    assert robot.send(SimulationInject, fault="safeguard_stop") == Done()
+    robot.tick()
+    (told,) = (event for event in robot.events if event.kind == "safety_stop")
+    assert told.duration is None or told.duration > 0.0
 
 
 def test_what_lasts_too_long_is_not_foreseen():

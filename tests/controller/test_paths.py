@@ -7,7 +7,7 @@ from tests.plant.arms import chain
 
 from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.setup import paper_payload
-from tvist_lab.safety.stops import SHAPERS
+from tvist_lab.safety.draws import SHAPERS
 from tvist_lab.safety.subject import Subject
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetTcp
@@ -140,6 +140,7 @@ def test_the_second_of_two_blends_that_overlap_is_skipped_and_the_arm_stops_ther
     positions = went(robot, MovePath, segments=segments)
     warned = [event for event in robot.events if event.code == "blend_skipped"]
     assert [event.why.split(":")[0] for event in warned] == ["segments[1]"]
+    assert warned[0].why.endswith("overlaps the blend beside it: give a smaller radius to one of them")
     assert warned[0].id == 1
     corner = tool_pose(BENT, NO_TOOL)[0] + np.array(corners[1])
     near = np.linalg.norm(positions - corner, axis=1)

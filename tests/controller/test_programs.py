@@ -12,6 +12,7 @@ from tvist_protocol.motions import MoveL
 from tvist_protocol.programs import ProgramClosePopup, ProgramPause, ProgramPlay, ProgramRun, ProgramStop
 from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationInject
+from tvist_urscript.machine import PATIENCE
 
 from .robots import UR5E, Robot
 from .scripts import URSIM, a_robot, failure, finish, playing, run, said, script, start
@@ -261,7 +262,7 @@ def test_an_endless_loop_ends_with_an_error_and_the_next_program_runs():
     robot = a_robot()
     run(robot, "while True:", "  x = 1", "end")
     assert failure(robot).line is not None
-    assert len(robot.states) <= 60
+    assert len(robot.states) <= PATIENCE + 1
     run(robot, "textmsg(1)")
     assert said(robot) == ["1"]
 

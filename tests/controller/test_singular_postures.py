@@ -103,7 +103,8 @@ def test_the_compiled_kernels_equal_their_python_source(case, monkeypatch):
     status = closest(table, *pose, near, one)
     uncompile(monkeypatch)
     choice.improved_postures(table, *pose, near, found)
-    assert choice.closest(table, *pose, near, other) == status == choice.FOUND
+    assert choice.closest(table, *pose, near, other) == status
+    assert status % choice.ON_CURVE == choice.FOUND
     exist = ~np.isnan(expected[:, 0])
     np.testing.assert_array_equal(~np.isnan(found[:, 0]), exist)
     np.testing.assert_allclose(found[exist], expected[exist], rtol=0, atol=1e-7)

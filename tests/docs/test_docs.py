@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import tomllib
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -94,6 +95,45 @@ class TestLinks:
         text = index.read_text(encoding="utf-8")
         linked = {(DOCS / match["target"]).resolve() for match in LINK.finditer(text)}
         assert set(DOCS.rglob("*.md")) - linked == {index}
+
+    @pytest.mark.parametrize("page", LINKED, ids=named)
+    def test_every_row_of_a_table_has_the_cells_of_its_header(self, page):
+        rows = [cells(line) for line in page.read_text(encoding="utf-8").splitlines()]
+        for number, (above, row) in enumerate(itertools.pairwise(rows), start=2):
+            assert not above or not row or above == row, (
+                f"{named(page)}:{number} has {row} cells, not {above}"
+            )
+
+    def test_the_picture_of_the_packages_is_the_contract_of_imports(self):
+        contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"][
+            "importlinter"
+        ]
+        layers = [layer.split(" | ") for layer in contracts["contracts"][0]["layers"]]
+        text = (DOCS / "explanations" / "architecture.md").read_text(encoding="utf-8")
+        (picture,) = [
+            match["text"] for match in FENCE.finditer(text) if match["text"].startswith(" tvist_cli")
+        ]
+        drawn = [re.findall(r"tvist_\w+", line) for line in picture.splitlines()]
+        assert drawn == layers
+
+    def test_the_readme_counts_what_the_paper_page_does_not_match(self):
+        rows = re.findall(
+            r"\| (fitted|tuned|predicted|not matched) \|",
+            (DOCS / "reference" / "paper.md").read_text("utf-8"),
+        )
+        said = re.search(r"(\d+) of the (\d+) figures", (ROOT / "README.md").read_text(encoding="utf-8"))
+        assert [rows.count("not matched"), len(rows)] == list(map(int, said.groups()))
+
+    @pytest.mark.parametrize("page", [page for page in LINKED if page.name != "CHANGELOG.md"], ids=named)
+    def test_a_page_that_installs_what_is_not_published_says_what_to_do_until_then(self, page):
+        text = page.read_text(encoding="utf-8")
+        if re.search(r"pip install [\"']?tvist", text) and page != DOCS / "how-to" / "install.md":
+            assert "how-to/install.md" in text or "(install.md)" in text
+
+
+def cells(line):
+    """Number of cells of a row of a table; 0 for any other line."""
+    return len(re.findall(r"(?<!\\)\|", line)) if line.startswith("|") else 0
 
 
 def anchors(page):

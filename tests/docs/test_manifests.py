@@ -16,6 +16,32 @@ def understood(words):
     application(words[:1]).parse_args(words, exit_on_error=False, print_error=False)
 
 
+def recorded(words, mounts):
+    """Whether a command records into a volume such that it can start again and again."""
+    places = [words[at + 1] for at, word in enumerate(words[:-1]) if word == "--record"]
+    return len(places) == 1 and "--keep" in words and any(places[0].startswith(mount) for mount in mounts)
+
+
+def test_every_recorder_starts_again_by_itself_into_a_volume():
+    found = []
+    for file in ("fleet.yaml", "compose.yaml"):
+        for service in yaml.safe_load((DOCKER / file).read_text())["services"].values():
+            words = service.get("command", [])
+            if "--record" in words:
+                mounts = [volume.partition(":")[2] for volume in service["volumes"]]
+                found.append(service["restart"] == "unless-stopped" and recorded(words, mounts))
+    (robots,) = (
+        document
+        for document in yaml.safe_load_all((DOCKER / "kubernetes.yaml").read_text())
+        if document["kind"] == "StatefulSet"
+    )
+    (container,) = robots["spec"]["template"]["spec"]["containers"]
+    claims = {claim["metadata"]["name"] for claim in robots["spec"]["volumeClaimTemplates"]}
+    mounts = [mount["mountPath"] for mount in container["volumeMounts"] if mount["name"] in claims]
+    words = [part for word in container["args"] for part in word.split("=", 1)]
+    assert [*found, recorded(words, mounts)] == [True] * 5
+
+
 def test_kubernetes_takes_every_resource():
     documents = list(yaml.safe_load_all((DOCKER / "kubernetes.yaml").read_text()))
     assert {document["kind"] for document in documents} >= {"Deployment", "StatefulSet", "Service"}

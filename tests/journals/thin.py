@@ -1,13 +1,31 @@
 """Keep what a replay needs of recordings, and every fiftieth state: `python -m tests.journals.thin FOLDER`."""
 
+import hashlib
+import os
 import sys
+from importlib.metadata import version
 from pathlib import Path
+
+from llvmlite import binding
 
 from tvist_lab.recordings.mcap_file import read
 from tvist_server.recording import Recorder
 
 EVERY = 50
 """Of so many states one is kept."""
+MADE_ON = Path(__file__).parent / "made-on.txt"
+"""Names the processor that made the runs."""
+
+
+def processor():
+    """What the last bits depend on: the processor, and the libraries that choose their code by it."""
+    features = sorted(name for name, there in binding.get_host_cpu_features().items() if there)
+    libraries = [version(name) for name in ("numpy", "numba", "llvmlite", "pin", "ruckig")]
+    chosen = [
+        os.environ.get(name, "") for name in ("OPENBLAS_CORETYPE", "NUMBA_CPU_NAME", "NUMBA_DISABLE_JIT")
+    ]
+    told = " ".join([*features, *libraries, *chosen])
+    return f"{binding.get_host_cpu_name()} {hashlib.sha256(told.encode()).hexdigest()[:16]}"
 
 
 def thin(path, kept):
@@ -24,5 +42,6 @@ def thin(path, kept):
 
 
 if __name__ == "__main__":
+    MADE_ON.write_text(processor() + "\n", encoding="utf-8")
     for path in Path(sys.argv[1]).glob("*.mcap"):
         thin(path, Path(__file__).parent / path.name)

@@ -6,8 +6,6 @@ import msgspec
 import numpy as np
 import pytest
 
-from tvist_controller.api import BOXES, Box, Place
-from tvist_lab.benchmark.box_timer import BoxError, BoxTimer, found
 from tvist_lab.benchmark.figure import figure, in_alternation, median_interval
 from tvist_lab.benchmark.machine import this_machine
 from tvist_lab.benchmark.saved_run import FORMAT, BenchRun, as_json, changes, load_run
@@ -83,35 +81,3 @@ def test_a_figure_of_one_run_only_is_told():
     found = {one.key: one for one in changes(run(old=ratio(1.0)), run(new=ratio(1.0)))}
     assert found["old"].new is None
     assert found["new"].old is None
-
-
-class Outer:
-    def whole(self):
-        return self.part(1, sign=-1) + self.part(2)
-
-    def part(self, number, *, sign=1):
-        return sign * number
-
-
-TWO = (Box("whole", None, "", (Place(Outer, "whole"),)), Box("part", "whole", "", (Place(Outer, "part"),)))
-
-
-@pytest.mark.parametrize("twice", [False, True])
-def test_wrapped_functions_do_the_same_and_own_times_add_up_to_the_whole(twice):
-    timer, part = BoxTimer(TWO), Outer.part
-    with timer.attached(twice=twice):
-        assert Outer().whole() == 1
-        Outer().part(3)  # not from the box around it
-    assert timer.calls == [1, 2]
-    assert sum(timer.own_times()) == timer.nanoseconds[0]
-    assert Outer.part is part
-
-
-def test_a_box_whose_function_is_gone_is_an_error():
-    with pytest.raises(BoxError, match=r"'lost' should be Outer\.gone"):
-        found(Box("lost", None, "", (Place(Outer, "gone"),)))
-
-
-@pytest.mark.parametrize("box", BOXES, ids=lambda box: box.name)
-def test_every_box_of_the_controller_is_where_the_table_says(box):
-    assert found(box)

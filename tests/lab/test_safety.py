@@ -3,17 +3,25 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tvist_controller.api import paper_payload
 from tvist_controller.trajectory import PathStop
-from tvist_lab.safety import programs, sequences, stops
+from tvist_lab.safety import draws, programs, sequences, stops
 from tvist_lab.safety.markdown import page
+from tvist_lab.safety.own_calibration import own_calibration
 from tvist_lab.safety.report import Counts, broken, search
+from tvist_lab.safety.subject import Subject, speeds
 from tvist_plant.description import load
+from tvist_plant.plant import PERIOD
+from tvist_protocol.commands import MoveJ
+from tvist_shaping import BUILT_IN
 
 UR5E = load("ur5e")
+SEVEN = str(Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf")
 
 
 @pytest.mark.parametrize("number", range(12))
@@ -41,9 +49,11 @@ def test_whatever_programs_do_the_promises_hold(number):
 def test_the_page_says_on_which_side_of_a_bound_the_worst_stop_was(ahead, late, share, says):
     stopped = {
         "count": 1, "broken": [], "worst_ahead_rad": ahead, "worst_off_rad": 0.0, "worst_late_ticks": late,
-        "worst_torque_share": share, "worst_penetration_of_the_flexible_arm_m": None, "kinds": {},
+        "worst_torque_share": share,
+        "worst_velocity_share": 1.0, "worst_acceleration_share": 1.0,
+        "worst_penetration_of_the_flexible_arm_m": None, "kinds": {},
     }  # fmt: skip
-    text = page({"robot": "ur5e", "stops": stopped}, "a command")
+    text = page({"robots": ["ur5e"], "stops": stopped}, "a command")
     assert all(part in text for part in says), text
 
 
@@ -78,6 +88,50 @@ def test_a_search_counts_what_it_tried_and_gives_a_sentence_for_what_it_found():
     assert [result[name]["count"] for name in ("stops", "streams", "changes", "sequences")] == [2, 1, 2, 1]
     assert broken(result) == []
     assert result["stops"]["worst_penetration_of_the_flexible_arm_m"] is None
+
+
+def test_robots_take_turns_each_with_its_own_calibration_and_every_shaper_is_tried():
+    tried = [SEVEN, "ur3e"]
+    result = search(Counts(stops=2, streams=2), 3, robots=tried)
+    assert result["robots"] == tried
+    assert result["stops"]["count"] == 2
+    page(result, "a command")
+    names = [draws.SHAPERS[0], "planned", "um_zvd", "ei3_exact", "elastic-auto"]
+    for arm in map(load, [*tried, "ur30"]):
+        known = own_calibration(arm)
+        assert known.robot == arm.robot.model
+        q = np.array(next(iter(arm.poses.values())))
+        for name in names:
+            robot = Subject(arm, q, paper_payload(arm), shaper=name)
+            assert robot.controller.cycle.tvist.name == name
+    assert set(names) < set(draws.SHAPERS) == set(BUILT_IN.names())
+
+
+def test_a_joint_above_its_own_limit_is_found_whatever_the_others_may():
+    arm = load("ur3e")  # whose wrist may turn twice as fast as its base
+    time = np.arange(50)[:, np.newaxis] * PERIOD
+    for joint, share in ((0, 2.0), (5, 1.0)):
+        references = np.where(np.arange(6) == joint, 2.0 * arm.limits.velocity[0] * time, 0.0)
+        assert speeds(arm, references)[0] == pytest.approx(share, rel=1e-4)
+
+
+def test_an_arm_of_two_joints_is_searched_too():
+    assert broken(search(Counts(streams=2, sequences=1), 1, robots=["one-joint"])) == []
+
+
+@pytest.mark.parametrize("name", ["ur3e", "ur30", SEVEN])
+def test_limits_are_drawn_at_the_arm_s_own_and_above_which_it_refuses(name):
+    arm, random = load(name), np.random.default_rng(1)
+    drawn = [draws.limits(arm, random) for _ in range(100)]
+    robot = Subject(arm, np.array(next(iter(arm.poses.values()))), paper_payload(arm, 0.0))
+    for key, most in draws.own_limits(arm).items():
+        values = [one[key] for one in drawn]
+        assert max(values) == most
+        assert min(values) < 0.5 * most
+    for _ in range(20):
+        key, value = draws.above(arm, random)
+        reply = robot.send(MoveJ, q=tuple(robot.references[0]), **{key: value})
+        assert (reply.code, reply.where) == (draws.CODES[key], key)
 
 
 def test_the_command_prints_one_object_and_refuses_what_it_cannot_do():

@@ -1,5 +1,7 @@
 """Shapers on the bench: honest ones are measured, dishonest and broken ones are named; the arms are what they say."""
 
+import json
+import re
 import sys
 import textwrap
 from dataclasses import replace
@@ -420,6 +422,7 @@ class TestScores:
         assert any(row["pareto"] for row in board["shapers"][:3])
         about = {
             "command": "",
+            "date": "2026-11-23",
             "moves": 1,
             "seed": 0,
             "calibration": "",
@@ -427,6 +430,16 @@ class TestScores:
         }
         written = page(about | board, "a command")
         assert all(row["name"] in written for row in board["shapers"])
+        assert "Measured on 2026-11-23" in written
+
+    def test_the_published_page_says_when_it_was_made_and_what_it_lacks(self, ur5e, calibration):
+        reference = Path(__file__).parents[2] / "docs" / "reference"
+        published = json.loads((reference / "leaderboard.json").read_text(encoding="utf-8"))
+        _, first, *_ = (reference / "shaperbench.md").read_text(encoding="utf-8").split("\n\n")
+        now = [one.name for one in candidates(ur5e, calibration, None, None)] + [arm.name for arm in ARMS]
+        there = [row["name"] for row in published["shapers"]] + list(published["arms"])
+        assert first.startswith("Measured on 20")
+        assert set(re.findall(r"`(\w+(?:-\w+)*)`", first)) == set(now) - set(there)
 
     def test_curved_paths_are_run_by_all_that_shape_references(self, ur5e, calibration):
         standing = candidates(ur5e, calibration, None, ["zv", "double_s_as_zv"])

@@ -2,6 +2,7 @@
 
 import os
 import threading
+from types import SimpleNamespace
 
 import pytest
 
@@ -19,7 +20,7 @@ class FakeHost:
 
     def __init__(self, enough=5):
         self.failure = None
-        self.ticks, self.missed_ticks = 0, 0
+        self.ticks, self.missed_ticks, self.warned = 0, 0, []
         self.enough = enough
         self.reached = threading.Event()
         self.threads = set()
@@ -32,6 +33,9 @@ class FakeHost:
 
     def missed(self, ticks):
         self.missed_ticks += ticks
+
+    def warn(self, why):
+        self.warned.append(why)
 
 
 def served(robots, **options):
@@ -54,6 +58,7 @@ def test_one_thread_ticks_all_robots_and_says_how_late_each_was(number):
     for robot in robots:
         assert clock.punctuality(robot).ticks == robot.host.ticks >= 5
         assert clock.punctuality(robot).ticks == 0
+        assert robot.overload.missed == robot.host.missed_ticks <= robot.overload.due >= robot.host.ticks
 
 
 def test_jobs_are_done_in_order_before_the_next_tick_and_all_before_the_end():
@@ -146,3 +151,32 @@ def test_in_lockstep_the_state_is_repeated_however_many_jobs_come(monkeypatch):
     clock.start()
     assert repeated.wait(WAIT)
     clock.close()
+
+
+def test_an_overload_is_told_to_the_robot_s_clients_when_it_begins_and_when_it_ends(monkeypatch):
+    """A clock of numbers: each tick takes 16 ms of it for a while, and then none."""
+    passed, told = [0.0], threading.Event()
+
+    class Slow(FakeHost):
+        def tick(self):
+            passed[0] += 0.016 if len(self.warned) < 1 else 0.0
+
+        def warn(self, why):
+            super().warn(why)
+            if len(self.warned) == 2:
+                told.set()
+
+    def sleep(seconds):
+        passed[0] += seconds
+
+    monkeypatch.setattr("tvist_server.clock.time", SimpleNamespace(monotonic=lambda: passed[0], sleep=sleep))
+    robot = Mailbox(Slow())
+    clock = Realtime([robot], lambda: None, PERIOD)
+    clock.start()
+    assert told.wait(WAIT)
+    clock.close()
+    began, ended = robot.host.warned[:2]
+    assert "is overloaded: " in began
+    assert "Next: " in began
+    assert "no longer overloaded" in ended
+    assert not robot.overload.overloaded

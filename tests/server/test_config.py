@@ -62,6 +62,7 @@ def test_a_key_or_value_that_cannot_be(values, named):
         ({"start": "1,2,3"}, "start has 3 angles"),
         ({"start": "0,0,0,0,0,7"}, "q[5]"),
         ({"start": "0,0,0,0,0,nan"}, "q[5]"),
+        ({"start": "0,0,0,0,0,0"}, "at q = [0, 0, 0, 0, 0, 0] wrist_2 and floor would overlap by"),
         ({"start": [0.0, 0.0]}, "start has 2 angles"),
         ({"calibration": "nowhere.json"}, "calibration 'nowhere.json'"),
         ({"calibration": "no\0where"}, "null"),
@@ -123,6 +124,10 @@ def test_a_robot_that_no_calibration_belongs_to_says_what_to_do(tmp_path):
 @pytest.mark.parametrize("start", ["0.1,-1,2,0,0,0.5", " 0.1, -1, 2, 0, 0, 0.5", [0.1, -1, 2, 0, 0, 0.5]])
 def test_a_start_by_its_angles(start):
     assert config(start=start).setup().q == (0.1, -1.0, 2.0, 0.0, 0.0, 0.5)
+
+
+def test_a_start_on_the_floor_where_there_is_none():
+    assert config(start="0,0,0,0,0,0", profile="ursim").setup().q == (0.0,) * 6
 
 
 def test_a_start_by_its_name():

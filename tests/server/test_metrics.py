@@ -4,6 +4,7 @@ import re
 import urllib.request
 from pathlib import Path
 
+import msgspec
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
@@ -14,7 +15,8 @@ from tvist_server.gateways.metrics import COUNTERS, Metrics, place
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "metrics.md"
 COUNTS = dict.fromkeys((field for _, _, field in COUNTERS), 7)
 TELEMETRY = Telemetry(
-    tick=1000, ticks_per_second=499.5, late_p50_us=50.0, late_p99_us=900.0, late_max_us=2000.0, load=0.13, **COUNTS
+    tick=1000, ticks_per_second=499.5, late_p50_us=50.0, late_p99_us=900.0, late_max_us=2000.0, load=0.13,
+    overloaded=True, **COUNTS
 )  # fmt: skip
 
 
@@ -43,6 +45,8 @@ def test_what_a_robot_says_is_on_the_page_with_its_place(metrics):
         sample.labels["quantile"]: sample.value for sample in families["tvist_tick_lateness_seconds"].samples
     }
     assert lateness == pytest.approx({"0.5": 50e-6, "0.99": 900e-6, "1": 2e-3})
+    (overloaded,) = families["tvist_overloaded"].samples
+    assert (overloaded.labels, overloaded.value) == (labels, 1.0)
     (events,) = (sample for sample in families["tvist_events"].samples if sample.name.endswith("_total"))
     assert (events.labels, events.value) == ({**labels, "kind": "lease_lost"}, 2)
     assert {name for name, _, _ in COUNTERS} < set(families)
@@ -51,6 +55,14 @@ def test_what_a_robot_says_is_on_the_page_with_its_place(metrics):
 def test_a_robot_that_has_said_nothing_has_no_figures(metrics):
     metrics.gateway("", "left")
     assert all(not family.samples for family in read(metrics).values())
+
+
+def test_in_lockstep_nothing_is_due(metrics):
+    telemetry = msgspec.structs.replace(TELEMETRY, due_ticks=None, load=None)
+    metrics.gateway("", "left").publish("telemetry", telemetry, b"")
+    families = read(metrics)
+    assert not families["tvist_due_ticks"].samples
+    assert families["tvist_missed_ticks"].samples
 
 
 def test_the_reference_names_every_figure_and_no_other(metrics):

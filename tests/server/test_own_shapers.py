@@ -29,7 +29,7 @@ from tvist_shaping.own import TRIED_F_D
 MINE = '''
 import numpy as np
 from dataclasses import dataclass
-from tvist_shaping import FirShaper, Impulses, custom, zv
+from tvist_shaping import FirShaper, Impulses, Shaper, custom, zv
 
 def mine(f_d, zeta):
     """Zero vibration."""
@@ -50,14 +50,28 @@ NUMBER = 3
 class Step:
     def step(self, q_ref, info): return q_ref
 def raises(f_d, zeta): raise RuntimeError("not today")
-def somewhere(f_d, zeta): return zv(f_d, zeta) if f_d < 100 else None
+TABLE = [[0.5, 0.5]] * 20
+def table(f_d, zeta): return Impulses(TABLE[int(f_d)], [0.0, 0.5 / f_d])
+def negative(f_d, zeta): return Impulses([1.5, -0.5], [0.0, 0.5 / f_d])
+NEGATIVE = Shaper("negative", "", negative, 0.5)
+FIR = FirShaper("fir", "", lambda f_d, zeta: [2.0, -1.0], taps=2)
+def lists(f_d, zeta): return [0.5, 0.5], [0.0, 0.5 / f_d]
+def early(f_d, zeta): return Impulses([0.5, 0.5], [-0.1, 0.5 / f_d])
+def unsummed(f_d, zeta):
+    return Impulses([0.5, 0.4], [0.0, 0.5 / f_d])
+def damped(f_d, zeta): return zv(f_d, zeta) if zeta < 0.2 else None
+def low(f_d, zeta): return zv(f_d, zeta) if 5.0 < f_d < 30.0 else 1 / 0
 '''
 WRONG_NAMES = {
     "nobody": "mine.py does not contain nobody; it contains mine, thirds, MEAN",
     "NUMBER": "NUMBER is of type int; it must be a function (f_d, zeta) -> Impulses",
     "Step": "Step is a class",
-    "raises": "mine.py:raises raises RuntimeError: not today for f_d = 0.1 Hz and ζ = 0; it must support 0.1 to 200 Hz",
-    "somewhere": "returns NoneType instead of Impulses for f_d = 100.2",
+    "raises": "mine.py:raises raises RuntimeError: not today in line 24 of mine.py for f_d = 10 Hz and ζ = 0.1",
+    "NEGATIVE": "has a peak of 2, more than the declared 1: give peak=2 to Shaper",
+    "FIR": "has a peak of 3, more than the declared 1: give peak=3 to FirShaper",
+    "lists": "returns tuple instead of Impulses(A, tau) of tvist_shaping",
+    "early": "must ascend from 0 (sort the impulses by time, and subtract the first) in line 31 of mine.py",
+    "unsummed": "must sum to 1 within 1e-9 (divide A by its sum) in line 33 of mine.py",
     "zvd": "name is 'zvd', but must be a name that no other shaper has",
     "": "the name of the shaper is missing",
 }
@@ -137,6 +151,29 @@ class TestStart:
         made = from_mapping(read_toml(str(path)), "configuration").setup()
         assert made.shaper == "thirds"
         assert made.registry.names()[-1] == "thirds"
+
+    @pytest.mark.parametrize(
+        ("name", "robot", "said"),
+        [
+            ("table", "ur5e", "raises IndexError: list index out of range in line 26 of mine.py for f_d = 2"),
+            ("damped", "ur5e", "returns NoneType instead of Impulses"),
+            ("low", "ur30", "raises ZeroDivisionError"),
+            ("low", "ur5e", None),
+            ("low", "ur3e", None),
+            ("table", "one-joint", None),
+            ("damped", "one-joint", None),
+        ],
+    )
+    def test_it_has_to_work_for_the_modes_of_the_arm_and_for_no_others(self, file, name, robot, said):
+        config = from_mapping({"shaper": f"{file}:{name}", "robot": robot}, "configuration")
+        if said is None:
+            assert config.setup().shaper == name
+            return
+        with pytest.raises(
+            ConfigError, match=r"must support the modes of this arm, .* Hz with ζ = .*clip"
+        ) as error:
+            config.setup()
+        assert said in str(error.value)
 
     @pytest.mark.parametrize("ending", ["toml", "json"])
     def test_a_state_file_takes_it_beside_another(self, file, tmp_path, ending):

@@ -101,7 +101,7 @@ def test_a_text_without_a_header_stands_whole_where_the_node_is():
         (polyscope("<Script/>").encode(), "without text"),
         (polyscope(SCRIPT_NODE, "<Wait type='DigitalInput'/>").encode(), "has the nodes Script, Wait"),
         (polyscope("<Contributed strategyClass='com.other'/>").encode(), "has the nodes Contributed"),
-        (b"<!DOCTYPE a>" + polyscope(SCRIPT_NODE).encode(), "has the nodes none"),
+        (b"<!DOCTYPE a>" + polyscope(SCRIPT_NODE).encode(), "has a document type"),
         (b"<a", "not valid XML"),
         (b"\x1f\x8bxx", "cannot be unpacked"),
         (gzip.compress(bytes(5 << 20)), "more than 4 MiB"),

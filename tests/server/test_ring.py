@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import shutil
 from itertools import pairwise
 from pathlib import Path
@@ -203,11 +204,150 @@ def test_a_disk_that_is_full_at_the_end_leaves_both_files_readable(path, monkeyp
     assert [state.tick for state in read(path).states] == list(range(101, 251))
 
 
-def test_existing_files_are_not_replaced(path):
-    path.with_name(earlier_name(path.name)).write_bytes(b"mine")
-    with pytest.raises(RecorderError, match=r"run\.earlier\.mcap exists already"):
+def record(path, ticks, killed=False):
+    """Record ticks; killed, the files are left as they are."""
+    recorder = Recorder(path, INFO, {}, keep=KEEP, wait=True)
+    for message in messages(ticks):
+        if isinstance(message, State):
+            recorder.state(message)
+    if not killed:
+        recorder.close()
+        return
+    while recorder._queue:
+        recorder._wake.set()
+    recorder._file.write = recorder._file.finish = lambda *_: None
+    recorder.close()
+
+
+def ticks_of(path):
+    return [state.tick for state in read(path).states]
+
+
+def kept(path, number):
+    return path.with_name(earlier_name(path.name, number))
+
+
+@pytest.mark.parametrize("killed", [False, True])
+@pytest.mark.parametrize("name", ["run.mcap", "run", "a.b.mcap"])
+def test_a_recording_of_an_earlier_run_is_kept_under_a_number_and_both_are_readable(name, killed, path):
+    path = path.with_name(name)
+    record(path, 330, killed)
+    before = ticks_of(path)
+    assert len(before) > KEEP
+    record(path, 120)
+    assert ticks_of(kept(path, 1)) == before
+    assert ticks_of(path) == list(range(1, 121))
+
+
+def test_the_five_newest_are_kept_and_files_of_other_names_stay(path):
+    strange = [
+        path.with_name(name) for name in ("run.1.mcap", "run.earlier-x.mcap", "run.earlier-01.mcap", "x.mcap")
+    ]
+    for place in strange:
+        place.write_bytes(b"mine")
+    for number in range(1, 9):
+        record(path, 250 + number, killed=number % 2 == 0)
+    assert all(ticks_of(kept(path, number))[-1] > 230 for number in range(3, 8))
+    left = {*names(path.parent)} - {place.name for place in strange}
+    runs = {path.name, *(kept(path, number).name for number in range(3, 8))}
+    assert runs <= left <= runs | {earlier_name(name) for name in runs}
+    assert all(place.read_bytes() == b"mine" for place in strange)
+
+
+def test_a_start_that_fails_costs_no_earlier_recording(path):
+    record(path, 120)
+    for _ in range(9):
+        recorder = Recorder(path, INFO, {}, keep=KEEP)
+        recorder.close()
+        path.unlink()  # as a server does that cannot listen
+    assert ticks_of(kept(path, 1)) == list(range(1, 121))
+    assert names(path.parent) == [kept(path, 1).name]
+
+
+@pytest.mark.parametrize("step", [0, 1])
+def test_a_kill_while_a_recording_gets_its_number_loses_nothing(step, path, monkeypatch):
+    class Killed(BaseException):
+        pass
+
+    record(path, 330, killed=True)
+    before, replace, left = ticks_of(path), Path.replace, [step]
+
+    def counted(*arguments):
+        if left[0] == 0:
+            raise Killed
+        left[0] -= 1
+        return replace(*arguments)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "replace", counted)
+        with pytest.raises(Killed):
+            Recorder(path, INFO, {}, keep=KEEP)
+    record(path, 20)
+    assert ticks_of(kept(path, 1)) == before
+    assert ticks_of(path) == list(range(1, 21))
+
+
+@pytest.mark.parametrize(
+    ("content", "stays"),
+    [(b"", False), (b"\x89MCAP0\r\n", False), (b"\x89MC", True), (bytes(5000), True)],
+    ids=["empty", "begun", "torn", "zeros"],
+)
+def test_what_a_power_failure_left_keeps_no_recording_from_starting(content, stays, path):
+    path.write_bytes(content)
+    record(path, 20)
+    assert names(path.parent) == ([kept(path, 1).name] if stays else []) + [path.name]
+    assert not stays or kept(path, 1).read_bytes() == content
+    assert ticks_of(path) == list(range(1, 21))
+
+
+@pytest.mark.parametrize("killed", [False, True])
+def test_runs_that_end_before_they_have_recorded_anything_cost_no_earlier_recording(killed, path):
+    """As when the system kills a process whenever it has started."""
+    record(path, 120)
+    for _ in range(9):
+        record(path, 0, killed)
+    record(path, 20)
+    assert ticks_of(kept(path, 1)) == list(range(1, 121))
+    assert names(path.parent) == [kept(path, 1).name, path.name]
+
+
+@pytest.mark.parametrize("keep", [KEEP, None])
+def test_a_full_disk_costs_no_earlier_recording_however_often_the_server_starts(keep, path, monkeypatch):
+    record(path, 120)
+
+    class Full(writer.Writer):
+        def add_metadata(self, *_):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(writer, "Writer", Full)
+        for _ in range(9):
+            with pytest.raises(RecorderError, match="No space left on device"):
+                Recorder(path if keep else path.with_name("all.mcap"), INFO, {}, keep=keep)
+    if keep:
+        assert names(path.parent) == [kept(path, 1).name]
+        assert ticks_of(kept(path, 1)) == list(range(1, 121))
+    else:
+        assert names(path.parent) == [path.name]
+
+
+@pytest.mark.parametrize("name", ["run.mcap", "run.earlier.mcap"])
+def test_a_file_that_is_no_recording_is_left_where_it_is(name, path):
+    path.with_name(name).write_bytes(b"mine")
+    with pytest.raises(
+        RecorderError, match=rf"{re.escape(name)} is no recording, and is not replaced: choose"
+    ):
         Recorder(path, INFO, {}, keep=KEEP)
-    assert names(path.parent) == [earlier_name(path.name)]
+    assert names(path.parent) == [name]
+
+
+def test_a_recording_that_somebody_writes_is_left_to_him(path):
+    with Recorder(path, INFO, {}, keep=KEEP) as first:
+        first.state(STATE)
+        with pytest.raises(RecorderError, match=r"run\.mcap is being written by another process: choose"):
+            Recorder(path, INFO, {}, keep=KEEP)
+    assert first.error is None
+    assert ticks_of(path) == [STATE.tick]
 
 
 def test_a_file_that_was_moved_ends_the_recording(path):
@@ -227,13 +367,13 @@ def test_replay_says_that_the_beginning_is_forgotten(path):
 
 
 @pytest.mark.parametrize(
-    ("name", "earlier"),
+    ("name", "earlier", "third"),
     [
-        ("run.mcap", "run.earlier.mcap"),
-        ("run", "run.earlier"),
-        (".mcap", ".mcap.earlier"),
-        ("a.b.c", "a.b.earlier.c"),
+        ("run.mcap", "run.earlier.mcap", "run.earlier-3.mcap"),
+        ("run", "run.earlier", "run.earlier-3"),
+        (".mcap", ".mcap.earlier", ".mcap.earlier-3"),
+        ("a.b.c", "a.b.earlier.c", "a.b.earlier-3.c"),
     ],
 )
-def test_the_name_of_the_older_file(name, earlier):
-    assert earlier_name(name) == earlier
+def test_the_names_of_the_older_part_and_of_an_earlier_run(name, earlier, third):
+    assert (earlier_name(name), earlier_name(name, 3)) == (earlier, third)

@@ -1,11 +1,13 @@
 """Deadlines of several robots in one thread, on a clock that is a number."""
 
+import re
 from collections import Counter
 from fractions import Fraction
 from itertools import pairwise
 
 import pytest
 
+from tvist_server.overload import Overload
 from tvist_server.schedule import CATCH_UP, MOMENTS, Schedule
 
 PERIOD = 0.002
@@ -93,3 +95,68 @@ def test_after_minutes_the_deadlines_have_not_drifted():
     for _ in range(ticks):
         schedule.begin(schedule.due)
     assert schedule.due == pytest.approx(start + PERIOD * (1 + ticks / robots), abs=1e-5)
+
+
+def loaded(overload, schedule, now, seconds, takes):
+    """Tick for some seconds, each tick taking this long; what was said and when, and the number of ticks."""
+    said, ticks, until = [], 0, now + seconds
+    while now < until:
+        now = max(now, schedule.due)
+        told = overload.note(schedule.begin(now)[2])
+        said += [] if told is None else [(now, told)]
+        now += takes
+        ticks += 1
+    return said, ticks, now
+
+
+@pytest.mark.parametrize("periods", [1.25, 1.9, 8.3, 350.0])
+@pytest.mark.parametrize("speed", [0.5, 1.0, 10.0])
+def test_more_are_never_missed_than_were_due_and_what_is_due_is_the_wall_clock_s(periods, speed):
+    period = PERIOD / speed
+    takes = periods * period
+    overload, start = Overload(period), 1000.0
+    _, ticks, now = loaded(overload, Schedule(1, period, start), start, 60.0, takes)
+    assert ticks <= overload.due
+    assert 0.9 * overload.due < overload.missed <= overload.due
+    behind = (CATCH_UP + 1) * period + takes
+    assert now - start - behind <= overload.due * period <= now - start
+
+
+def test_an_overload_begins_after_two_seconds_and_ends_after_five_good_ones_and_is_told_once_each():
+    overload, schedule, now = Overload(PERIOD), Schedule(1, PERIOD, 0.0), 0.0
+    said, _, now = loaded(overload, schedule, now, 30.0, 1 / 60)
+    ((when, why),) = said
+    assert 2.0 <= when < 2.5
+    assert overload.overloaded
+    missed, due = map(int, re.findall(r"(\d+) of the (\d+) control periods", why)[0])
+    assert 500 <= due < 600
+    assert 0.9 * due < missed <= due
+    assert "Next: end other programs" in why
+    said, _, now = loaded(overload, schedule, now, 30.0, 0.0)
+    ((when, why),) = said
+    assert 35.0 <= when < 36.5
+    assert not overload.overloaded
+    assert "no longer overloaded" in why
+
+
+def test_between_the_two_limits_nothing_changes():
+    """A tenth of the ticks missed is too few for it to begin and too many for it to end."""
+
+    def second(overload, missed):
+        return [told for tick in range(500) if (told := overload.note(int(tick < missed))) is not None]
+
+    overload = Overload(PERIOD)
+    assert not any(second(overload, 50) for _ in range(20))
+    assert [bool(second(overload, 100)) for _ in range(2)] == [False, True]
+    assert not any(second(overload, 50) for _ in range(20))
+    assert [bool(second(overload, missed)) for missed in (24, 24, 24, 24, 25, 24, 24, 24, 24, 24)] == [
+        False
+    ] * 9 + [True]
+
+
+def test_one_long_pause_of_the_machine_is_no_overload():
+    overload, schedule = Overload(PERIOD), Schedule(1, PERIOD, 0.0)
+    loaded(overload, schedule, 0.0, 3.0, 0.0)
+    said, *_ = loaded(overload, schedule, 63.0, 10.0, 0.0)
+    assert not said
+    assert overload.missed > 29_000

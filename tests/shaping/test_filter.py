@@ -163,7 +163,7 @@ def test_a_replaced_filter_goes_on_from_rest():
 
 
 def test_a_shaper_too_long_for_the_line_is_refused_with_what_to_do():
-    with pytest.raises(FilterError, match=r"'ei3' lasts 2 periods .* 1 Hz: take a larger max_delay") as error:
+    with pytest.raises(FilterError, match=r"'ei3' lasts 2 periods .* 1 Hz: take a shorter shaper") as error:
         TvistFilter(shaper("ei3"), Fixed([1.0], [0.1]), joints=6)
     assert error.value.field == "duration"
     assert error.value.value == 2.0
@@ -177,7 +177,9 @@ def test_the_longest_shaper_that_fits_the_line_runs():
 
 def test_a_damping_beyond_the_shaper_is_refused_with_what_to_do():
     mine = Shaper("mine", "valid to 0.2", zv, 0.5, zeta_max=0.2)
-    with pytest.raises(FilterError, match=r"less than 0.2, as shaper 'mine' demands; take another") as error:
+    with pytest.raises(
+        FilterError, match=r"less than 0.2, as shaper 'mine' demands; take a shaper with"
+    ) as error:
         TvistFilter(mine, Fixed([7.0], [0.3]), joints=1)
     assert error.value.field == "zeta_max"
     TvistFilter(mine, Fixed([7.0], [0.1]), joints=1)

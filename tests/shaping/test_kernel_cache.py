@@ -1,10 +1,19 @@
 """Machine code on disk: it is used again where it is right, and only there."""
 
+import contextlib
+import hashlib
 import os
+import pickle
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from numba.core.registry import cpu_target
+
+from tvist_shaping import kernel_cache
+from tvist_shaping.kernel_cache import DistrustWarning, KernelCache
 
 CALLEE = """
 from tvist_shaping.compiling import compiled
@@ -28,9 +37,8 @@ CALL = """
 import sys
 import numba
 from tvist_of_tests.caller import outer
-from tvist_shaping.compiling import is_cached
 from tvist_shaping.kernel_cache import unkept
-said = [is_cached(outer), *map(outer, eval(sys.argv[1]))]
+said = [outer._cache.holds(), *map(outer, eval(sys.argv[1]))]
 print(*said, sum(outer.stats.cache_misses.values()), int(bool(unkept)))
 """
 """Prints whether outer is on disk, its values, how often it was compiled, and whether some was not kept."""
@@ -116,3 +124,170 @@ def test_processes_that_compile_at_once_keep_what_each_compiled(package):
         process.communicate()
     assert call(package, "[1.0, 2]") == ["True", "3.0", "5.0", "0", "0"]
     assert not list(package.rglob("*.draft"))
+
+
+class Code:
+    """What runs when it is unpickled."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __reduce__(self):
+        return Path.mkdir, (self.mark,)
+
+
+def mode_of(level, mode):
+    def change(kernel):
+        (kernel, *kernel.parents)[level].chmod(mode)
+
+    return change
+
+
+def owner_of(level):
+    def change(kernel):
+        os.chown((kernel, *kernel.parents)[level], 4711, -1)
+
+    return change
+
+
+def linked(kernel):
+    kernel.symlink_to(kernel.rename(kernel.with_name("elsewhere")))
+
+
+def through_a_link(kernel):
+    kernel.parent.symlink_to(kernel.parent.rename(kernel.parent.with_name("open")))
+    kernel.parent.chmod(0o777)
+
+
+def pipe(kernel):
+    kernel.unlink()
+    os.mkfifo(kernel)
+
+
+UNTRUSTED = {
+    "file that all can write": mode_of(0, 0o666),
+    "file that the group can write": mode_of(0, 0o664),
+    "folder that all can write": mode_of(1, 0o777),
+    "folder that the group can write": mode_of(1, 0o775),
+    "sticky folder": mode_of(1, 0o1777),
+    "folder above": mode_of(2, 0o777),
+    "folder above that": mode_of(3, 0o777),
+    "behind a link": through_a_link,
+}
+OF_OTHERS = {"file": owner_of(0), "folder": owner_of(1), "folder above": owner_of(2)}
+TRUSTED = {
+    "as it is": lambda _kernel: None,
+    "read only": mode_of(0, 0o444),
+    "below a sticky folder such as /tmp": mode_of(2, 0o1777),
+}
+
+
+@pytest.fixture(params=["NUMBA_CACHE_DIR", "__pycache__"])
+def kernel(request, tmp_path, monkeypatch):
+    """A cache, a file of its kernel in a folder three levels down, and what exists once the file has run."""
+    place, mark = tmp_path / "far" / "top" / "kernels", tmp_path / "mark"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    monkeypatch.setattr(kernel_cache.config, "CACHE_DIR", str(place) if "NUMBA" in request.param else "")
+    monkeypatch.setattr(kernel_cache, "_said", set())
+
+    def function(x):
+        return x
+
+    function.__code__ = function.__code__.replace(co_filename=str(place / "module.py"))
+    cache = KernelCache(function)
+    file = kernel_cache.folders(place)[0] / cache._file("types", cpu_target.target_context)
+    file.parent.mkdir(parents=True)
+    code = pickle.dumps(Code(mark))
+    file.write_bytes(hashlib.sha256(code).digest() + code)
+    return cache, file, mark
+
+
+def load(cache):
+    with contextlib.suppress(TypeError):  # after it has run: a folder is no machine code
+        cache.load_overload("types", cpu_target.target_context)
+
+
+def refuses(kernel):
+    cache, file, mark = kernel
+    with pytest.warns(DistrustWarning) as said:
+        assert not cache.holds()
+    load(cache)  # a second warning would be an error
+    assert not mark.exists()
+    (one,) = said
+    assert re.search(
+        r"somebody else.*: /.* \(mode \d+\) belongs to .*, (who|and) .*: .*, or .*until then",
+        str(one.message),
+    )
+    return file
+
+
+@pytest.mark.parametrize("change", list(UNTRUSTED))
+def test_code_where_others_can_write_does_not_run_and_one_sentence_says_so(kernel, change):
+    UNTRUSTED[change](kernel[1])
+    refuses(kernel)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
+@pytest.mark.parametrize("change", list(OF_OTHERS))
+def test_code_of_another_user_does_not_run_and_one_sentence_says_so(kernel, change):
+    OF_OTHERS[change](kernel[1])
+    refuses(kernel)
+
+
+@pytest.mark.parametrize("change", [linked, pipe])
+def test_a_link_or_a_pipe_is_no_code(kernel, change):
+    cache, file, mark = kernel
+    change(file)
+    load(cache)
+    assert not mark.exists()
+
+
+def test_a_link_that_is_exchanged_after_the_look_leads_nowhere_else(kernel, monkeypatch):
+    cache, file, mark = kernel
+    elsewhere = file.parent.rename(file.parent.with_name("elsewhere"))
+    here = file.parent.with_name("here")
+    here.mkdir()
+    (here / file.name).write_bytes(b"no code")
+    file.parent.symlink_to(here)
+    read = kernel_cache.trust.read_file
+
+    def exchanged(path):
+        file.parent.unlink()
+        file.parent.symlink_to(elsewhere)
+        return read(path)
+
+    monkeypatch.setattr(kernel_cache.trust, "read_file", exchanged)
+    load(cache)
+    assert not mark.exists()
+
+
+@pytest.mark.parametrize("reader", [None, 4711], ids=["its owner", "another user than root, as in an image"])
+@pytest.mark.parametrize("change", list(TRUSTED))
+def test_code_of_this_user_or_root_runs_where_nobody_else_can_write(kernel, change, reader, monkeypatch):
+    cache, file, mark = kernel
+    TRUSTED[change](file)
+    if reader is not None:
+        if os.geteuid() != 0:
+            pytest.skip("the files are not root's")
+        monkeypatch.setattr(os, "geteuid", lambda: reader)
+    assert cache.holds()
+    load(cache)
+    assert mark.exists()
+
+
+@pytest.mark.parametrize("kernel", ["NUMBA_CACHE_DIR"], indirect=True)
+def test_nothing_is_written_where_others_can_write_nor_so_that_they_can(kernel, tmp_path):
+    _, file, _ = kernel
+    file.parent.chmod(0o777)
+    before = os.umask(0)
+    try:
+        with pytest.warns(DistrustWarning):
+            (own,) = kernel_cache.folders(file.parents[1])
+        kernel_cache._write(own / "a.kernel", b"")
+        with pytest.raises(OSError, match="chmod go-w"):
+            kernel_cache._write(file.with_name("b.kernel"), b"")
+    finally:
+        os.umask(before)
+    assert own.is_relative_to(tmp_path / "home")
+    assert [one for one in (tmp_path / "home").rglob("*") if one.stat().st_mode & 0o022] == []
+    assert list(file.parent.iterdir()) == [file]

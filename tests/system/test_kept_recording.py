@@ -2,10 +2,12 @@
 
 import signal
 
-from tests.conformance.served import Served
+import pytest
+from tests.conformance.served import Served, refused_to_start
 
 from tvist_client.robot import Robot
 from tvist_lab.recordings.mcap_file import read
+from tvist_protocol.recorded import earlier_name
 
 TICKS = 1300
 
@@ -34,3 +36,38 @@ async def test_after_a_kill_what_was_written_is_readable_without_a_gap(tmp_path)
     content, ticks = await advance_and_send(signal.SIGKILL, tmp_path / "run.mcap")
     assert not content.complete
     assert len(ticks) <= 1000
+
+
+@pytest.mark.parametrize("options", [(), ("--robots", "ur5e*2"), ("--robots", "ur5e*2", "--workers", "2")])
+async def test_a_service_that_is_killed_and_started_again_loses_no_recording(options, tmp_path):
+    """As with a restart policy: the same options, the same path, and SIGKILL in between."""
+    robots = (
+        {f"run-ur5e-{number}.mcap": f"ur5e-{number}" for number in (1, 2)}
+        if options
+        else {"run.mcap": "ur5e"}
+    )
+    path, started = tmp_path / "run.mcap", {"name": None if options else "ur5e"}
+    given = ("--clock", "lockstep", "--record", str(path), "--keep", "1s", *options)
+    for number, ticks in ((signal.SIGKILL, TICKS), (signal.SIGTERM, 200)):
+        with Served(*given, **started) as served:
+            for name in robots.values():
+                async with await Robot.connect(served.endpoint, name) as robot, robot.control("a"):
+                    await robot.advance(ticks)
+            served.end(number)
+    for name in robots:
+        killed, ended = read(tmp_path / earlier_name(name, 1)), read(tmp_path / name)
+        # Processes of --workers end in order when the first one is killed.
+        assert (killed.complete, ended.complete) == ("--workers" in options, True)
+        seen = [state.tick for state in killed.states]
+        assert seen == list(range(seen[0], seen[-1] + 1))
+        assert TICKS - 600 < seen[-1] <= TICKS
+        assert [state.tick for state in ended.states] == list(range(1, 201))
+
+
+def test_a_recording_that_keeps_all_replaces_none_and_says_how_to_start_again_and_again(tmp_path):
+    path = tmp_path / "run.mcap"
+    path.write_bytes(b"mine")
+    code, said = refused_to_start("--clock", "lockstep", "--record", path)
+    assert code == 1
+    assert "exists already and is not overwritten: choose another file, or record with --keep 10min" in said
+    assert path.read_bytes() == b"mine"

@@ -246,7 +246,7 @@ class TestProgram:
         failed(
             tvist(*command, endpoint, "--security", ring / "wall"),
             1,
-            "that this certificate is an operator's",
+            "may only watch: use an operator's certificate",
         )
 
     def test_an_endpoint_and_keys_that_do_not_go_together(self, robot, tmp_path):

@@ -95,7 +95,9 @@ def later(f_d, zeta):
 """
     (folder / "mine.py").write_text(MINE + later, encoding="utf-8")
     ended = tvist("evaluate", "--random", 1, "--no-baselines", "--shaper", "mine.py:later", cwd=folder)
-    ended.assert_failed(1, "shaper later returns NoneType instead of Impulses for f_d = ")
+    ended.assert_failed(
+        1, "shaper later returns NoneType instead of Impulses(A, tau) of tvist_shaping for f_d = "
+    )
 
 
 class TestServed:
@@ -119,7 +121,7 @@ class TestServed:
             at = ("--endpoint", served.endpoint)
             assert "moved to Q2" in tvist("move", "Q2", *at).assert_done().out
             (folder / "stop").touch()
-            served.wait_until_said("shaper mine raises RuntimeError: there is a file called stop for f_d = ")
+            served.wait_until_said("there is a file called stop in line 12 of mine.py for f_d = ")
             tvist("move", "Q1", *at).assert_failed(1, "PROTECTIVE_STOP")
             with Wire(served.endpoint) as wire, wire.control() as token:
                 assert wire.command("set_shaper", token=token, name="zv")["type"] == "done"

@@ -1,6 +1,7 @@
 """Who may do what on a robot that others can reach: real sessions, real certificates."""
 
 import queue
+import socket
 
 import msgpack
 import pytest
@@ -12,7 +13,12 @@ from zenoh.handlers import Callback
 
 from tvist_client import Robot
 from tvist_client.blocking import Robot as BlockingRobot
-from tvist_client.errors import NotConnectedError
+from tvist_client.errors import DeniedError, NotConnectedError
+from tvist_client.fleet import Fleet, Place
+from tvist_client.transports.certificates import why_refused
+from tvist_client.transports.session import open_session
+from tvist_server.gateways.network import GatewayError, Network
+from tvist_view.pilot import Pilot
 
 from .keyring import forge, free_tls_endpoint, leave_out, made, shown, tvist
 
@@ -223,10 +229,22 @@ class TestViewer:
     def test_s_client_says_what_is_the_matter(self, served, ring):
         with (
             BlockingRobot.connect(served.endpoint, security=ring / "wall") as robot,
-            pytest.raises(NotConnectedError, match="this certificate is an operator's"),
+            pytest.raises(DeniedError, match="may only watch: use an operator's certificate"),
             robot.control("wall"),
         ):
             pass
+
+    async def test_s_page_and_fleet_say_so_too(self, served, ring):
+        said = []
+        async with await Robot.connect(served.endpoint, security=ring / "wall") as robot:
+            pilot = Pilot(robot, "page", said.append)
+            assert not await pilot.take(1)
+            await pilot.stop()
+        async with Fleet(served.endpoint, security=ring / "wall") as fleet:
+            said += [report.said for report in await fleet.stop([Place("", "ur5e")])]
+        assert len(said) == 3
+        assert all("takes no commands from this client" in sentence for sentence in said)
+        assert all("an operator's certificate" in sentence for sentence in said)
 
 
 class TestStranger:
@@ -305,6 +323,34 @@ class TestNoSession:
         )
         with zenoh.open(config), pytest.raises(NotConnectedError, match="not trusted"):
             BlockingRobot.connect(endpoint, security=ring / "anna")
+
+    def test_a_client_without_one_is_told_that_certificates_are_demanded_and_how_to_give_one(self, served):
+        plain = served.endpoint.replace("tls/", "tcp/")
+        what = (
+            f"demands certificates: give {served.endpoint}, and as security the folder that `tvist keys` made"
+        )
+        with pytest.raises(NotConnectedError, match=f"no connection to {plain}: the robot there {what}"):
+            open_session(plain)
+        with pytest.raises(GatewayError, match=f"the router there {what}"):
+            Network([], connect=[plain])
+
+    def test_a_client_with_one_is_told_that_a_robot_has_none(self, ring):
+        endpoint = free_tls_endpoint()
+        plain = endpoint.replace("tls/", "tcp/")
+        network = Network([plain])
+        try:
+            with pytest.raises(
+                NotConnectedError, match=f"the robot there has no certificates: give {plain} without"
+            ):
+                open_session(endpoint, ring / "anna")
+        finally:
+            network.close()
+
+    def test_who_listens_and_says_nothing_is_not_judged(self, ring):
+        with socket.create_server(("127.0.0.1", 0)) as silent:
+            place = f"127.0.0.1:{silent.getsockname()[1]}"
+            assert why_refused(f"tcp/{place}", None) is None
+            assert why_refused(f"tls/{place}", ring / "anna") is None
 
     @pytest.mark.parametrize("days", [-1, None])
     def test_the_client_of_this_project_says_why(self, served, ring, elsewhere, tmp_path, days):

@@ -39,8 +39,8 @@ main()
 @pytest.mark.parametrize(
     "where",
     [
-        "tvist_plant.flexible_arm.is_compiled",  # nothing is there yet
-        "tvist_server.server.Network",  # the recording has begun
+        "tvist_server.kernels.compiled",  # the network is open, and there is no robot yet
+        "tvist_server.server.Network",  # nothing is there yet
     ],
 )
 def test_a_signal_before_it_serves_is_a_clean_end_that_leaves_nothing_behind(where, number, tmp_path):

@@ -24,7 +24,8 @@ NAMES = ["ur5e-1", "ur5e-2", "ur5e-3"]
 
 
 def workers(served):
-    return psutil.Process(served.process.pid).children()
+    """Processes with robots: the first one that was started is what clients connect to."""
+    return sorted(psutil.Process(served.process.pid).children(), key=lambda child: child.pid)[1:]
 
 
 def states(endpoint, name, ticks=200):
@@ -91,7 +92,7 @@ def test_a_dead_process_is_told_with_its_robots_and_ends_all(tmp_path):
     try:
         served.wait_until_ready()
         states(served.endpoint, "ur5e-1")
-        first, second = sorted(workers(served), key=lambda child: child.pid)
+        first, second = workers(served)
         second.kill()
         assert served.wait() == 1
         assert (
@@ -105,11 +106,25 @@ def test_a_dead_process_is_told_with_its_robots_and_ends_all(tmp_path):
         served.kill()
 
 
+def test_the_end_of_the_process_that_clients_connect_to_is_told_and_ends_all():
+    served = Served(*LOCKSTEP, name=None)
+    try:
+        served.wait_until_ready()
+        front, *others = sorted(psutil.Process(served.process.pid).children(), key=lambda child: child.pid)
+        front.kill()
+        assert served.wait() == 1
+        assert "the process that clients connect to was ended by SIGKILL: the other robots" in served.said
+        assert not [other for other in others if other.is_running()]
+        served.assert_quiet()
+    finally:
+        served.kill()
+
+
 def test_the_processes_end_with_the_first_one():
     served = Served(*LOCKSTEP, name=None)
     try:
         served.wait_until_ready()
-        children = workers(served)
+        children = psutil.Process(served.process.pid).children()
         served.process.kill()
         assert psutil.wait_procs(children, PATIENCE)[1] == []
     finally:

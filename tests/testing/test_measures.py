@@ -5,10 +5,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from tvist_lab.metrics import motions, peak_after_stop
 from tvist_lab.recordings import Recording
+from tvist_protocol import decode_state, decode_truth
+from tvist_protocol.generate import FOLDER as PROTOCOL
+from tvist_protocol.modes import RuntimeState
 from tvist_testing import assert_residual_vibration_below, assert_settles_within, assert_within_limits
+from tvist_testing.history import History
 from tvist_testing.measures import settling, vibration
 
 TARGET = [0.5, -3.1, 0.2, -1.6, 0.0, 0.0]
@@ -34,6 +41,28 @@ def test_a_tool_that_is_still_outside_at_the_end_has_not_settled():
     rows = decaying(1e-3, 30.0, 1.0)
     rows[-1].pose[2] += 1e-3
     assert settling(rows, 1e-4).seconds == math.inf
+
+
+@given(st.lists(st.integers(-4, 4), min_size=30, max_size=30), st.sets(st.integers(1, 30)))
+def test_a_tick_is_measured_at_one_point_in_whatever_order_state_and_truth_come(delays, lost):
+    state = decode_state((PROTOCOL / "fixtures" / "v1" / "state.msgpack").read_bytes())
+    truth = decode_truth((PROTOCOL / "fixtures" / "v1" / "truth.msgpack").read_bytes())
+    ticks = range(1, 31)
+    states = [(float(tick), replace(state, tick=tick, runtime_state=RuntimeState.STOPPED)) for tick in ticks]
+    truths = [
+        (tick + 0.5 + delay, replace(truth, tick=tick, flange_pose=[float(tick)] * 6))
+        for tick, delay in zip(ticks, delays, strict=True)
+        if tick not in lost
+    ]
+    history = History()
+    for _, message in sorted(states + truths, key=lambda pair: pair[0]):
+        (history.on_state if isinstance(message, type(state)) else history.on_truth)(message)
+    rows = history.since_rest()
+    if len(lost) < len(ticks):
+        assert [row.tick for row in rows] == [tick for tick in ticks if tick not in lost]
+        assert all(row.pose[0] == row.tick for row in rows)
+    else:
+        assert len(rows) == len(ticks)
 
 
 @pytest.mark.parametrize("rotation", [(0.0, 0.0, 0.0), (0.3, -1.2, 2.0), (math.pi, 0.0, 0.0)])

@@ -56,7 +56,7 @@ def runs_or_fails(text):
     try:
         for _ in range(TICKS):
             left = machine.resume(BUDGET)
-            assert 0 <= left <= BUDGET
+            assert -MOST_OPERATIONS - OVERDRAFT <= left <= BUDGET
             assert machine.left >= -BEYOND
             if not machine.running:
                 return "ended"

@@ -103,6 +103,13 @@ def test_the_end_of_a_machine_reaches_the_functions_that_wait():
     assert robot.ticks(1) == [EVALUATIONS]
 
 
+def test_a_statement_beyond_the_budget_leaves_a_debt_and_one_that_waits_does_not():
+    robot = Robot("l = make_list(1000, 0.5)\nl = l + l\nsync()")
+    assert -1000 < robot.ticks(1, 100)[0] < -100
+    waiting = Robot("while True:\n x = 1\nend")
+    assert waiting.ticks(3) == [0, 0, 0]
+
+
 def test_a_killed_thread_leaves_its_motion():
     robot = Robot("thread t():\n move(1)\nend\nh = run t()\nsync()\nkill h\nsay(7)\nsync()")
     robot.ticks(2)
@@ -350,7 +357,7 @@ def test_an_endless_recursion_of_threads_is_an_error():
 def test_work_on_long_lists_counts_by_their_length():
     prepared = "a = make_list(1000, 1)\nb = 0\n"
     alone = Robot(prepared).ticks(1, budget=10_000)[0]
-    for work in ("b = a + a", "b = a * 2", "b = norm(a)", "b = a == [1]", "b = -a"):
+    for work in ("b = a + a", "b = a * 2", "b = norm(a)", "b = -a"):
         robot = Robot(prepared + work)
         robot.ticks(1, budget=10_000)
         assert robot.machine.left <= alone - 900, work
@@ -493,7 +500,7 @@ def test_many_short_statements_one_after_the_other_are_no_endless_loop():
         added.last = compile_script(text, added.signatures, added.last)
         added.waiting.append(added.last)
     while len(added.said) < 200:
-        assert added.machine.resume() >= 0
+        added.machine.resume()
 
 
 @pytest.mark.parametrize(

@@ -43,13 +43,13 @@ def browser():
 
 
 class Page:
-    """A `tvist view` process; `url` is where its page is."""
+    """A process that serves a page, `tvist view` by default; `url` is where its page is."""
 
-    def __init__(self, *arguments):
+    def __init__(self, *arguments, command="view"):
         self.lines = []
         self._news = threading.Condition()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "tvist_cli", "view", *map(str, arguments), "--port", "0"],
+            [sys.executable, "-m", "tvist_cli", command, *map(str, arguments), "--port", "0"],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

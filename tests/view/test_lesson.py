@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.conformance.served import PATIENCE
+from tests.view.browser import Page, browser
 
 from tvist_view.oscillator import STEP, leftover, leftovers, swing
 
@@ -43,3 +45,26 @@ def test_the_curve_is_zero_without_an_error_and_rises_to_both_sides():
     assert curve[30] == pytest.approx(0.0, abs=1e-12)
     assert (np.diff(curve[30:]) > 0.0).all()
     assert (np.diff(curve[:31]) < 0.0).all()
+
+
+@pytest.mark.slow
+def test_every_browser_has_sliders_of_its_own():
+    with Page(command="lesson") as served, browser() as chromium:
+        first = opened(chromium, served)
+        before = words(first)
+        first.get_by_role("slider").first.press("End")
+        first.wait_for_function("before => !document.body.innerText.includes(before)", arg=before)
+        first.close()  # two pages drawn by software would share the processor
+        assert words(opened(chromium, served)) == before
+        assert len(served.lines) == 1, served.lines  # where the page is
+
+
+def opened(chromium, served):
+    page = chromium.new_context().new_page()
+    page.set_default_timeout(PATIENCE * 1000.0)
+    page.goto(served.url)
+    return page
+
+
+def words(page):
+    return page.get_by_text("the arm swings with").inner_text()

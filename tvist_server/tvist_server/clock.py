@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from tvist_controller.host import Host
 from tvist_server.jobs import Do, Jobs
 from tvist_server.lateness import Lateness, Punctuality
+from tvist_server.overload import Overload
 from tvist_server.punctual import PRIORITY, bind, take_priority
 from tvist_server.schedule import Schedule
 
@@ -47,6 +48,8 @@ class Mailbox:
         self.ending = False
         """Whether a step in progress has to end."""
         self.lateness = Lateness()
+        self.overload: Overload | None = None
+        """Count of the ticks that were due; None if a client advances time."""
 
     def post(self, do: Do, client: str | None = None) -> None:
         """Queue a job for the controller's thread, before its next tick. Callable from any thread; does not block.
@@ -162,6 +165,9 @@ class Realtime(Clock):
         super().__init__(robots)
         self._hand_on = hand_on
         self._period = period / speed
+        self._overloads = [Overload(self._period) for _ in robots]
+        for robot, overload in zip(robots, self._overloads, strict=True):
+            robot.overload = overload
         self._priority, self._processor = priority, processor
         self._asked = threading.Event()
         self.granted: list[str] = []
@@ -181,7 +187,7 @@ class Realtime(Clock):
             self._ask()
         finally:
             self._asked.set()
-        robots, now, sleep = self._robots, time.monotonic, time.sleep
+        robots, overloads, now, sleep = self._robots, self._overloads, time.monotonic, time.sleep
         alone, handed_on = len(robots) == 1, -HAND_ON_EVERY
         schedule = Schedule(len(robots), self._period, now())
         while self._running:
@@ -196,6 +202,9 @@ class Realtime(Clock):
             robot.lateness.note(late)
             if missed:
                 robot.host.missed(missed)
+            told = overloads[number].note(missed)
+            if told is not None:
+                robot.host.warn(told)
             robot.jobs.do_waiting()
             robot.host.tick()
             robot.lateness.worked(now() - begun)

@@ -20,6 +20,7 @@ from tvist_protocol.info import Clock
 from tvist_protocol.values import Namespace, RobotName, Seed
 from tvist_server.durations import ticks_of
 from tvist_server.fleet import MOST, members
+from tvist_server.gateways.allowed_hosts import AllowedHosts
 from tvist_server.initial import read_state, shaped_by
 from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
 from tvist_server.program_folder import ProgramFolder
@@ -176,6 +177,17 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             raise ConfigError(f"keep is {self.keep}, but nothing is recorded: give record, too")
         try:
             return ticks_of(self.keep, "keep")
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
+
+    def allowed_hosts(self) -> AllowedHosts:
+        """Return the machines that programs may connect to.
+
+        Raises:
+            ConfigError: `ur_allow` has what names no machine.
+        """
+        try:
+            return AllowedHosts(self.ur_allow)
         except ValueError as error:
             raise ConfigError(str(error)) from error
 

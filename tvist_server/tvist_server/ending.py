@@ -1,7 +1,9 @@
-"""Orderly shutdown on the signals SIGINT, SIGTERM, SIGHUP and SIGQUIT."""
+"""Orderly shutdown on the signals SIGINT, SIGTERM, SIGHUP and SIGQUIT, and of processes whose parent has died."""
 
 import contextlib
+import os
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 
@@ -15,6 +17,53 @@ def ending_signals() -> list[signal.Signals]:
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         ends.append(signal.SIGHUP)
     return ends
+
+
+def end_like_interrupted() -> None:
+    """Let the other signals that shut this process down do what Control+C does; a second one ends it at once."""
+
+    def interrupt(number: int, _frame: FrameType | None) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a script's background
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.raise_signal(signal.SIGINT)
+
+    for number in ending_signals():
+        if number != signal.SIGINT:
+            signal.signal(number, interrupt)
+
+
+@contextlib.contextmanager
+def signals_held() -> Iterator[None]:
+    """Let signals that shut this process down wait until the body is through, so that nothing there is half done."""
+    if threading.current_thread() is not threading.main_thread():  # where no signal raises anything
+        yield
+        return
+    came: list[int] = []
+    handlers = {
+        number: signal.signal(number, lambda number, _: came.append(number)) for number in ending_signals()
+    }
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    for number in came:
+        signal.raise_signal(number)
+
+
+def end_with_parent() -> None:
+    """End this process, which `multiprocessing` has started, as soon as its parent has died, even of SIGKILL."""
+    import multiprocessing.connection
+
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def end() -> None:
+        multiprocessing.connection.wait([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=end, name="tvist-parent", daemon=True).start()
 
 
 class Ending:

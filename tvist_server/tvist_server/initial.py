@@ -7,12 +7,13 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
-from tvist_controller.own_shapers import is_file, load_own
+from tvist_controller.own_shapers import check_for, is_file, load_own
 from tvist_controller.setup import Setup
 from tvist_plant.user_file import read_bytes, read_toml
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Joints, Payload, ResetMode, Seed
+from tvist_shaping import FirShaper
 
 ShaperChoice = Annotated[str, Meta(min_length=1, max_length=4096)]
 
@@ -57,12 +58,15 @@ def shaped_by(setup: Setup, shaper: str) -> Setup:
         shaper: Name of a shaper, or FILE.py:NAME, which is then loaded.
 
     Raises:
-        OwnShaperError: The file contains no such shaper.
+        OwnShaperError: The file contains no such shaper, or it fails for this arm's modes.
         UserFileError: FILE.py is not a text file, or too large.
     """
     if not is_file(shaper):
         return replace(setup, shaper=shaper)
     own = load_own(shaper)
+    modes = own.shaper.modes if isinstance(own.shaper, FirShaper) else 1
+    if modes <= (source := setup.source()).most:  # else it is refused where a filter is made
+        check_for(own, source.estimator(modes, setup.payload), setup.description.joints)
     known = setup.own_shapers if own in setup.own_shapers else (*setup.own_shapers, own)
     return replace(setup, shaper=own.name, own_shapers=known)
 

@@ -5,45 +5,70 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.kinematics.inverse import is_compiled as planning_is_compiled
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.planner import Planner
-from tvist_plant.flexible_arm import is_compiled
 from tvist_protocol.codec import decode_reply, encode
-from tvist_protocol.commands import Command, MoveJ, TakeControl
-from tvist_protocol.replies import Accepted, Done, Reply
+from tvist_protocol.commands import Command, MoveJ, SetShaper, Stop, TakeControl
+from tvist_protocol.kinematics import ForwardKinematics
+from tvist_protocol.motions import MoveL
+from tvist_protocol.replies import Accepted, Refused, Reply, ToolPose
 from tvist_protocol.simulation import SimulationStep
 from tvist_server.config import from_mapping
-from tvist_shaping.kernel_cache import unkept
+from tvist_server.gateways.starting import Tell
+from tvist_shaping.kernel_cache import kernels, unkept
 
-MOVE_TICKS = 500
+MOVE_TICKS = 1000
+"""Longest time of a motion that uses kernels [ticks]."""
+LOOK = 0.5
+"""Time between two looks at what is on disk [s]."""
+STUDIES = {"all_to_drives", "drive", "improved_postures", "mean_delay", "play", "product_taps", "shape_all"}
+"""Kernels that no served robot calls."""
+KERNELS = tuple(kernel for kernel in kernels if kernel.name.rpartition(".")[2] not in STUDIES)
+"""Kernels that a served robot may call."""
 
 
 class KernelsError(RuntimeError):
     """A process that compiles has failed, or could not keep what it compiled."""
 
 
-def are_compiled() -> bool:
-    """Return whether machine code of a served robot is on disk; otherwise its start compiles for long."""
-    return is_compiled() and planning_is_compiled()
+def compiled() -> int:
+    """Return how many of `KERNELS` are on disk; if some are not, the start of a robot takes long."""
+    return sum(kernel.holds() for kernel in KERNELS)
 
 
-def compile_ahead(processes: int | None = None) -> None:
+def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> None:
     """Compile every kernel that a served robot calls, unless its machine code is on disk already.
 
     Args:
         processes: Number of processes that compile at once; None for one on each processor of this process.
+        tell: Called now and then with the progress.
 
     Raises:
         KernelsError: Some could not be compiled or kept.
     """
-    with ThreadPoolExecutor(processes or processors()) as pool:
-        said = [why for why in pool.map(_in_a_process, PARTS) if why]
+    waiting, running, said = list(PARTS), list[_Process](), ""
+    missing = list(KERNELS)
+    try:
+        while waiting or running:
+            while waiting and len(running) < (processes or processors()):
+                running.append(_begin(waiting.pop(0)))
+            missing = [kernel for kernel in missing if not kernel.holds()]
+            if tell is not None:
+                tell(len(KERNELS) - len(missing), len(KERNELS))
+            with suppress(subprocess.TimeoutExpired):
+                running[0].wait(LOOK)
+            for process in [process for process in running if process.poll() is not None]:
+                running.remove(process)
+                said = _said(process) or said
+    finally:  # a signal may have ended this
+        for process in running:
+            process.kill()
+            process.communicate()
     if said:
-        raise KernelsError(said[0])
+        raise KernelsError(said)
 
 
 def processors() -> int:
@@ -51,15 +76,19 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
-def _in_a_process(part: str) -> str:
-    """Compile a part in a process, which ends with this one; return what has failed."""
+_Process = subprocess.Popen[bytes]
+
+
+def _begin(part: str) -> _Process:
+    """Compile a part in a process, which ends with this one."""
     command = [sys.executable, "-m", "tvist_server.kernels", part]
     pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT) as process:  # noqa: S603
-        assert process.stdin is not None
-        assert process.stdout is not None
-        said = process.stdout.read().decode(errors="replace").strip()
-        process.stdin.close()
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT)  # noqa: S603
+
+
+def _said(process: _Process) -> str:
+    """Return what has failed in a process that has ended."""
+    said = process.communicate()[0].decode(errors="replace").strip()
     if process.returncode == 0:
         return ""
     return said.splitlines()[-1] if said else f"a process that compiles ended with {process.returncode}"
@@ -76,8 +105,22 @@ def _line() -> None:
     assert isinstance(control, Accepted)
     assert control.token is not None
     token = control.token
-    assert isinstance(ask(MoveJ(token=token, q=(0.1, -3.0, 0.0, -1.5, 0.0, 0.0))), Accepted)
-    assert isinstance(ask(SimulationStep(token=token, ticks=MOVE_TICKS)), Done)
+    host.subscribe("state", bytes)  # has states encoded
+    bent = (0.2, -1.4, 1.7, -1.8, -1.5, 0.3)
+    found = ask(ForwardKinematics(q=bent))
+    assert isinstance(found, ToolPose)
+    x, y, z, a, b, c = found.pose
+    back = MoveJ(token=token, q=(0.4, *bent[1:]))
+    step = SimulationStep(token=token, ticks=MOVE_TICKS)
+    commands: list[Command] = [
+        MoveJ(token=token, q=bent), step, MoveL(token=token, pose=(x, y, z + 0.05, a, b, c)),
+        SimulationStep(token=token, ticks=50), Stop(), step, SetShaper(token=token, name="elastic"), back, step,
+        SetShaper(token=token, name="auto"), MoveJ(token=token, q=bent), step,
+        SetShaper(token=token, name="none", modes=2), back, step,
+    ]  # fmt: skip
+    for command in commands:
+        reply = ask(command)
+        assert not isinstance(reply, Refused), reply
     Instruments(host.controller.setup.description)
 
 

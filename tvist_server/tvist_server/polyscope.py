@@ -6,6 +6,8 @@ does, so a program that has them is refused.
 
 from xml.etree import ElementTree as ET
 
+from tvist_plant.user_file import UserFileError, xml
+
 EXTERNAL_CONTROL = (
     'popup("Play this program from the machine that controls it.", title="External Control", blocking=True)'
 )
@@ -28,12 +30,10 @@ def script_of(name: str, data: bytes) -> str:
     Raises:
         PolyscopeError: It is not XML, or has nodes that are not understood.
     """
-    main: ET.Element | None = None
-    if b"<!DOCTYPE" not in data:  # its entities could expand without end
-        try:
-            main = ET.fromstring(data).find("./children/MainProgram")  # noqa: S314  see above
-        except (ET.ParseError, LookupError, ValueError) as error:  # the last two: of an unknown encoding
-            raise PolyscopeError(f"it is not valid XML: {error}") from error
+    try:
+        main = xml(data).find("./children/MainProgram")
+    except UserFileError as error:
+        raise PolyscopeError(str(error)) from error
     nodes = [] if main is None else main.findall("./children/*")
     texts = [_text(node) for node in nodes]
     if main is None or not nodes or None in texts:

@@ -41,11 +41,11 @@ class ServedRobot:
         dump: Folder for the last second before a failure.
         observe: Makes a further sink of the controller's messages.
         programs: Folder with programs that clients load by their names.
-        allowed: Machines that programs may connect to, besides the one that sent them.
+        hosts: Machines that programs may connect to, besides the one that sent them [none].
         keep: Number of ticks that the recording keeps at least; None keeps all.
 
     Raises:
-        ValueError: The setup is invalid, or a machine is none.
+        ValueError: The setup is invalid.
         RecordingError: The recording cannot be written.
     """
 
@@ -56,11 +56,10 @@ class ServedRobot:
         dump: Path,
         observe: Callable[[Controller], Sink] | None = None,
         programs: ProgramFolder | None = None,
-        allowed: Sequence[str] = (),
+        hosts: AllowedHosts | None = None,
         keep: int | None = None,
     ) -> None:
         self.setup = setup
-        hosts = AllowedHosts(allowed)
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
         self._realtime = not lockstep
@@ -84,7 +83,7 @@ class ServedRobot:
         self._looked_at = self.controller.latest.tick
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]
-        self.sockets = ProgramSockets(self._hear, self.warn, hosts)
+        self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
         """Gateway for the sockets of programs."""
         self._host = Host(self.controller, *sinks, black_box, self._publisher, ports=self.sockets)
         self.driven = Mailbox(self._host, self.sockets.patience)
@@ -207,6 +206,7 @@ class ServedRobot:
         late, lost, limited = controller.motion.streams.counters()
         refused = reception.setpoints_refused + sum(gateway.setpoints_refused for gateway in gateways)
         on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0, 0.0)
+        overload = self.driven.overload
         return Telemetry(
             tick=controller.tick_number,
             ticks_per_second=on_time.ticks / on_time.seconds,
@@ -224,6 +224,9 @@ class ServedRobot:
             commands=counters.commands + reception.commands_refused,
             refused=counters.refused + reception.commands_refused,
             load=None if punctuality is None else punctuality.load,
+            due_ticks=None if overload is None else overload.due,
+            due_per_second=None if overload is None else overload.due_per_second,
+            overloaded=overload is not None and overload.overloaded,
         )
 
     def close_recording(self) -> None:

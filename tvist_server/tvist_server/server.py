@@ -26,6 +26,7 @@ from tvist_server.gateways.console import Console, ConsoleGateway
 from tvist_server.gateways.exposure import ExposureError, check_endpoints, guarded, guarded_interfaces
 from tvist_server.gateways.metrics import Metrics
 from tvist_server.gateways.network import Network
+from tvist_server.gateways.starting import Prepare, Starting
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 from tvist_server.punctual import leave_processor, lock_memory
 from tvist_server.robot import ServedRobot
@@ -58,6 +59,8 @@ class Server:
         config: Configuration of the robots.
         observe: Makes an observer of a robot's messages, which then tells people about it instead of the console.
         share: The robots that this process serves, if others serve the rest [all of them].
+        prepare: What takes long before the robots are made; it is given a function that takes its progress. Clients
+            hear meanwhile that the robots are starting.
 
     Raises:
         ConfigError: The configuration is invalid.
@@ -70,6 +73,7 @@ class Server:
         config: ServeConfig,
         observe: Callable[[Controller], Sink] | None = None,
         share: Share | None = None,
+        prepare: Prepare | None = None,
     ) -> None:
         setups = config.setups()
         check_together(config, len(setups))
@@ -92,26 +96,27 @@ class Server:
         self.left = True
         """Whether the network is closed after `close`. Zenoh or a courier may still wait for a client that has stopped
         reading."""
+        lockstep, starting = config.clock != "realtime", Starting()
+        self._network = Network(
+            listen,
+            guard,
+            lockstep=lockstep,
+            connect=config.connect if share.router is None else (share.router,),
+            security=config.security if share.router is None else None,
+            namespace=config.namespace or "",
+            on_router=partial(self._tell_router, ", ".join(config.connect)) if share.router is None else None,
+        )
         try:
-            for setup in setups:
-                self.robots.append(_robot(setup, config, observe, several=several))
-            self._couriers, self._clocks = _drivers(config, self.robots)
-            lockstep = config.clock != "realtime"
-            self._network = Network(
-                listen,
-                guard,
-                lockstep=lockstep,
-                connect=config.connect if share.router is None else (share.router,),
-                security=config.security if share.router is None else None,
-                namespace=config.namespace or "",
-                on_router=partial(self._tell_router, ", ".join(config.connect))
-                if share.router is None
-                else None,
-            )
             self._console = Console()
             self.metrics = (
                 None if config.metrics is None or share.router is not None else Metrics(config.metrics)
             )
+            self._network.expect([setup.name for setup in setups], starting)
+            if prepare is not None:
+                prepare(starting.note)
+            for setup in setups:
+                self.robots.append(_robot(setup, config, observe, several=several))
+            self._couriers, self._clocks = _drivers(config, self.robots)
             self._interfaces: list[UrInterfaces] = []
             self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
             """Address and ports of each robot's UR interfaces; empty if they are not open."""
@@ -151,6 +156,7 @@ class Server:
         for robot in self.robots:
             robot.close()
             robot.discard_recording()
+        self._network.close()
 
     def _gateways(self, robot: ServedRobot, config: ServeConfig, number: int) -> list[Gateway]:
         name, desk, lockstep = robot.setup.name, robot.reception, config.clock != "realtime"
@@ -245,6 +251,11 @@ class Server:
             self.close()
 
     @property
+    def page(self) -> str | None:
+        """Address of the page with figures for Prometheus; None if they are not published."""
+        return None if self.metrics is None else self.metrics.page
+
+    @property
     def failure(self) -> str | None:
         """Why a robot has stopped ticking; None if all of them tick."""
         return next((robot.failure for robot in self.robots if robot.failure is not None), None)
@@ -278,7 +289,7 @@ def _robot(
         path = recording_of(config.record, setup.name) if several else Path(config.record)
     programs, dump, keep = config.program_folder(setup.name), config.dump_folder(), config.keep_ticks()
     try:
-        return ServedRobot(setup, path, dump, observe, programs, config.ur_allow, keep)
+        return ServedRobot(setup, path, dump, observe, programs, config.allowed_hosts(), keep)
     except ValueError as error:
         raise ConfigError(str(error)) from error
 

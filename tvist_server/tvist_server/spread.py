@@ -32,15 +32,19 @@ def shares(robots: int, workers: int) -> list[range]:
 
 
 def check_together(config: ServeConfig, robots: int) -> None:
-    """Check what the options of network and processes ask of each other.
+    """Check durations and folders, and what the options of network and processes ask of each other.
 
     Args:
         config: Configuration.
         robots: Number of robots that it names.
 
     Raises:
-        ConfigError: They exclude each other.
+        ConfigError: They exclude each other, or one of them is wrong.
     """
+    config.keep_ticks()
+    config.dump_folder()
+    config.program_folder(config.name)
+    config.allowed_hosts()
     if config.connect and config.endpoints and config.security is not None:
         raise ConfigError(
             "connect, listen and security exclude each other: the router checks certificates, so leave listen out"

@@ -3,18 +3,31 @@
 import asyncio
 import os
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from typing import Any
+
+import zenoh
+from zenoh.handlers import Callback
 
 from tvist_plant.user_file import UserFileError
+from tvist_protocol import keys
 from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError
+from tvist_server.gateways.distant_metrics import DistantMetrics
+from tvist_server.gateways.metrics import Metrics
+from tvist_server.gateways.network import Network
+from tvist_server.gateways.starting import Starting
 from tvist_server.recording import RecorderError
 from tvist_server.server import Recording, Server
 from tvist_server.spread import Share
 from tvist_server.ur_ports import InterfaceName
+
+END = 15.0
+"""Longest wait for a process to end its recordings and leave [s]; then it is killed."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +45,13 @@ class Made:
 
     ur: list[tuple[str, dict[InterfaceName, int]]]
     """Address and ports of each robot's UR interfaces."""
+    page: str | None = None
+    """Address of the page with figures for Prometheus."""
 
 
 @dataclass(frozen=True)
 class Ready:
-    """The robots tick and answer."""
+    """The robots tick and answer, or clients reach all of them."""
 
 
 @dataclass(frozen=True)
@@ -51,54 +66,125 @@ class Ended:
 News = Refused | Made | Ready | Ended
 
 
-def work(config: ServeConfig, share: Share, first: Connection) -> None:
+@dataclass(frozen=True)
+class First:
+    """The first process, from another one."""
+
+    pipe: Connection
+    died: Callable[[], None]
+    """Clean up what it has left behind."""
+
+    def told(self) -> Any:
+        """Wait for its word; False if it has died, or wants no robots."""
+        try:
+            return self.pipe.recv()
+        except (EOFError, OSError):
+            self.died()
+            return False
+
+    def say(self, news: News) -> None:
+        """Send it news, unless it has died."""
+        try:
+            self.pipe.send(news)
+        except OSError:
+            self.died()
+
+
+def meet_clients(
+    config: ServeConfig, names: Sequence[str], listen: Sequence[str], guard: Mapping[str, Any], first: First
+) -> None:
+    """Be the process that clients connect to: a router for the others, which answers for robots that are starting.
+
+    The conversation: it says `Made`; it is told progress; told that all robots are ready, it says `Ready` once it
+    reaches them; told that it is over, it says `Ended`.
+
+    Args:
+        config: Configuration of all robots.
+        names: Names of the robots.
+        listen: Endpoints to listen on.
+        guard: Settings that protect them.
+        first: The first process.
+    """
+    place, starting = config.namespace or "", Starting()
+    try:
+        network = Network(
+            listen,
+            guard,
+            lockstep=config.clock != "realtime",
+            connect=config.connect,
+            security=config.security,
+            namespace=place,
+        )
+        network.expect(names, starting, here=False)
+        metrics = None if config.metrics is None else Metrics(config.metrics)
+    except GatewayError as error:
+        first.say(Refused(str(error), misuse=False))
+        return
+    if metrics is not None:
+        for name in names:
+            metrics.add(DistantMetrics(network.session, place, name))
+    first.say(Made([], None if metrics is None else metrics.page))
+    awaited, reached = set(names), threading.Event()
+
+    def on_token(sample: zenoh.Sample) -> None:
+        awaited.discard(str(sample.key_expr).split("/")[1])
+        if not awaited:
+            reached.set()
+
+    network.session.liveliness().declare_subscriber(
+        keys.ANY_ALIVE, Callback(on_token, indirect=False), history=True
+    )
+    while word := first.told():
+        if word is not True:
+            starting.note(*word)
+            continue
+        if not config.connect:  # else clients reach them through another router
+            reached.wait(END)
+        network.forget()
+        first.say(Ready())
+    if metrics is not None:
+        metrics.close()
+    network.close()
+    first.say(Ended(None, []))
+
+
+def work(config: ServeConfig, share: Share, first: First) -> None:
     """Serve robots until the first process says that it is over, or has died.
 
-    The conversation: this process makes its robots and says `Made`; told to go on, it starts them and says `Ready`;
-    told to end, it says `Ended`. Signals are the first process's to hear: a terminal sends them to all processes.
+    The conversation: told to begin, this process makes its robots and says `Made`; told to go on, it starts them and
+    says `Ready`; told to end, it says `Ended`. Signals are the first process's to hear: a terminal sends them to all
+    processes.
 
     Args:
         config: Configuration of all robots.
         share: The robots of this process.
-        first: Connection to the first process.
+        first: The first process.
     """
     ending = Ending()
     ending.close()  # hears no signals
+    if not first.told():
+        return
     try:
         server = Server(config, share=share)
     except (ConfigError, UserFileError, GatewayError, RecorderError) as error:
-        _say(first, Refused(str(error), isinstance(error, ConfigError)))
+        first.say(Refused(str(error), isinstance(error, ConfigError)))
         return
-    _say(first, Made(server.ur))
-    if not _told(first):
+    first.say(Made(server.ur))
+    if not first.told():
         server.discard()
         return
 
     def ready() -> None:
-        _say(first, Ready())
-        threading.Thread(target=_wait, args=(first, ending.request), name="tvist-end", daemon=True).start()
+        first.say(Ready())
+        threading.Thread(target=end, name="tvist-end", daemon=True).start()
+
+    def end() -> None:
+        first.told()
+        ending.request()
+        time.sleep(2.0 * END)  # whoever would kill it by then may have died
+        os._exit(1)
 
     asyncio.run(server.run(ready, ending))
-    _say(first, Ended(server.failure, server.recordings))
+    first.say(Ended(server.failure, server.recordings))
     if not server.left:  # Zenoh would wait for ten seconds
         os._exit(0)
-
-
-def _told(first: Connection) -> bool:
-    """Wait for a word of the first process; False if it has died, or wants no robots."""
-    try:
-        return bool(first.recv())
-    except (EOFError, OSError):
-        return False
-
-
-def _wait(first: Connection, over: Callable[[], None]) -> None:
-    _told(first)
-    over()
-
-
-def _say(first: Connection, news: News) -> None:
-    try:
-        first.send(news)
-    except OSError:  # the first process has died, which is noticed where its words are awaited
-        return

@@ -1,7 +1,8 @@
 """Several processes that serve robots behind one endpoint.
 
-Clients connect to the first process, which has no robots. It is a router, to which the others connect over a socket
-that nobody else can open. Each robot ticks in one of the others, as it would in a process of its own.
+Clients connect to a process without robots. It is a router, to which the others connect over a socket that nobody else
+can open. Each robot ticks in one of the others, as it would in a process of its own. The first process has no network,
+since a process with threads should not fork.
 """
 
 import contextlib
@@ -9,14 +10,12 @@ import gc
 import multiprocessing
 import multiprocessing.process
 import signal
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection, wait
-from pathlib import Path
 from typing import Any
 
-from tvist_client.transports.session import close_session
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.planner import Planner
@@ -24,17 +23,13 @@ from tvist_controller.setup import Setup
 from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.ending import Ending
 from tvist_server.gateways.access import with_robots_behind
-from tvist_server.gateways.distant_metrics import DistantMetrics
 from tvist_server.gateways.endpoints import protocol
-from tvist_server.gateways.metrics import Metrics
-from tvist_server.gateways.network import REALTIME, open_router
+from tvist_server.gateways.starting import Prepare
+from tvist_server.own_folder import OwnFolder
 from tvist_server.server import Recording, protected
 from tvist_server.spread import LOCAL, Share, check_together, shares
 from tvist_server.ur_ports import InterfaceName
-from tvist_server.worker import Ended, Made, News, Ready, Refused, work
-
-END = 15.0
-"""Longest wait for a process to end its recordings and leave [s]; then it is killed."""
+from tvist_server.worker import END, Ended, First, Made, News, Ready, Refused, meet_clients, work
 
 
 class WorkersError(Exception):
@@ -45,20 +40,20 @@ class WorkersError(Exception):
 class _Worker:
     """One process, from here."""
 
-    number: int
+    who: str
+    """Which one it is, with its robots, in words."""
     process: multiprocessing.process.BaseProcess
     pipe: Connection
-    names: str
-    """Its robots, in words."""
     told: Ended | None = None
     """What it said at its end."""
 
 
 class Workers:
-    """The first process: it starts the others, lets clients reach them, and ends with them.
+    """The first process: it starts the others, and ends with them.
 
     Args:
         config: Configuration of the robots.
+        prepare: What takes long before the robots are made, see `Server`.
 
     Raises:
         ConfigError: The configuration is invalid.
@@ -67,7 +62,7 @@ class Workers:
         WorkersError: A process cannot serve its robots.
     """
 
-    def __init__(self, config: ServeConfig) -> None:
+    def __init__(self, config: ServeConfig, prepare: Prepare | None = None) -> None:
         self.setups = config.setups()
         check_together(config, len(self.setups))
         self._names = [setup.name for setup in self.setups]
@@ -77,19 +72,23 @@ class Workers:
         """Address and ports of each robot's UR interfaces; empty if they are not open."""
         self.recordings: list[Recording] = []
         """What became of the recordings, after `run`."""
-        self.metrics: Metrics | None = None
-        self._session: Any = None
-        self._folder = tempfile.TemporaryDirectory(prefix="tvist-")
+        self._folder = OwnFolder()
+        self._front: list[_Worker] = []
+        """The process that clients connect to."""
         self._workers: list[_Worker] = []
-        for setup in {id(setup.description): setup for setup in self.setups}.values():
-            _rehearse(setup)
         try:
+            self._front.append(self._open())
+            self.page = self._made(self._front[0]).page
+            """Address of the page with figures for Prometheus; None if they are not published."""
+            if prepare is not None:
+                prepare(self._note)
+            for setup in {id(setup.description): setup for setup in self.setups}.values():
+                _rehearse(setup)
             self._fork()
-            self._open()  # after the forks, since it starts threads
             for worker in self._workers:
                 worker.pipe.send(True)
             for worker in self._workers:
-                self.ur += self._made(worker)
+                self.ur += self._made(worker).ur
         except BaseException:  # a signal, too
             self.close()
             raise
@@ -110,8 +109,8 @@ class Workers:
         try:
             for worker in self._workers:
                 worker.pipe.send(True)
-            waiting: dict[Any, _Worker] = {worker.pipe: worker for worker in self._workers}
-            starting = len(waiting)
+            waiting: dict[Any, _Worker] = {worker.pipe: worker for worker in self._front + self._workers}
+            starting = len(self._workers)
             while why is None:
                 for source in wait([heard, *waiting]):
                     if source is heard:
@@ -123,6 +122,8 @@ class Workers:
                         continue
                     starting -= 1
                     if starting == 0:
+                        self._tell_front(True)
+                    elif starting < 0:
                         ready()
         finally:
             failures = self.close()
@@ -132,16 +133,14 @@ class Workers:
 
     def close(self) -> list[str]:
         """End the other processes, then the network; return what went wrong. A second call does nothing."""
-        workers, self._workers = self._workers, []
-        for worker in workers:
-            with contextlib.suppress(OSError):  # it has died
-                worker.pipe.send(False)
-        failures = [failure for worker in workers for failure in self._end(worker)]
-        if self.metrics is not None:
-            self.metrics.close()
-        if self._session is not None:
-            close_session(self._session)
-        self._folder.cleanup()
+        failures: list[str] = []
+        for group in (self._workers, self._front):  # clients read until the robots have ended
+            for worker in group:
+                with contextlib.suppress(OSError):  # it has died
+                    worker.pipe.send(False)
+            failures += [failure for worker in group for failure in self._end(worker)]
+            group.clear()
+        self._folder.close()
         return failures
 
     # ------------------------------------------------------------------ start
@@ -149,7 +148,6 @@ class Workers:
     def _fork(self) -> None:
         gc.collect()
         gc.freeze()  # what exists stays shared memory: the collector writes to no object that it does not look at
-        context = multiprocessing.get_context("fork")
         parts = shares(len(self.setups), self._config.workers)
         pipes = [multiprocessing.Pipe() for _ in parts]
         router = None if self._config.connect else self._inside
@@ -158,10 +156,10 @@ class Workers:
             rest = [
                 end for other, pair in enumerate(pipes) for end in pair if (other, end) != (number, pair[1])
             ]
-            arguments = self._config, Share(part, router), pipes[number][1], rest
-            process = context.Process(target=_work, args=arguments, name=f"tvist-worker-{number + 1}")
-            process.start()
-            self._workers.append(_Worker(number + 1, process, pipes[number][0], _listed(self._names, part)))
+            rest += [front.pipe for front in self._front]
+            who = f"worker {number + 1} of {len(parts)} ({_listed(self._names, part)})"
+            do = partial(work, self._config, Share(part, router))
+            self._workers.append(self._started(who, do, *pipes[number], rest))
         for _, theirs in pipes:
             theirs.close()
         gc.unfreeze()
@@ -169,26 +167,45 @@ class Workers:
     @property
     def _inside(self) -> str:
         """Endpoint for the processes; the folder is this user's alone."""
-        return f"{LOCAL}{Path(self._folder.name) / 'robots'}"
+        return f"{LOCAL}{self._folder.path / 'robots'}"
 
-    def _open(self) -> None:
-        config, lockstep = self._config, self._config.clock != "realtime"
+    def _open(self) -> _Worker:
+        config, listen, guard = self._config, self._listen, self._guard
         if not config.connect:
-            inside, place = self._inside, config.namespace or ""
-            access = with_robots_behind(
-                self._guard["access_control"], self._names, place, protocol(self._inside)
-            )
-            settings = {**({} if lockstep else REALTIME), **self._guard, "access_control": access}
-            self._session = open_router([*self._listen, inside], [], settings, None)
-        if config.metrics is not None:
-            self.metrics = Metrics(config.metrics)
-            for name in self._names:
-                self.metrics.add(DistantMetrics(self._session, config.namespace or "", name))
+            listen, place = [*listen, self._inside], config.namespace or ""
+            access = with_robots_behind(guard["access_control"], self._names, place, protocol(self._inside))
+            guard = {**guard, "access_control": access}
+        ours, theirs = multiprocessing.Pipe()
+        do = partial(meet_clients, config, self._names, listen, guard)
+        front = self._started("the process that clients connect to", do, ours, theirs, [ours])
+        theirs.close()
+        return front
 
-    def _made(self, worker: _Worker) -> list[tuple[str, dict[InterfaceName, int]]]:
+    def _started(
+        self,
+        who: str,
+        do: Callable[[First], None],
+        ours: Connection,
+        theirs: Connection,
+        rest: Sequence[Connection],
+    ) -> _Worker:
+        process = multiprocessing.get_context("fork").Process(
+            target=_begin, args=(do, theirs, rest, self._folder)
+        )
+        process.start()
+        return _Worker(who, process, ours)
+
+    def _note(self, done: int, total: int) -> None:
+        self._tell_front((done, total))
+
+    def _tell_front(self, word: object) -> None:
+        with contextlib.suppress(OSError):  # it has died, which `run` tells
+            self._front[0].pipe.send(word)
+
+    def _made(self, worker: _Worker) -> Made:
         news = self._news(worker)
         if isinstance(news, Made):
-            return news.ur
+            return news
         if isinstance(news, Refused) and news.misuse:
             raise ConfigError(news.why)
         raise WorkersError(self._why(worker, news))
@@ -219,7 +236,7 @@ class Workers:
             if code and code < 0
             else f"ended with exit code {code}"
         )
-        return f"worker {worker.number} of {self._config.workers} ({worker.names}) {how}"
+        return f"{worker.who} {how}"
 
     def _end(self, worker: _Worker) -> list[str]:
         """Wait for the end of a process that was told to end; return what went wrong."""
@@ -230,22 +247,20 @@ class Workers:
         if worker.process.is_alive():
             worker.process.kill()
             worker.process.join()
-            return [f"worker {worker.number} ({worker.names}) did not end within {END:g} s and was killed"]
+            return [f"{worker.who} did not end within {END:g} s and was killed"]
         failure = None if worker.told is None else worker.told.failure
         return [] if failure is None or already else [failure]
 
 
-def _work(config: ServeConfig, share: Share, first: Connection, others: Sequence[Connection]) -> None:
-    """Begin a process; wait until its network is there."""
+def _begin(
+    do: Callable[[First], None], first: Connection, others: Sequence[Connection], folder: OwnFolder
+) -> None:
+    """Begin a process."""
     for end in others:
         end.close()
     signals = Ending()  # from now on a signal ends only the first process
     signals.close()
-    try:
-        if first.recv():
-            work(config, share, first)
-    except (EOFError, OSError):  # the first process has given up
-        return
+    do(First(first, folder.remove))
 
 
 def _rehearse(setup: Setup) -> None:

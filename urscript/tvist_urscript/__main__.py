@@ -13,8 +13,8 @@ def main(arguments: list[str]) -> int:
         return 2
     path = Path(arguments[0])
     run = dry_run(path.read_text(encoding="utf-8", errors="replace"))
-    for text in run.memory.said:
-        print(text)
+    for text in run.memory.said:  # without a terminal's commands
+        print("".join(c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}" for c in text))
     if run.error is not None:
         print(f"{path}: {run.error}", file=sys.stderr)
         return 1

@@ -1,14 +1,29 @@
 """What the operators compute: numbers, and lists of them as vectors and matrices."""
 
 import math
-from collections.abc import Callable
+import operator
+from collections.abc import Callable, Iterable
+from functools import reduce
+from itertools import repeat
 from typing import Any, TypeAlias
 
 from tvist_urscript.errors import Fault
-from tvist_urscript.values import Array, Pose, Value, kind, number, whole
+from tvist_urscript.values import (
+    HIGHEST,
+    LISTS,
+    LOWEST,
+    NUMBERS,
+    Array,
+    Pose,
+    Value,
+    kind,
+    number,
+    only_numbers,
+    whole,
+)
 
-MOST_PRODUCTS = 4096
-"""Multiplications of one product of matrices: two of 16 by 16."""
+MOST_PRODUCTS = 2744
+"""Multiplications of one product of matrices: two of 14 by 14."""
 
 Number: TypeAlias = int | float
 Work: TypeAlias = Callable[[int], None]
@@ -71,6 +86,8 @@ def _elementwise(of: Callable[[Any, Any], Value], a: Array, b: Array, done: str,
     if len(a.items) != len(b.items):
         raise Fault(f"lists of {len(a.items)} and {len(b.items)} elements cannot be {done}")
     work(len(a.items))
+    if only_numbers(a) and only_numbers(b):
+        return _whole(map(_PLAIN[of], a.items, b.items))
     return Array(
         of(x, y) if type(x) in NUMBERS and type(y) in NUMBERS else _beside(of, x, y, done, work)
         for x, y in zip(a.items, b.items, strict=True)
@@ -145,6 +162,8 @@ def negate(a: Value, work: Work) -> Value:
 
 def _scaled(a: Array, by: Number, of: Callable[[Any, Any], Value], work: Work) -> Array:
     work(len(a.items))
+    if only_numbers(a) and not (of is _quotient and by == 0):
+        return _whole(map(_PLAIN[of], a.items, repeat(by)))
     return Array(
         of(x, by)
         if type(x) in NUMBERS
@@ -168,7 +187,7 @@ def _list_product(a: Array, b: Array, work: Work) -> Value:
         )
     if (products := len(left) * inner * len(right[0])) > MOST_PRODUCTS:
         raise Fault(f"these matrices need {products} multiplications: the limit is {MOST_PRODUCTS}")
-    work(products)
+    work(2 * products // 3)
     result = [[_dot(row, column) for column in zip(*right, strict=True)] for row in left]
     if rows is None:
         return Array(result[0])
@@ -177,11 +196,15 @@ def _list_product(a: Array, b: Array, work: Work) -> Value:
     return Array(Array(row) for row in result)
 
 
+def _whole(values: Iterable[Any]) -> Array:
+    return Array([x if type(x) is float or LOWEST <= x <= HIGHEST else float(x) for x in values])
+
+
 def _dot(a: list[Number], b: tuple[Number, ...]) -> Number:
-    total: Number = 0
-    for x, y in zip(a, b, strict=True):
-        total = _sum(total, _product(x, y))
-    return total
+    total = reduce(
+        operator.add, map(operator.mul, a, b)
+    )  # not sum(), which rounds otherwise in later Pythons
+    return whole(total) if type(total) is int else total
 
 
 def _numbers(a: Array) -> list[Number]:
@@ -196,7 +219,7 @@ def matrix(a: Array) -> list[list[Number]] | None:
     Raises:
         Fault: The rows have unequal lengths, or an element is no number.
     """
-    if not any(isinstance(row, Array) for row in a.items):
+    if LISTS.isdisjoint(map(type, a.items)):
         return None
     rows: list[list[Number]] = []
     for row in a.items:
@@ -206,4 +229,7 @@ def matrix(a: Array) -> list[list[Number]] | None:
     return rows
 
 
-NUMBERS = frozenset((int, float))
+_PLAIN: dict[Any, Callable[[Any, Any], Any]] = {
+    _sum: operator.add, _difference: operator.sub, _product: operator.mul, _quotient: operator.truediv
+}  # fmt: skip
+"""What these do with numbers, but for integers beyond 32 bits."""

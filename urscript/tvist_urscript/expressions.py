@@ -4,12 +4,11 @@ import ast
 from collections.abc import Callable, Sequence
 
 from tvist_urscript import tree
-from tvist_urscript.arithmetic import NUMBERS
 from tvist_urscript.errors import name_not_found
 from tvist_urscript.names import BUILT_IN_ARRAYS, Scope
 from tvist_urscript.pieces import DEPTH, MISSING, Position
 from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
-from tvist_urscript.values import LONGEST, Array, Pose
+from tvist_urscript.values import LONGEST, NUMBERS, Array, Pose
 
 MOST_OPERATIONS = 1000
 """Evaluations of one statement; beyond them nothing could interrupt it in time."""

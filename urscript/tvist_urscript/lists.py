@@ -5,7 +5,18 @@ import math
 from tvist_urscript.arithmetic import MOST_PRODUCTS, matrix
 from tvist_urscript.errors import Fault
 from tvist_urscript.poses import pose_inv
-from tvist_urscript.values import LONGEST, Array, Pose, Value, array, integer, kind, to_bytes, vector
+from tvist_urscript.values import (
+    LONGEST,
+    Array,
+    Pose,
+    Value,
+    array,
+    check_size,
+    integer,
+    kind,
+    to_bytes,
+    vector,
+)
 
 _BITS = 32
 
@@ -67,6 +78,7 @@ def make_list(elements: Value, initial_value: Value) -> Array:
         raise Fault("a list cannot have a negative length")
     if count > LONGEST:
         raise Fault(f"a list of {count} elements is too long: the limit is {LONGEST}")
+    check_size(count * (1 + initial_value.size if isinstance(initial_value, Array) else 1))
     return Array([initial_value] * count)
 
 
@@ -86,18 +98,23 @@ def inv(value: Value) -> Array:
         raise Fault(f"a matrix of {n} by {len(rows[0])} has no inverse")
     if n**3 > MOST_PRODUCTS:
         raise Fault(f"a matrix of {n} by {n} is too large for inv")
-    work = [[*map(float, row), *(float(i == j) for j in range(n))] for i, row in enumerate(rows)]
+    work, swaps = [list(map(float, row)) for row in rows], []
     for column in range(n):
         pivot = max(range(column, n), key=lambda i: abs(work[i][column]))
         if work[pivot][column] == 0:
             raise Fault("a singular matrix has no inverse")
         work[column], work[pivot] = work[pivot], work[column]
-        divisor = work[column][column]
-        work[column] = [x / divisor for x in work[column]]
-        for i in range(n):
-            if i != column and (factor := work[i][column]) != 0:
-                work[i] = [x - factor * y for x, y in zip(work[i], work[column], strict=True)]
-    return Array(Array(row[n:]) for row in work)
+        swaps.append((column, pivot))
+        divisor, work[column][column] = work[column][column], 1.0  # the inverse grows in place of the matrix
+        top = work[column] = [x / divisor for x in work[column]]
+        for i, row in enumerate(work):
+            if i != column and (factor := row[column]) != 0:
+                row[column] = 0.0
+                work[i] = [x - factor * y for x, y in zip(row, top, strict=True)]
+    for column, pivot in reversed(swaps):
+        for row in work:
+            row[column], row[pivot] = row[pivot], row[column]
+    return Array(map(Array, work))
 
 
 def _matrix(value: Value, name: str) -> list[list[int | float]]:

@@ -9,18 +9,17 @@ from tvist_urscript.errors import Fault, ScriptError
 from tvist_urscript.failures import TooDeep, failure, line_of, position_of
 from tvist_urscript.functions import DEEPEST_CALLS
 from tvist_urscript.namespace import Namespace
-from tvist_urscript.pieces import HERE, MISSING, SPENT
+from tvist_urscript.pieces import HERE, MISSING
 from tvist_urscript.threads import MOST_THREADS, Thread
 from tvist_urscript.values import Value
 
 EVALUATIONS = 500
 """Evaluations of all threads in a tick."""
-PATIENCE = 50
+PATIENCE = 250
 """Ticks in which a thread may use up its budget one after the other, before it counts as an endless loop."""
-OVERDRAFT = 5000
+OVERDRAFT = 2000
 """Evaluations by which one statement may exceed the budget."""
 
-_SPENT = object()
 _MISSING = object()
 Steps = Generator[Any, None, Any]
 
@@ -39,6 +38,7 @@ class Machine:
     Attributes:
         left: What is left of the budget of this tick; compiled code takes from it.
         thread: Number of the thread that runs now, or ran last; 0 is the main thread.
+        halted: Whether it has ended by `halt`.
 
     Args:
         script: What it runs.
@@ -60,6 +60,7 @@ class Machine:
         self.script = script
         self.left = 0
         self.thread = 0
+        self.halted = False
         self._finish = finish or _nothing
         self._started = 0
         self._holder: Thread | None = None
@@ -96,7 +97,7 @@ class Machine:
             budget: Evaluations that they may use together.
 
         Returns:
-            What is left of the budget; at least 0.
+            What is left of the budget; below 0 if a statement took more, for the next ticks to pay.
 
         Raises:
             ScriptError: A thread has failed, in the script or in a built-in function. All threads have ended.
@@ -107,11 +108,12 @@ class Machine:
         for thread in self._turns:  # it grows where a thread starts another
             if thread.ended:
                 continue
-            if self.left <= 0 or not self._may_enter(thread):
+            short = self.left <= 0 or self.left < min(thread.owes, budget)
+            if short or not self._may_enter(thread):
                 self._missed.append(thread)
             else:
                 self._turn(thread)
-        return max(self.left, 0)
+        return self.left
 
     def end(self) -> None:
         """End all threads: GeneratorExit reaches the blocking functions in which they wait.
@@ -134,14 +136,14 @@ class Machine:
         self._running.spent = 0
 
     def charge(self, work: int) -> None:
-        """Take the elements of a list from the budget.
+        """Take what depends on the values from the budget, such as the elements of a list.
 
         Raises:
-            Fault: One statement works on too many.
+            Fault: One statement does too much.
         """
         self.left -= work
         if self.left < -OVERDRAFT:
-            raise Fault("a statement works on too many list elements at once")
+            raise Fault("a statement works on too many list elements, or searches too many poses, at once")
 
     def _turn(self, thread: Thread) -> None:
         try:
@@ -160,21 +162,27 @@ class Machine:
         assert thread.steps is not None
         self._running = thread
         self.thread = thread.number
+        self.left -= thread.owes
+        thread.owes = 0
         try:
             why = next(thread.steps)
         except (StopIteration, Killed):
             self._ended(thread)
         except Halted:
+            self.halted = True
             self.end()
         else:
-            self._waits(thread, spent=why is _SPENT)
+            self._waits(thread, why)
 
-    def _waits(self, thread: Thread, *, spent: bool) -> None:
-        if not spent:
+    def _waits(self, thread: Thread, cost: int | None) -> None:
+        """Note that a thread waits: for time, or for a budget that can bear the cost of its next statements."""
+        if cost is None:
             thread.spent = 0
             if self._holder is thread:
                 self._holder = None
             return
+        thread.owes = cost
+        self.left = min(self.left + cost, 0)  # it has not been carried out
         thread.spent += 1
         if thread.spent >= PATIENCE:
             line, column = position_of(thread.steps) or (1, 1)
@@ -306,7 +314,6 @@ class Machine:
     def _called(self) -> dict[str, Any]:
         return {
             HERE: self,
-            SPENT: _SPENT,
             MISSING: _MISSING,
             "run": self._run,
             "kill": self._kill,

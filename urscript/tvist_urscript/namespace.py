@@ -6,7 +6,7 @@ from types import FunctionType
 from typing import Any
 
 from tvist_urscript.compiler import Script
-from tvist_urscript.library import PURE
+from tvist_urscript.library import PURE, WEIGHTS
 from tvist_urscript.operators import operators
 from tvist_urscript.values import Array
 
@@ -77,11 +77,13 @@ class Namespace:
         if not signature.linear:
             return function
 
+        weight = WEIGHTS[name]
+
         def charged(*arguments: Any) -> Any:
-            self._charge(sum(argument.size for argument in arguments if isinstance(argument, Array)))
+            self._charge(weight * sum(argument.size for argument in arguments if isinstance(argument, Array)))
             result = function(*arguments)
             if isinstance(result, Array):
-                self._charge(result.size)
+                self._charge(result.size // 3)  # made at once, not one by one
             return result
 
         return charged

@@ -31,7 +31,7 @@ def operators(work: Work) -> Mapping[str, Callable[..., Any]]:
 
     def is_equal(a: Any, b: Any) -> bool:
         if isinstance(a, Array):
-            work(a.size)
+            work(a.size // 3)
         return bool(a == b)
 
     return {

@@ -6,8 +6,8 @@ from typing import Any
 from tvist_urscript.tree import Node
 
 LOAD, STORE = ast.Load(), ast.Store()
-HERE, SPENT, MISSING, DEPTH = "machine", "SPENT", "MISSING", "depth"
-"""Names that compiled functions use: the machine, what a thread without budget yields, a missing argument, depth."""
+HERE, MISSING, DEPTH = "machine", "MISSING", "depth"
+"""Names that compiled functions use: the machine, a missing argument, depth."""
 
 
 class Position:
@@ -73,14 +73,14 @@ class Position:
         return ast.Compare(left, [operator], [right], **self.given)
 
     def charge(self, cost: int, *, check: bool) -> list[ast.stmt]:
-        """Take a cost from the budget, and wait for more where it is spent."""
+        """Take a cost from the budget; where that is spent, yield the cost, to be paid in the tick that bears it."""
         if cost == 0 and not check:
             return []
         left = ast.Attribute(self.name(HERE), "left", STORE, **self.given)
         statements: list[ast.stmt] = [ast.AugAssign(left, ast.Sub(), self.constant(cost), **self.given)]
         if check:
             present = ast.Attribute(self.name(HERE), "left", LOAD, **self.given)
-            spent = ast.Yield(self.name(SPENT), **self.given)
+            spent = ast.Yield(self.constant(cost), **self.given)
             statements.append(
                 self.branch(self.compare(present, ast.Lt(), self.constant(0)), [self.statement(spent)])
             )

@@ -5,7 +5,7 @@ from itertools import count
 
 from tvist_urscript import tree
 from tvist_urscript.errors import syntax_error
-from tvist_urscript.expressions import MOST_OPERATIONS, Expressions, Report, first
+from tvist_urscript.expressions import MOST_OPERATIONS, START, Expressions, Report, first
 from tvist_urscript.names import BUILT_IN_ARRAYS
 from tvist_urscript.pieces import Position
 from tvist_urscript.signatures import Signatures
@@ -184,6 +184,7 @@ class Statements(Expressions):
                     ast.Return(at.constant(True) if self.is_part else value, **at.given),
                 ]
             case tree.Handle(word="kill"):
+                self.cost += START
                 return [at.statement(at.call("kill", self.value(statement.value)))]
             case tree.Handle():
                 return [at.statement(at.waiting(at.call("join", self.value(statement.value))))]

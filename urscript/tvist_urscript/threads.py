@@ -19,6 +19,7 @@ class Thread:
             thread.
         critical: How many critical sections it is in.
         spent: Ticks one after the other in which it used up its budget.
+        owes: Evaluations of what it does first in its next turn, which that tick has to bear.
         added: Whether it was started by statements that were added to the program, or is the main thread and runs such
             statements now.
     """
@@ -28,6 +29,7 @@ class Thread:
     parent: "Thread | None"
     critical: int = 0
     spent: int = 0
+    owes: int = 0
     added: bool = False
 
     @property

@@ -44,14 +44,12 @@ class Array:
         depth = 0
         if size > LONGEST:
             raise Fault(f"a list of {size} elements is too long: the limit is {LONGEST}")
-        for item in self.items:
-            if isinstance(item, Array):
-                size += item.size
-                depth = max(depth, item.depth)
-        if size > LARGEST:
-            raise Fault(
-                f"a list with {size} elements, those of its lists included, is too large: the limit is {LARGEST}"
-            )
+        if not LISTS.isdisjoint(map(type, self.items)):
+            for item in self.items:
+                if isinstance(item, Array):
+                    size += item.size
+                    depth = max(depth, item.depth)
+        check_size(size)
         if depth >= DEEPEST:
             raise Fault(f"lists are nested too deep: the limit is {DEEPEST}")
         self.size = size
@@ -100,6 +98,8 @@ class Pose(Array):
         return self.items  # type: ignore[return-value]
 
 
+LISTS = frozenset((Array, Pose))
+NUMBERS = frozenset((int, float))
 T = TypeVar("T")
 Value: TypeAlias = int | float | bool | str | Array | None
 
@@ -187,7 +187,22 @@ def vector(value: Any, what: str) -> tuple[float, ...]:
     """
     if not isinstance(value, Array):
         raise Fault(f"{what} has to be a list of numbers, not {kind(value)}")
+    if only_numbers(value):
+        return tuple(map(float, value.items))  # type: ignore[arg-type]
     return tuple(float(number(item, f"an element of {what}")) for item in value.items)
+
+
+def check_size(size: int) -> None:
+    """Refuse a list with too many elements, those of its lists included."""
+    if size > LARGEST:
+        raise Fault(
+            f"a list with {size} elements, those of its lists included, is too large: the limit is {LARGEST}"
+        )
+
+
+def only_numbers(value: Array) -> bool:
+    """Return whether a list has numbers alone, which need no checks one by one."""
+    return NUMBERS.issuperset(map(type, value.items))
 
 
 def whole(value: int) -> int | float:

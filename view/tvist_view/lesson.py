@@ -2,10 +2,11 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from viser import GuiApi, GuiUplotHandle, ViserServer, uplot
+from viser import ClientHandle, GuiApi, GuiUplotHandle, ViserServer, uplot
 
 from tvist_protocol.geometry import Geometry
 from tvist_protocol.values import Payload
@@ -72,24 +73,56 @@ Run = Callable[[float, float], Awaitable[Compared]]
 """Makes the motion of the UR5e for an error of the frequency [-] and a damping ratio [-]."""
 
 
-class LessonPage:
-    """The page of the lesson.
+async def show_lesson(server: ViserServer, one_mass: OneMass, run: Run) -> None:
+    """Give every browser a lesson of its own until cancelled, so that a class can share one page.
 
     Args:
         server: Server of the page.
         one_mass: The arm with one flexible joint.
         run: Makes the UR5e's motion.
     """
+    loop = asyncio.get_running_loop()
+    lessons: dict[int, asyncio.Task[None]] = {}
 
-    def __init__(self, server: ViserServer, one_mass: OneMass, run: Run) -> None:
-        self._server, self._one, self._run = server, one_mass, run
+    def begin(browser: ClientHandle) -> None:
+        lessons[browser.client_id] = loop.create_task(LessonPage(browser, one_mass, run).run())
+
+    def end(browser: ClientHandle) -> None:
+        lesson = lessons.pop(browser.client_id, None)
+        if lesson is not None:
+            lesson.cancel()
+
+    look_at(server, (0.2, 0.0, 0.1), 1.3)
+    # viser calls these from threads of its own.
+    server.on_client_connect(lambda browser: _later(loop, begin, browser))
+    server.on_client_disconnect(lambda browser: _later(loop, end, browser))
+    await asyncio.Event().wait()
+
+
+def _later(
+    loop: asyncio.AbstractEventLoop, what: Callable[[ClientHandle], None], browser: ClientHandle
+) -> None:
+    with suppress(RuntimeError):  # the page has ended
+        loop.call_soon_threadsafe(what, browser)
+
+
+class LessonPage:
+    """The page of the lesson in one browser.
+
+    Args:
+        browser: The browser.
+        one_mass: The arm with one flexible joint.
+        run: Makes the UR5e's motion.
+    """
+
+    def __init__(self, browser: ClientHandle, one_mass: OneMass, run: Run) -> None:
+        self._browser, self._one, self._run = browser, one_mass, run
         self._loop = asyncio.get_running_loop()
         self._chain = Chain(one_mass.geometry)
         self._arms = [self._arm(name, side) for name, side in (("unshaped", 1.0), ("shaped", -1.0))]
         self._compared: Compared | None = None
         self._ur5es: list[DrawnArm] = []
-        look_at(server, (0.2, 0.0, 0.1), 1.3)
-        gui = server.gui
+        gui = browser.gui
         low, high = one_mass.f_d_range
         tabs = gui.add_tab_group()
         with tabs.add_tab("One mass"):
@@ -142,7 +175,7 @@ class LessonPage:
 
     def show(self, time: float) -> None:
         """Draw a time since the beginning of the motion [s]."""
-        with self._server.atomic():
+        with self._browser.atomic():
             if self._compared is None:
                 elbow, place = (
                     self._one.elbow(float(self._f_d.value)),
@@ -165,7 +198,7 @@ class LessonPage:
 
     def _arm(self, name: str, side: float) -> DrawnArm:
         return DrawnArm(
-            self._server.scene,
+            self._browser.scene,
             f"/{name}",
             self._chain,
             payload=self._one.payload,
@@ -223,7 +256,7 @@ class LessonPage:
                 shown = done.unshaped.shown
                 self._ur5es.append(
                     DrawnArm(
-                        self._server.scene,
+                        self._browser.scene,
                         f"/ur5e_{name}",
                         Chain(shown.geometry),
                         payload=shown.payload,

@@ -23,6 +23,7 @@ def analyze(
     *,
     figures: Path | None = None,
     look: FigureOptions = AS_USUAL,
+    columns: str | None = None,
     json: bool = False,
 ) -> None:
     """Measure each motion of a recording or a robot's log, and print the columns of the paper's Table 2.
@@ -34,6 +35,8 @@ def analyze(
             with RTDE's names, a dump of UR's port 30003, a rosbag2 in MCAP.
         figures: Folder for the figures of each motion: what was recorded, and the ring-down after it.
         look: How to write the figures.
+        columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
+            after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
         json: Print one JSON object.
     """
     look.check(figures)
@@ -41,7 +44,7 @@ def analyze(
     from tvist_lab.recordings import RecordingError, read
 
     with told(RecordingError):
-        recording = read(file)
+        recording = read(file, columns)
         found = motions(recording)
     results = []
     with progress(len(found), "motions") as bar:
@@ -64,7 +67,10 @@ def analyze(
     if not results:
         out.print(f"{file} contains no motion.", markup=False)
         return
-    table(f"{file}: {len(results)} motions", COLUMNS, [_row(index, r) for index, r in enumerate(results, 1)])
+    origin = recording.origin
+    since = f", times from {origin:.3f} s on" if origin else ""
+    rows = [_row(index, r, origin) for index, r in enumerate(results, 1)]
+    table(f"{file}: {len(results)} motions{since}", COLUMNS, rows)
     for note in grouped_notes(results):
         out.print(note, markup=False)
 
@@ -85,12 +91,12 @@ def _draw(recording: "Recording", found: "list[MotionRows]", files: "FigureFiles
                 say(f"motion {index}: no figure {kind}: {error}")
 
 
-def _row(index: int, result: "MotionResult") -> tuple[str, ...]:
+def _row(index: int, result: "MotionResult", origin: float) -> tuple[str, ...]:
     overshoot = result.overshoot_m
     return (
         str(index),
-        number(result.start_s),
-        number(result.stop_s),
+        number(result.start_s - origin),
+        number(result.stop_s - origin),
         number(result.delay_ms, 1),
         number(result.stabilisation_ms, 1),
         number(result.cycle_ms, 1),

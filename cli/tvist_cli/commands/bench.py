@@ -7,12 +7,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, interrupted, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import err, print_json
 from tvist_lab.benchmark.names import PartName
 
-MOST = 2000
-"""Largest number of simulated publishers of a fleet."""
 Study = Callable[[], None]
 
 
@@ -22,17 +19,8 @@ def bench(
     only: Annotated[list[PartName] | None, Parameter(consume_multiple=True)] = None,
     shapers: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     against: Path | None = None,
-    boxes: bool = False,
-    markdown: Path | None = None,
-    figures: Path | None = None,
-    look: FigureOptions = AS_USUAL,
     soak: float | None = None,
     hostile: int | None = None,
-    viewed: int | None = None,
-    reverse: float | None = None,
-    reading: float | None = None,
-    fleet: int | None = None,
-    fixture: int | None = None,
     lateness: float | None = None,
     json: bool = False,
 ) -> None:
@@ -47,24 +35,9 @@ def bench(
         shapers: Further shapers with which the line is measured, besides zv and auto.
         against: File with what tvist bench --json printed before, to compare with: prints for each figure the change of
             its ratio to its reference, and whether it is beyond chance.
-        boxes: Instead, print where a tick's time goes: in each box of the paper's Figure 6, and in what is around them.
-        markdown: With --boxes, file to write a page with the tables to.
-        figures: With --boxes, folder to write a figure of the tables to.
-        look: How to write the figure.
         soak: Serve a robot under load for this many minutes instead, and report whether memory and timing stay stable.
         hostile: Instead, compare how late a served robot's ticks are with and without 100 messages a second of every
             type and size, valid and invalid, in this many pairs of runs of --seconds each.
-        viewed: Instead, compare how late a served robot's ticks are with and without a page of tvist view, in this
-            many pairs of runs of --seconds each, and report the page's pictures per second and its memory.
-        reverse: Instead, for this many seconds, let a client steer the program of a served robot over a socket at
-            500 Hz, as a driver does, and count the program's time-outs; two bare processes do the same meanwhile.
-        reading: Instead, record a moving robot for this many minutes of simulation, and compare how long this recording
-            takes to read with how long the bare MCAP reader takes; also export it to every format.
-        fleet: Instead, connect this many simulated publishers to two routers, let a client see all their states at
-            several rates for --seconds each, and report what the routers need, how late states are, and how long the
-            fleet needs to be found and to come back after a router was killed.
-        fixture: Instead, compare how long the pytest fixture tvist_robot takes, in sessions of this many tests, with
-            how long tvist serve takes to start.
         lateness: Instead, compare the ticks that a served robot misses with those that a bare thread misses which
             sleeps to the same deadlines, in turn: for this many minutes alone, as many with ten clients, and as many
             with ten clients, real-time priority and locked memory.
@@ -74,30 +47,16 @@ def bench(
 
     _check(
         seconds,
-        {"soak": soak, "reverse": reverse, "reading": reading, "lateness": lateness},
-        {"hostile": hostile, "viewed": viewed},
+        {"soak": soak, "lateness": lateness},
+        {"hostile": hostile},
     )
-    if fixture is not None and fixture < 2:
-        raise Failure(f"fixture is {fixture}: must be at least 2 tests", code=2)
-    if fleet is not None and not (2 <= fleet <= MOST and seconds > 0.0):
-        raise Failure(f"fleet is {fleet}: must be 2 to {MOST} publishers, and seconds more than 0", code=2)
     studies: dict[str, tuple[float | None, Study]] = {
-        "boxes": (boxes or None, lambda: run.boxes(shapers or (), markdown, figures, look, json)),
-        "fleet": (fleet, lambda: run.fleet(fleet or 0, seconds, json)),
         "hostile": (hostile, lambda: run.hostile(hostile or 0, seconds, json)),
-        "viewed": (viewed, lambda: run.viewed(viewed or 0, seconds, json)),
-        "reverse": (reverse, lambda: run.reverse(reverse or 0.0, json)),
-        "reading": (reading, lambda: run.reading(reading or 0.0, json)),
-        "fixture": (fixture, lambda: run.fixture(fixture or 0, json)),
         "lateness": (lateness, lambda: run.lateness(lateness or 0.0, json)),
         "soak": (soak, lambda: run.soak(soak or 0.0, json)),
     }
     asked = [name for name, (value, _) in studies.items() if value is not None]
-    _check_together(
-        asked,
-        {"only": only, "shapers": shapers, "against": against, "markdown": markdown, "figures": figures},
-    )
-    look.check(figures)
+    _check_together(asked, {"only": only, "shapers": shapers, "against": against})
     try:
         if asked:
             studies[asked[0]][1]()
@@ -126,13 +85,9 @@ def _check_together(asked: Sequence[str], given: dict[str, object]) -> None:
         raise Failure(
             f"--{asked[0]} and --{asked[1]} each run instead of the other: give one of them", code=2
         )
-    study = asked[0] if asked else None
-    about = {"markdown": ("boxes",), "figures": ("boxes",), "shapers": ("boxes", None)}
     for name, value in given.items():
-        if value is not None and study not in about.get(name, (None,)):
-            if study is None:
-                raise Failure(f"--{name} is about --boxes: give that too, or leave --{name} out", code=2)
-            raise Failure(f"--{name} does nothing with --{study}: leave it out", code=2)
+        if asked and value is not None:
+            raise Failure(f"--{name} does nothing with --{asked[0]}: leave it out", code=2)
 
 
 def _all(

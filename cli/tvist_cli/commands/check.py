@@ -1,9 +1,13 @@
 """`tvist check`: check that a robot answers and is ready to be moved."""
 
+import math
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from tvist_cli.failure import Failure
-from tvist_cli.output import out, print_json
+from tvist_cli.output import err, out, print_json
 
 
 def check(
@@ -13,11 +17,13 @@ def check(
     alive: bool = False,
     security: Path | None = None,
     namespace: str = "",
+    wait: Annotated[list[float] | None, Parameter(consume_multiple=(0, 1), allow_repeating=False)] = None,
     json: bool = False,
 ) -> None:
     """Check that a served robot answers and is ready to be moved, without changing anything.
 
-    Exit code 0: it answers, ticks, refuses commands without control, has power, and its safety system allows motion.
+    Exit code 0: it answers, ticks on time, refuses commands without control, has power, and its safety system allows
+    motion.
     Exit code 1: one of these does not hold; the message says why and what to do next.
 
     Args:
@@ -26,12 +32,26 @@ def check(
         alive: Check only that the server answers and, in real time, ticks. A robot that has stopped passes, too, so
             that an orchestrator does not kill one that somebody is about to unlock.
         namespace: Namespace of the robot, if it is served in one.
+        wait: Try again for this many seconds while no robot answers or it is starting; without a number, until it is
+            ready.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         json: Print one JSON object.
     """
     from tvist_client.check import check as run
 
-    report = run(endpoint, name, alive=alive, security=security, namespace=namespace)
+    seconds = 0.0 if wait is None else wait[0] if wait else math.inf
+    with err.status("") as status:
+        if not err.is_terminal:
+            status.stop()
+        report = run(
+            endpoint,
+            name,
+            alive=alive,
+            security=security,
+            namespace=namespace,
+            wait=seconds,
+            tell=status.update,
+        )
     if json:
         print_json(report)
     else:
@@ -40,5 +60,5 @@ def check(
                 out.print(f"ok  {finding.what:<8} {finding.said}", soft_wrap=True, markup=False)
     for finding in report.findings:
         if not finding.ok:
-            what = "the robot is not ready" if finding.what == "ready" else f"{finding.what} failed"
-            raise Failure(f"{what}: {finding.said}")
+            what = "the robot is not ready" if finding.what in {"ready", "load"} else f"{finding.what} failed"
+            raise Failure(finding.said if report.starting else f"{what}: {finding.said}")

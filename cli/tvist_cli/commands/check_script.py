@@ -8,6 +8,7 @@ from cyclopts import Parameter
 from tvist_cli.failure import Failure
 from tvist_cli.output import print_json
 from tvist_cli.scripts import named, placed, read_script
+from tvist_protocol.errors import harmless
 
 
 def check_script(*file: Annotated[Path, Parameter(required=True)], json: bool = False) -> None:
@@ -36,7 +37,7 @@ def check_script(*file: Annotated[Path, Parameter(required=True)], json: bool = 
         print_json({"ok": errors == 0, "files": len(file), "errors": errors, "findings": findings})
     else:
         for one, finding in found:
-            print(placed(one, finding))
+            print(harmless(placed(one, finding)))
     if errors:
         files = "1 program" if len(file) == 1 else f"{len(file)} programs"
         raise Failure(f"{errors} {'error' if errors == 1 else 'errors'} in {files}")

@@ -15,7 +15,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def compare(a: Path, b: Path, *, json: bool = False) -> None:
+def compare(a: Path, b: Path, *, columns: str | None = None, json: bool = False) -> None:
     """Compare two recordings or logs of the same motions, as without and with shaping.
 
     Motions correspond if they start and end at the same joint angles within 0.02 rad. Those that only one file
@@ -24,6 +24,8 @@ def compare(a: Path, b: Path, *, json: bool = False) -> None:
     Args:
         a: First file, in any format that `tvist analyze` reads.
         b: Second file; its format may be another one.
+        columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
+            after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
         json: Print one JSON object with all figures of each motion.
     """
     from tvist_lab.metrics import Measured
@@ -31,7 +33,7 @@ def compare(a: Path, b: Path, *, json: bool = False) -> None:
     from tvist_lab.recordings import RecordingError, read
 
     with told(RecordingError):
-        first, second = read(a), read(b)
+        first, second = read(a, columns), read(b, columns)
         result = compared(Measured.of(first), Measured.of(second))
     for file, recording in ((a, first), (b, second)):
         for note in recording.notes:

@@ -5,6 +5,7 @@ from pathlib import Path
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import out, print_json, program, progress, words
+from tvist_cli.serving import compile_if_new
 from tvist_cli.tables import print_paper
 from tvist_cli.tracks import recorded, show_tracks
 
@@ -36,6 +37,7 @@ def demo(
     from tvist_lab.paper.answer import answer, checks, terms
     from tvist_lab.paper.experiment import count
 
+    compile_if_new()
     with (
         progress(count(1, baselines=False), "motions", f"the recording so far is in {output}") as bar,
         told(DemoError, OSError),

@@ -119,7 +119,7 @@ def _table(robots: "list[FleetRobot]") -> Table:
     for column in ("namespace", "robot", "model", "robot mode", "safety mode", "control"):
         drawn.add_column(column, no_wrap=column == "robot")
     for column in ("ticks/s", "silent s", "missed", "late p99 µs", "load %"):
-        drawn.add_column(column, justify="right")
+        drawn.add_column(column, justify="right", no_wrap=column == "missed")
     for robot in robots:
         drawn.add_row(
             robot.namespace or "–",
@@ -130,9 +130,9 @@ def _table(robots: "list[FleetRobot]") -> Table:
             robot.control or "–",
             number(robot.ticks_per_second, 1),
             number(robot.silent_s, 1),
-            "–" if robot.missed_ticks is None else str(robot.missed_ticks),
+            "–" if robot.due_ticks is None else f"{robot.missed_ticks} of {robot.due_ticks}",
             number(robot.late_p99_us, 0),
             number(None if robot.load is None else 100.0 * robot.load, 1),
-            style="" if robot.ready else "bold red",
+            style="bold red" if robot.overloaded or not robot.ready else "",
         )
     return drawn

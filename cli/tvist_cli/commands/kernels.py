@@ -4,6 +4,7 @@ import time
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import say
+from tvist_cli.serving import compile_shown
 
 
 def kernels(*, processes: int | None = None) -> None:
@@ -17,9 +18,9 @@ def kernels(*, processes: int | None = None) -> None:
     """
     if processes is not None and processes < 1:
         raise Failure(f"processes is {processes}: must be at least 1", code=2)
-    from tvist_server.kernels import KernelsError, compile_ahead
+    from tvist_server.kernels import KernelsError
 
     began = time.monotonic()
     with told(KernelsError):
-        compile_ahead(processes)
+        compile_shown(processes)
     say(f"everything is compiled, after {time.monotonic() - began:.0f} s")

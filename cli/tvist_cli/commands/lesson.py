@@ -8,6 +8,7 @@ from tvist_cli.failure import told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import out, print_json, progress, table, typed
 from tvist_cli.pages import serve_page
+from tvist_cli.serving import compile_if_new
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -52,6 +53,7 @@ def lesson(
     from tvist_lab.one_joint import lesson as run
     from tvist_lab.one_joint.markdown import MODES, delays, left, modes, page
 
+    compile_if_new()
     with progress(run.COUNT, "plucks and motions") as bar:
         done = run.lesson(lambda: bar(1, None))
     with told(OSError):
@@ -79,9 +81,9 @@ def lesson(
 
 
 async def _show(server: "ViserServer") -> None:
-    from tvist_view.lesson import LessonPage
+    from tvist_view.lesson import show_lesson
 
-    await LessonPage(server, _one_mass(), _moved).run()
+    await show_lesson(server, _one_mass(), _moved)
 
 
 def _one_mass() -> "OneMass":

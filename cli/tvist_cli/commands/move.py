@@ -64,7 +64,7 @@ def move(
     numbers = _numbers(target, line=line, by=by, degrees=degrees)
     held = False
 
-    async def run() -> tuple[int, int]:
+    async def run() -> tuple[int, int, str | None]:
         nonlocal held
         found = name if name is not None else await only_robot(endpoint, NAME, security, namespace)
         async with await Robot.connect(endpoint, found, security=security, namespace=namespace) as robot:
@@ -85,19 +85,28 @@ def move(
                 except asyncio.CancelledError:
                     await _stop(arm)
                     raise
-                return motion.started or 0, motion.done or 0
+                return motion.started or 0, motion.done or 0, motion.limited
 
     with told():
         try:
-            started, done = asyncio.run(run())
+            started, done, limited = asyncio.run(run())
         except KeyboardInterrupt:
             ended = "the motion was stopped; the robot is at rest" if held else "nothing was moved"
             raise interrupted(ended) from None
     if json:
-        print_json({"started_tick": started, "done_tick": done, "seconds": (done - started) * 0.002})
+        print_json(
+            {
+                "started_tick": started,
+                "done_tick": done,
+                "seconds": (done - started) * 0.002,
+                "limited": limited,
+            }
+        )
     else:
         moved = f"moved the tool {'by' if by else 'to'}" if line else "moved to"
         out.print(f"{moved} {target.strip()} in {(done - started) * 0.002:.3f} s", markup=False)
+        if limited is not None:
+            out.print(limited, markup=False)
 
 
 class _Limits(TypedDict, total=False):

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import print_json, progress, typed
+from tvist_cli.serving import compile_if_new
 from tvist_cli.tables import print_paper
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def paper(
 
     with told(ConfigError, code=2):
         setup = free_setup(calibration=calibration, seed=seed)
+    compile_if_new()
 
     async def run() -> "Experiment":
         async with robot_in_process(setup) as robot, robot.control("paper") as arm:

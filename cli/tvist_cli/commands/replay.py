@@ -5,6 +5,7 @@ from pathlib import Path
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import out, print_json, say
 from tvist_cli.playing_back import publish_recording
+from tvist_cli.serving import compile_if_new
 from tvist_cli.shapers_of import load_given
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -72,6 +73,7 @@ def _run_again(file: Path, output: Path | None, shaper: list[str], *, json: bool
     own = [load_given(place) for place in shaper]
     with told(RecordingError, ReplayError, RecorderError, ValueError):
         content = read(file)
+        compile_if_new()
         again = replay_file(content, output, own)
     for note in again.notes:
         say(note)

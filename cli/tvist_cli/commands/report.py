@@ -7,7 +7,13 @@ from tvist_cli.output import out, print_json, typed
 from tvist_cli.report_file import write_report
 
 
-def report(*files: Path, output: Path = Path("report.html"), force: bool = False, json: bool = False) -> None:
+def report(
+    *files: Path,
+    output: Path = Path("report.html"),
+    force: bool = False,
+    columns: str | None = None,
+    json: bool = False,
+) -> None:
     """Write a report of recordings or logs as one web page that needs no network.
 
     It says in a sentence how much the tool vibrates; of several files, whether the others vibrate less than the first.
@@ -17,6 +23,8 @@ def report(*files: Path, output: Path = Path("report.html"), force: bool = False
             with.
         output: File to write.
         force: Replace an existing file.
+        columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
+            after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
         json: Print the verdict as one JSON object.
     """
     if not files:
@@ -27,7 +35,7 @@ def report(*files: Path, output: Path = Path("report.html"), force: bool = False
     from tvist_lab.report import recordings_page
 
     with told(RecordingError):
-        page = recordings_page(files, typed())
+        page = recordings_page(files, typed(), columns)
     write_report(output, page)
     if json:
         print_json(

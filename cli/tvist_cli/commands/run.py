@@ -90,7 +90,6 @@ def run(
         "ur": ur or None, "ur_allow": ur_allow,
     }  # fmt: skip
     checked = _configuration(given, config, lockstep=lockstep)
-    compile_if_new()
     job = _Job(file, text, inputs or (), timeout, Tell(quiet=json))
     watch, errors, server = job.in_lockstep(checked) if lockstep else job.in_real_time(checked)
     job.tell(watch)
@@ -173,6 +172,7 @@ class _Job:
         errors: list[str] = []
         with told(ConfigError, InputError, code=2):
             setup = config.setup()
+            compile_if_new()
             with told(RecorderError):
                 watch = run_in_lockstep(
                     setup,
@@ -198,7 +198,7 @@ class _Job:
 
         ending = Ending()
         with told(ConfigError, InputError, code=2), told(GatewayError, RecorderError), ending.at_once():
-            served = ProgramServer(config, self.text, self.inputs, ending, self.timeout)
+            served = ProgramServer(config, self.text, self.inputs, ending, self.timeout, compile_if_new)
         server = served.server
 
         def ready() -> None:

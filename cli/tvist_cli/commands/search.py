@@ -1,7 +1,9 @@
 """`tvist search`: search for cases in which a robot breaks its promises."""
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import number, out, print_json, progress, say, table, typed
@@ -14,7 +16,7 @@ def search(
     changes: int = 50,
     sequences: int = 50,
     seed: int = 0,
-    robot: str = "ur5e",
+    robot: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     flexible: bool = False,
     markdown: Path | None = None,
     json: bool = False,
@@ -22,8 +24,10 @@ def search(
     """Try random stops, streams, changes during motion and sequences of commands, and check the robot's promises.
 
     A stop stays on the path of the motion, never gets ahead of it, comes to rest no later and keeps the torque limits;
-    the reference stays clear of the floor and of the arm itself; every motion ends exactly once; and the robot can
-    always be brought back to motion. Each violation is printed with its case number, and the exit code is then 1.
+    the reference stays clear of the floor and of the arm itself, and no joint exceeds its velocity or acceleration, at
+    limits up to the arm's own and with every shaper; limits above these are refused; every motion ends exactly once;
+    and the robot can always be brought back to motion. Each violation is printed with its case number, and the exit
+    code is then 1.
 
     Args:
         stops: Number of stops to try, of every kind, at random moments of accepted moves.
@@ -31,7 +35,8 @@ def search(
         changes: Number of changes of payload, shaper, estimator and speed during a motion.
         sequences: Number of sequences of 40 random commands; every third one has programs among them.
         seed: Seed of the cases; another seed tries other cases.
-        robot: Name of a robot that comes with the package, or path of a robot file.
+        robot: Robots to try, which take turns: names of robots that come with the package, or paths of robot files or
+            URDFs [ur5e]. A robot without a calibration in the package gets one made of its file's springs and drives.
         flexible: Simulate the flexible arm in stops and streams, too, and report how far it overshoots the reference.
         markdown: File to write a page with the figures to.
         json: Print one JSON object.
@@ -55,11 +60,12 @@ def search(
         raise Failure(
             "there is nothing to search: give one of --stops --streams --changes --sequences", code=2
         )
+    robots = robot or ["ur5e"]
     with told(DescriptionError, code=2):
-        if load(robot).joints != 6:
-            raise Failure(f"robot {robot} does not have six joints: the search needs six", code=2)
+        for one in robots:
+            load(one)
     with progress(counts.all, "cases") as advance:
-        result = run(counts, seed, robot=robot, flexible=flexible, progress=lambda what: advance(1, what))
+        result = run(counts, seed, robots=robots, flexible=flexible, progress=lambda what: advance(1, what))
     found = broken(result)
     if markdown is not None:
         from tvist_lab.safety.markdown import page
@@ -78,7 +84,16 @@ def search(
 
 def _print(result: dict[str, Any]) -> None:
     searched = {name: part for name, part in result.items() if isinstance(part, dict)}
-    columns = ("search", "cases", "broken", "refused or stopped", "below clearance [mm]", "flexible arm [mm]")
+    columns = (
+        "search",
+        "cases",
+        "broken",
+        "refused or stopped",
+        "of velocity",
+        "of acceleration",
+        "below clearance [mm]",
+        "flexible arm [mm]",
+    )
     rows = []
     for name, part in searched.items():
         ended = part.get("refused", part.get("stopped_by_the_robot"))
@@ -89,12 +104,14 @@ def _print(result: dict[str, Any]) -> None:
                 str(part["count"]),
                 str(len(part["broken"])),
                 number(ended, 0),
+                number(part.get("worst_velocity_share"), 3),
+                number(part.get("worst_acceleration_share"), 3),
                 number(None if near is None else 1e3 * near, 2),
                 number(None if deep is None else 1e3 * deep, 2),
             )
         )
     table("what was searched", columns, rows)
-    if "stops" in result:
+    if "kinds" in result.get("stops", {}):
         kinds = result["stops"]["kinds"]
         table(
             "stops",

@@ -107,9 +107,11 @@ def serve(
             commas [Q1].
         state: TOML or JSON file with the state to start in: any of q, payload (the carried one), mode, shaper, seed.
         seed: Seed of sensor noise and gear errors [0]. With several robots, the second uses seed + 1, and so on.
-        record: MCAP file to record into. With several robots, each records into a file of its own, FILE-NAME.mcap.
+        record: MCAP file to record into. It must not exist, unless --keep is given. With several robots, each records
+            into a file of its own, FILE-NAME.mcap.
         keep: Let the recording keep the last 90s, 10min or 2h, and at most twice as much, and forget what was before
-            [it keeps all].
+            [it keeps all]. At a start, what an earlier run has left in FILE.mcap becomes FILE.earlier-1.mcap,
+            FILE.earlier-2.mcap and so on; the five latest stay.
         dump: Folder to save the last second before a failure of the simulated arm to [the system's temporary folder].
         truth: Publish what a real robot cannot measure, such as the arm's deflection, on tvist/NAME/truth and in the
             recording.
@@ -144,7 +146,6 @@ def serve(
         "ur_ports": ur_ports(ur_port), "ur_allow": ur_allow,
     }  # fmt: skip
     began = time.monotonic()
-    compile_if_new()
     from tvist_server.config import ConfigError, from_mapping, read_toml
     from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError
@@ -165,7 +166,7 @@ def serve(
             return
         # Now there is something to clean up, which an exception sees to.
         with told(GatewayError, RecorderError), ending.at_once():
-            server = Server(checked)
+            server = Server(checked, prepare=compile_if_new)
 
     setups = [robot.setup for robot in server.robots]
 
@@ -192,7 +193,7 @@ def _several(config: "ServeConfig", ending: "Ending", began: float) -> None:
 
     with told(WorkersError, GatewayError):
         with ending.at_once():
-            workers = Workers(config)
+            workers = Workers(config, compile_if_new)
         say_who_can_reach(workers, config, len(workers.setups))
         try:
             workers.run(lambda: _say_ready(workers.setups, config, began), ending)

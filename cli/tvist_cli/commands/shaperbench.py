@@ -1,5 +1,6 @@
 """`tvist shaperbench`: rank shapers, your own included, on ten simulated arms."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -92,6 +93,7 @@ def shaperbench(
             bent.append((path, curves.bend(path)))
             bar(1, None)
     result = {
+        "date": datetime.now(UTC).date().isoformat(),
         "command": _command(shaper, against, count, seed, calibration, quick=quick),
         "moves": count,
         "seed": seed,

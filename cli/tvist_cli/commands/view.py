@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import err, progress
 from tvist_cli.pages import serve_page
+from tvist_cli.serving import compile_if_new
 from tvist_cli.tracks import recorded, show_tracks
 
 if TYPE_CHECKING:
@@ -112,6 +113,7 @@ def _compared(shapers: Sequence[str], robot: str) -> "list[Track]":
 
     if not 2 <= len(shapers) <= 3:
         raise Failure(f"compare has {len(shapers)} shapers: give two or three", code=2)
+    compile_if_new()
     tracks = []
     with told(DescriptionError, ConfigError, RefusalError, code=2), progress(len(shapers), "runs") as advance:
         poses = load(robot).poses

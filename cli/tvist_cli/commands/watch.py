@@ -16,7 +16,7 @@ from tvist_cli.watching import watch_for
 
 if TYPE_CHECKING:
     from tvist_client.robot import Robot
-    from tvist_protocol.stream import Event, State
+    from tvist_protocol.stream import Event, State, Telemetry
 
 
 def watch(
@@ -27,7 +27,7 @@ def watch(
     seconds: float | None = None,
     json: bool = False,
 ) -> None:
-    """Show modes, joints, tool accelerometer, estimates and events of a served robot until Control+C.
+    """Show modes, rate, load, joints, accelerometer, estimates and events of a served robot until Control+C.
 
     If the robot is not ready to move, the second line says why, even if it stopped before the command started.
 
@@ -59,6 +59,8 @@ def watch(
     async def run() -> None:
         async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
             events: list[Event] = []
+            told: list[Telemetry] = []
+            robot.on_telemetry(lambda telemetry: told.__setitem__(slice(None), [telemetry]))
             robot.on_event(events.append)
             standing = _Standing(robot, command)
             if json:
@@ -66,7 +68,7 @@ def watch(
             with contextlib.nullcontext() if json else Live(console=out, refresh_per_second=10) as live:
                 async for state in robot.states(buffer=1):
                     if live is not None:
-                        live.update(_screen(state, events[-5:], await standing.line(state)))
+                        live.update(_screen(state, events[-5:], await standing.line(state), told))
                     else:
                         print_json(state)
                     await asyncio.sleep(0.1)
@@ -114,7 +116,18 @@ class _Standing:
             self._modes = None
 
 
-def _screen(state: "State", events: "list[Event]", standing: Text) -> Group:
+def _load(told: "list[Telemetry]") -> Text:
+    one = told[0] if told else None
+    if one is None or one.due_ticks is None or one.load is None:
+        return Text("no load is told: a client steps the time, or no telemetry has come yet", style="dim")
+    said = (
+        f"{one.ticks_per_second:.1f} ticks/s   missed {one.missed_ticks} of {one.due_ticks}   "
+        f"late p99 {one.late_p99_us:.0f} µs   load {100.0 * one.load:.1f} %"
+    )
+    return Text(f"{said}   overloaded", style="bold red") if one.overloaded else Text(said)
+
+
+def _screen(state: "State", events: "list[Event]", standing: Text, told: "list[Telemetry]") -> Group:
     joints = Table(show_edge=False, pad_edge=False)
     for column in ("joint", "reference rad", "target rad", "actual rad", "target rad/s²", "moment N m"):
         joints.add_column(column, justify="right")
@@ -131,9 +144,8 @@ def _screen(state: "State", events: "list[Event]", standing: Text) -> Group:
     )
     return Group(
         standing,
-        Text(
-            f"tick {state.tick}   {state.timestamp:.3f} s   missed {state.missed_ticks}   estimated {estimates}"
-        ),
+        _load(told),
+        Text(f"tick {state.tick}   {state.timestamp:.3f} s   estimated {estimates}"),
         joints,
         Text(
             f"tool accelerometer {x: .2f} {y: .2f} {z: .2f} m/s²   shaper delay {1e3 * state.shaper_delay:.1f} ms"

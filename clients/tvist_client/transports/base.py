@@ -23,6 +23,7 @@ class Transport(ABC):
 
         Raises:
             NotConnectedError: The robot does not answer, or disconnected meanwhile.
+            DeniedError: The robot takes no commands from this client.
             AnswerTimeoutError: The answer took longer than `timeout_s`.
         """
 

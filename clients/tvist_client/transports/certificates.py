@@ -5,8 +5,8 @@ client.pem       the client's certificate, and
 client.key       its private key
 """
 
-import contextlib
 import os
+import re
 import socket
 import ssl
 from pathlib import Path
@@ -61,40 +61,69 @@ def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
     }
 
 
-def why_refused(endpoint: str, security: Folder, whose: str = "robot") -> str | None:
+def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") -> str | None:
     """Return why no session could be opened, judged by a handshake of our own, since Zenoh does not report it.
 
-    This blocks for at most twice `PROBE_S`.
+    This blocks for at most three times `PROBE_S`.
 
     Args:
         endpoint: Endpoint of the server.
-        security: The client's folder.
+        security: The client's folder; None for a client without one.
         whose: What listens there, for the sentence.
 
     Returns:
-        A reason; None if the handshake succeeds or no server listens.
+        A reason and what to do; None if the cause is another one, such as that no server listens.
     """
-    folder = Path(security)
-    where = urlsplit("//" + endpoint.partition("/")[2].partition("#")[0].partition("?")[0])
-    try:
-        context = ssl.create_default_context(cafile=folder / AUTHORITY)
-        context.load_cert_chain(folder / CERTIFICATE, folder / KEY)
-    except ssl.SSLError as error:
-        return f"{folder} does not contain a certificate and its key ({error.reason or error})"
-    try:
-        with (
-            socket.create_connection((where.hostname or "", where.port or 0), PROBE_S) as plain,
-            context.wrap_socket(plain, server_hostname=where.hostname) as encrypted,
-            contextlib.suppress(TimeoutError),
-        ):
-            # In TLS 1.3 a server judges the client's certificate after the handshake, so its verdict has to be read.
-            encrypted.recv(1)
-    except ssl.SSLCertVerificationError as error:
-        return f"the {whose}'s certificate is not trusted: {error.verify_message.rstrip('.')}"
-    except ssl.SSLError as error:
-        return (
-            f"the {whose} rejects this certificate: {(error.reason or str(error)).replace('_', ' ').lower()}"
-        )
-    except (OSError, ValueError):
+    protocol, _, address = re.split("[?#]", endpoint)[0].partition("/")
+    if protocol not in {"tcp", "tls"}:
         return None
-    return None
+    try:
+        encrypted, failure = _handshake(address, security)
+    except ssl.SSLError as error:
+        return f"{security} does not contain a certificate and its key ({error.reason or error})"
+    except (OSError, ValueError):  # nobody listens there, or says anything
+        return None
+    said = None
+    if not encrypted and security is not None:
+        said = f"the {whose} there has no certificates: give tcp/{address} without security"
+    elif encrypted and security is None:
+        said = f"the {whose} there demands certificates: give tls/{address}, and as security the folder that "
+        said += "`tvist keys` made for this client"
+    elif isinstance(failure, ssl.SSLCertVerificationError):
+        said = f"the {whose}'s certificate is not trusted: {failure.verify_message.rstrip('.')}: take the folder that "
+        said += f"`tvist keys` made beside that {whose}'s, and an address given to it as --host"
+    elif encrypted and failure is not None:
+        why = (
+            str(getattr(failure, "reason", None) or failure).rpartition("ALERT_")[2].replace("_", " ").lower()
+        )
+        said = f"the {whose} rejects this certificate ({why}): make another one with `tvist keys`"
+    return said
+
+
+def _handshake(address: str, security: Folder | None) -> tuple[bool, OSError | None]:
+    """Return whether TLS is spoken there, and what ended the handshake.
+
+    Raises:
+        ssl.SSLError: The folder's files are damaged.
+        OSError: Nobody listens there, or says anything.
+    """
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    if security is None:  # nothing is sent, so that it does not matter to whom
+        context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    else:
+        context.load_verify_locations(Path(security) / AUTHORITY)
+        context.load_cert_chain(Path(security) / CERTIFICATE, Path(security) / KEY)
+    where, encrypted = urlsplit(f"//{address}"), False
+    with socket.create_connection((where.hostname or "", where.port or 0), PROBE_S) as plain:
+        try:
+            with context.wrap_socket(plain, server_hostname=where.hostname) as link:
+                encrypted = True
+                # In TLS 1.3 a server judges the client's certificate after the handshake: read its verdict.
+                link.recv(1)
+        except TimeoutError:
+            if not encrypted:
+                raise
+        except OSError as error:
+            alert = "ALERT" in (getattr(error, "reason", None) or "")  # only who speaks TLS sends one
+            return encrypted or alert or isinstance(error, ssl.SSLCertVerificationError), error
+    return encrypted, None

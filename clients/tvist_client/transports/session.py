@@ -52,11 +52,9 @@ def open_session(endpoint: str, security: Folder | None = None, namespace: str =
     try:
         session = zenoh.open(config)
     except zenoh.ZError as error:
-        refused = why_refused(endpoint, security) if security is not None else None
-        if refused is not None:
-            raise NotConnectedError(f"no connection to {endpoint}: {refused}") from error
+        refused = why_refused(endpoint, security)
         why = f"no server answers at {endpoint}: check that it is running and listens there (`tvist serve`)"
-        raise NotConnectedError(why) from error
+        raise NotConnectedError(f"no connection to {endpoint}: {refused}" if refused else why) from error
     _OPEN.add(session)
     return session
 

@@ -8,12 +8,19 @@ import asyncio
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import partial
 
 import zenoh
 from zenoh.handlers import Callback
 
-from tvist_client.errors import AnswerTimeoutError, ClientError, NotConnectedError, UnexpectedReplyError
+from tvist_client.errors import (
+    AnswerTimeoutError,
+    ClientError,
+    DeniedError,
+    NotConnectedError,
+    UnexpectedReplyError,
+)
 from tvist_client.transports.base import Topic, Transport
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import Inbox, wake
@@ -49,7 +56,7 @@ class ZenohTransport(Transport):
         self._robot = robot
         self._loop = asyncio.get_running_loop()
         self._mailbox = Inbox(self._loop)
-        self._alive = asyncio.Event()
+        self._alive, self._losses = asyncio.Event(), 0
         self._closed = False
         self._pending: set[asyncio.Future[bytes]] = set()
         self._lost_callbacks: list[Callable[[NotConnectedError], None]] = []
@@ -95,7 +102,20 @@ class ZenohTransport(Transport):
 
     async def request(self, data: bytes, timeout_s: float) -> bytes:
         """Send a command as a query and wait for the reply."""
-        return await self._get(keys.command(self._robot), data, timeout_s)
+        losses = self._losses
+        try:
+            return await self._get(keys.command(self._robot), data, timeout_s)
+        except NotConnectedError:
+            # Access control drops what is not allowed, so that it reaches no one. A robot that has been there all the
+            # time, and still answers, denies it.
+            if self._endpoint.startswith("tls/") and self._alive.is_set():
+                await self.info()
+                if self._losses == losses:
+                    raise DeniedError(
+                        f"robot {self._robot!r} at {self._endpoint} takes no commands from this client, which may only "
+                        "watch: use an operator's certificate (`tvist keys --operator`)"
+                    ) from None
+            raise
 
     def put_setpoint(self, data: bytes) -> None:
         """Put a set-point; this takes 20 µs, and the set-point is dropped if the link is congested."""
@@ -162,10 +182,9 @@ class ZenohTransport(Transport):
             raise self._gone()
         answer: asyncio.Future[bytes] = self._loop.create_future()
         self._pending.add(answer)
-        check = "check that the server is still running" + self._if_secured(
-            "that this certificate is an operator's"
+        nobody = NotConnectedError(
+            f"robot {self._robot!r} at {self._endpoint} does not answer: check that the server is still running"
         )
-        nobody = NotConnectedError(f"robot {self._robot!r} at {self._endpoint} does not answer: {check}")
 
         def on_reply(reply: zenoh.Reply) -> None:
             wake(self._loop, partial(_settle, answer, self._outcome(reply, timeout_s)))
@@ -206,6 +225,7 @@ class ZenohTransport(Transport):
 
     def _lose(self) -> None:
         self._alive.clear()
+        self._losses += 1
         if self._closed:
             return
         error = self._gone()
@@ -220,10 +240,6 @@ class ZenohTransport(Transport):
             f"robot {self._robot!r} at {self._endpoint} is gone: this client reconnects when it is back"
         )
 
-    def _if_secured(self, check: str) -> str:
-        """Return what else to check with certificates, since access control denies silently."""
-        return f", and {check}" if self._endpoint.startswith("tls/") else ""
-
     def _fail_pending(self, error: ClientError) -> None:
         for answer in tuple(self._pending):
             _settle(answer, error)
@@ -237,10 +253,13 @@ class ZenohTransport(Transport):
             robots = await _robots(self._session)
             if self._robot in robots:  # it has appeared late: the machine is slow
                 return
+            with suppress(NotConnectedError):  # it has no token while it starts, but answers
+                await self.info()
+                return
             there = f"the robots there are {', '.join(robots)}" if robots else "there are no robots"
-            check = "check name and endpoint" + self._if_secured(
-                "that the robot lists the name of this certificate"
-            )
+            # Access control denies silently, too.
+            secured = ", and that the robot lists the name of this certificate"
+            check = f"check name and endpoint{secured if self._endpoint.startswith('tls/') else ''}"
             why = f"there is no robot {self._robot!r} at {self._endpoint}; {there}: {check}"
             raise NotConnectedError(why) from None
 
@@ -291,8 +310,8 @@ async def _robots(session: zenoh.Session) -> list[str]:
     ended = asyncio.Event()
 
     def on_reply(reply: zenoh.Reply) -> None:
-        if reply.ok is not None:
-            names.append(str(reply.ok.key_expr).split("/")[1])
+        if reply.ok is not None and (place := keys.place(str(reply.ok.key_expr))) is not None:
+            names.append(place[1])
 
     session.liveliness().get(
         keys.ANY_ALIVE, Callback(on_reply, partial(wake, loop, ended.set), indirect=False), timeout=INFO_S

@@ -19,6 +19,8 @@ from tvist_controller.kinematics.least_squares import (
 from tvist_controller.kinematics.postures import DEFINITE, FREE, postures
 
 FOUND, NO_SOLUTION, OUT_OF_RANGE = 0, 1, 2
+ON_CURVE = 4
+"""Added to these where a joint is free, by which the search takes many times as long."""
 
 SAMPLES = 96
 """Values of a free angle at which postures are computed, before the nearest ones are improved."""
@@ -127,11 +129,12 @@ def closest(arm: Floats, rotation: Floats, position: Floats, near: Floats, q: Fl
         q: Result, shape (6,) [rad]; if it is outside the range of a joint, the nearest of those that are.
 
     Returns:
-        FOUND, NO_SOLUTION or OUT_OF_RANGE.
+        FOUND, NO_SOLUTION or OUT_OF_RANGE, and ON_CURVE if it applies.
     """
     table = np.empty((9, 6))
     table[8, 0] = math.nan
     freedom = all_postures(arm, rotation, position, near, table)
+    curve = ON_CURVE if freedom == FREE else 0
     if freedom != DEFINITE:
         _start_from_near(arm, rotation, position, near, freedom == FREE, table[8])
     squares, outside = np.empty(9), np.empty(9)
@@ -156,9 +159,9 @@ def closest(arm: Floats, rotation: Floats, position: Floats, near: Floats, q: Fl
             far, angle = pose_error(rotation, position, now, place, error)
             # Written so that a number that is none does not pass.
             if max(far, angle) <= AIM or descend(arm[:6], rotation, position, q, 0.0, 5, q) <= ACCURACY:
-                return OUT_OF_RANGE if wrong else FOUND
+                return (OUT_OF_RANGE if wrong else FOUND) + curve
             squares[best] = math.inf
-    return NO_SOLUTION
+    return NO_SOLUTION + curve
 
 
 @compiled

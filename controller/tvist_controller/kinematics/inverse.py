@@ -5,8 +5,14 @@ from typing import Any, Literal
 import numpy as np
 from numba import float64, types
 
-from tvist_controller._compiled import is_cached
-from tvist_controller.kinematics.choice import FOUND, NO_SOLUTION, closest, improved_postures, search
+from tvist_controller.kinematics.choice import (
+    FOUND,
+    NO_SOLUTION,
+    ON_CURVE,
+    closest,
+    improved_postures,
+    search,
+)
 from tvist_controller.kinematics.denavit_hartenberg import Floats
 from tvist_controller.kinematics.geometry import ANY, arm_table
 from tvist_plant.description import RobotDescription
@@ -50,7 +56,7 @@ class InverseKinematics:
     UR arms, and arms with a spherical wrist, are solved in closed form (`postures`), others by damped least squares
     from 64 starts, which are the same for every call. There, a posture that no start leads to is missed.
 
-    Objects keep no state between calls. `prepare` compiles what `solve` uses, or loads it from numba's cache; else
+    `prepare` compiles what `solve` uses, or loads it from numba's cache; else
     the first call does so.
 
     Args:
@@ -64,6 +70,8 @@ class InverseKinematics:
         self._closed = bool(self._arm[-1, 0] != ANY)
         span = np.minimum(self._limits, np.pi)
         self._prepared = False
+        self.searched = not self._closed
+        """Whether the last call of `solve` had to search a curve of postures, or without a closed form."""
         self._starts = np.random.default_rng(1).uniform(-span, span, (STARTS, description.joints))
 
     def prepare(self) -> None:
@@ -101,6 +109,8 @@ class InverseKinematics:
             return self._search(rotation, position, near)
         q = near.copy()
         status = closest(self._arm, rotation, position, near, q)
+        self.searched = status >= ON_CURVE
+        status %= ON_CURVE
         if status != FOUND:
             raise self._none() if status == NO_SOLUTION else self._outside(q)
         return q
@@ -176,8 +186,3 @@ def _compile(kernel: Any, signature: tuple[Any, ...]) -> None:
     if signature not in kernel.overloads:
         kernel.compile(signature)
         kernel.disable_compile()  # arrays of another type are refused, not compiled for
-
-
-def is_compiled() -> bool:
-    """Return whether the closed form is compiled for this processor; otherwise that takes half a minute."""
-    return is_cached(closest)

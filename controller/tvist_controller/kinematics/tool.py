@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_controller.kinematics.denavit_hartenberg import Floats, bias, dh_table, kinematics
+from tvist_controller.kinematics.straight_step import pseudo_inverse, straight_step
 from tvist_plant.description import RobotDescription
 
 
@@ -64,10 +65,30 @@ class ToolKinematics:
         """Return the tool's acceleration at constant velocities of the joints, J̇ q̇, shape (6,)."""
         return bias(self._dh, self._tool[1], q, qd)
 
-    def turned(self, rotation: Floats, angle: Floats) -> Floats:
-        """Return a rotation matrix turned about the base frame's axes by a rotation vector, shape (3,) [rad]."""
-        return turned(rotation, angle)
+    def inverse(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return the Jacobian, and its pseudo-inverse without the directions that are lost, shape (n, 6)."""
+        jacobian, inverse = self.jacobian(q), np.empty((len(q), 6))
+        pseudo_inverse(jacobian, inverse)
+        return jacobian, inverse
 
-    def turn(self, start: Floats, end: Floats) -> Floats:
-        """Return the rotation vector that turns one rotation matrix into another, shape (3,) [rad]."""
-        return turn(start, end)
+    def rehearse(self, period: float) -> None:
+        """Compile what `straight` uses, or load it from disk, before a tick needs it."""
+        n = len(self._dh)
+        still, at = np.zeros((3, n)), self.pose(np.zeros(n))
+        inverse = self.inverse(still[0])[1]
+        self.straight(
+            inverse, still[:2], np.zeros((2, 6)), still, np.zeros(6), 1.0, 1.0, 1.0, 1.0, period, at
+        )
+
+    def straight(
+        self, inverse: Floats, joints: Floats, twists: Floats, ranges: Floats, change: Floats,
+        rate: float, speed: float, slowest: float, acceleration: float, period: float,
+        place: tuple[Floats, Floats],
+    ) -> tuple[int, float, Floats, tuple[Floats, Floats]]:  # fmt: skip
+        """Follow a straight way for a tick, see `straight_step`; return also the tool's rotation and position then."""
+        q, rotation, position = np.empty(len(inverse)), np.empty((3, 3)), np.empty(3)
+        status, new = straight_step(
+            self._dh, *self._tool, inverse, joints, twists, ranges, change, rate, speed, slowest, acceleration, period,
+            *place, rotation, position, q,
+        )  # fmt: skip
+        return status, new, q, (rotation, position)

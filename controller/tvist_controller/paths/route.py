@@ -80,7 +80,9 @@ def runs_of(legs: Sequence[Leg], tracker: Tracker) -> tuple[list[Run], list[str]
         if leg.blend > 0.0 and number + 1 < len(legs):
             found = _cut(leg, legs[number + 1], length - begun, tracker)
             if isinstance(found, str):
-                skipped.append(f"{leg.where}: the blend of {leg.blend:g} m {found}, so the arm stops there")
+                skipped.append(
+                    f"{leg.where}: the arm stops there, since the blend of {leg.blend:g} m {found}"
+                )
             else:
                 cut = found
         end = length - (0.0 if cut is None else cut.before)
@@ -125,14 +127,14 @@ def _cut(leg: Leg, then: Leg, left: float, tracker: Tracker) -> _Cut | str:
     """The blend between two legs, or why there is none."""
     radius = leg.blend
     if radius < SMALLEST:
-        return "is too small to be worthwhile"
+        return f"is below the smallest one of {SMALLEST:g} m: give a larger radius"
     for _ in range(TRIES):
         before = _within(leg, radius, tracker, from_end=True)
         after = _within(then, radius, tracker, from_end=False)
         if np.isinf(before) or np.isinf(after):
-            return "is larger than the way of a part beside it"
+            return "is larger than the part before or after it: give a smaller radius"
         if before > left * INSIDE or after > then.way.length * INSIDE:
-            return "does not fit between those beside it and the ends of its parts"
+            return "overlaps the blend beside it: give a smaller radius to one of them"
         before, after = min(before, left), min(after, then.way.length)
         if 1e-9 * left < left - before < SLIVER and before > SLIVER:
             radius *= 1.0 - (SLIVER - (left - before)) / before
@@ -140,13 +142,13 @@ def _cut(leg: Leg, then: Leg, left: float, tracker: Tracker) -> _Cut | str:
         try:
             piece, curve = _blend(leg, then, before, after, tracker)
         except WayError:
-            return "passes a singular posture"
+            return "passes a singular posture: give a smaller radius, or move the corner"
         postures = _middle(piece.knots)
         off = [np.linalg.norm(tracker.pose(q).position - leg.corner.position) for q in postures]
         if max(off) <= leg.blend * INSIDE + CLOSE:
             return _Cut(before, after, piece, curve)
         radius *= SHRINK
-    return "cannot keep to its radius"
+    return "would leave the sphere of its radius: give a smaller one"
 
 
 def _blend(

@@ -36,6 +36,8 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
     """Velocity limit of reduced speed [rad/s]; None if the speed is not reduced."""
     excess: float
     """Share by which the filter may exceed the reference's acceleration, see `Filter.excess` [-]."""
+    surplus: tuple[float, float]
+    """Shares by which it may exceed velocity and acceleration at the arm's limits, see `Filter.surplus` [-]."""
     tcp: tuple[float, ...]
     """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
     carried: Body
@@ -48,7 +50,8 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
         """Return whether a plan made on one basis holds on the other."""
         return (
             np.array_equal(self.q, other.q)
-            and (self.speed, self.slowest, self.excess) == (other.speed, other.slowest, other.excess)
+            and (self.speed, self.slowest, self.excess, self.surplus)
+            == (other.speed, other.slowest, other.excess, other.surplus)
             and self.tcp == other.tcp
             and self.carried is other.carried
             and len(self.bodies) == len(other.bodies)

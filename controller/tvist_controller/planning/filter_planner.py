@@ -1,5 +1,6 @@
 """Filters by the names that clients use."""
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +10,16 @@ from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.elastic_source import elastic_feed_forward
 from tvist_controller.mode_source import ModeSource, modal_source
 from tvist_controller.planning.basis import FilterBasis
+from tvist_controller.planning.surplus import surplus_of
 from tvist_controller.refusal import RefusalError
-from tvist_controller.setup import Setup
+from tvist_controller.setup import Setup, paper_payload
 from tvist_protocol.commands import SetEstimator
 from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
 from tvist_shaping.errors import EstimatorError
-from tvist_shaping.estimators.base import Estimator
+
+KEPT = 32
+"""Number of filters whose `surplus` is kept."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,7 @@ class FilterPlanner:
     def __init__(self, setup: Setup) -> None:
         self._setup, self._known = setup, setup.registry
         self._modal = modal_source(setup.description, setup.calibration)
+        self._surpluses = deque[tuple[ModeSource, str, int, tuple[float, float]]](maxlen=KEPT)
 
     def first(self) -> PlannedFilter:
         """Return the robot's initial filter. Code that its first use would compile is compiled now.
@@ -52,7 +57,10 @@ class FilterPlanner:
             chosen = self.choose(setup.shaper, 1, setup.source(), setup.payload)
         except RefusalError as error:
             raise ValueError(str(error)) from error
-        if self._modal is not None:
+        if (
+            self._modal is not None
+            and wanted_modes("elastic-auto", 1, "shaper", self._known) <= self._modal.most
+        ):
             ready = self.choose("elastic-auto", 1, self._modal, setup.payload)
             ready.tvist.filter(np.zeros(setup.description.joints))
             if ready.elastic is not None:
@@ -79,8 +87,8 @@ class FilterPlanner:
         wanted = wanted_modes(name, modes, where, self._known)
         if wanted > source.most and self._modal is not None:
             source = self._modal
-        estimator = make_estimator(source, wanted, declared, "modes" if modes > 1 else where)
-        return self._with_feed_forward(source, self._make(name, estimator, where), where)
+        tvist = self._make(name, wanted, source, declared, where, "modes" if modes > 1 else where)
+        return self._with_feed_forward(source, tvist, where)
 
     def estimate(self, command: SetEstimator, basis: FilterBasis) -> PlannedFilter:
         """Return the present filter with modes from another source.
@@ -101,12 +109,29 @@ class FilterPlanner:
         return self._again(basis, basis.source, basis.declared, "shaper")
 
     def _again(self, basis: FilterBasis, source: ModeSource, declared: Payload, where: str) -> Filter:
-        estimator = make_estimator(source, basis.modes, declared, where)
-        return self._make(basis.name, estimator, where)
+        return self._make(basis.name, basis.modes, source, declared, where, where)
 
-    def _make(self, name: str, estimator: Estimator, where: str) -> Filter:
-        joints = self._setup.description.joints
-        return choose_filter(name, estimator, joints, where=where, known=self._known)
+    def _make(
+        self, name: str, modes: int, source: ModeSource, declared: Payload, where: str, where_modes: str
+    ) -> Filter:
+        description = self._setup.description
+        estimator = make_estimator(source, modes, declared, where_modes)
+        tvist = choose_filter(name, estimator, description.joints, where=where, known=self._known)
+        tvist.surplus = self._surplus(tvist, source)
+        return tvist
+
+    def _surplus(self, tvist: Filter, source: ModeSource) -> tuple[float, float]:
+        """The filter's `surplus` with any payload. It takes long, so that it is kept for the latest filters."""
+        for known, name, modes, found in self._surpluses:
+            if known is source and (name, modes) == (tvist.name, tvist.estimator.modes):
+                return found
+        masses = (0.0, self._setup.description.limits.payload) if source.knows_payload else (0.0,)
+        payloads = [paper_payload(self._setup.description, mass) for mass in masses]
+        modes = tvist.estimator.modes
+        estimators = [source.estimator(modes, payload) for payload in payloads]
+        found = surplus_of(tvist, estimators, self._setup.description)
+        self._surpluses.append((source, tvist.name, modes, found))
+        return found
 
     def _with_feed_forward(self, source: ModeSource, tvist: Filter, where: str) -> PlannedFilter:
         """Add the feed-forward that a filter needs, with the springs of its source or else of the robot's calibration.

@@ -60,7 +60,7 @@ def keeping_motion(
 
 
 def shaped_ahead(motion: PlannedMotion, tvist: Filter) -> Floats | None:
-    """References of the shaped motion, shape (k, n) [rad]; None if it lasts too long to simulate.
+    """References of the shaped motion at full rate, shape (k, n) [rad]; None if it lasts too long to simulate.
 
     Args:
         motion: The motion, which has not begun; it is not changed.
@@ -72,7 +72,7 @@ def shaped_ahead(motion: PlannedMotion, tvist: Filter) -> Floats | None:
     line_filter = LineFilter(mine, motion.limits)
     line_filter.begin(mine, path.start, path.posture_of)
     mine.aim(path.end, quiet=motion.quiet)
-    ahead = Ahead(motion.fork(), line_filter, shaped)
+    ahead = Ahead(motion.paced_at(1.0), line_filter, shaped)
     ahead.until(MAX_AHEAD)
     return np.array(ahead.references) if ahead.rests else None
 

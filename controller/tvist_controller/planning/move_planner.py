@@ -6,15 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tvist_controller.collision import CLEARANCE, CollisionModel, Meeting
-from tvist_controller.control.differentiator import Floats
-from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.planning.basis import FilterBasis, MotionBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
-from tvist_controller.planning.keeping import keeping_motion, shaped_ahead
+from tvist_controller.planning.fitting import Fitted, Fitter, Slower
+from tvist_controller.planning.keeping import keeping_motion
 from tvist_controller.quiet.elastic_arm import ElasticArm
 from tvist_controller.quiet.quiet_motion import quiet_motion
 from tvist_controller.refusal import RefusalError
-from tvist_controller.safety import arm_limits, largest_torque, rate_of, torque_along
+from tvist_controller.safety import arm_limits, rate_of
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import (
     JointLine,
@@ -26,14 +25,11 @@ from tvist_controller.trajectory import (
 )
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
+from tvist_protocol.replies import Code
 from tvist_shaping.named import PLANNED
 
-LOOKS = 64
-"""Number of moments of a motion at which the torque is checked before the motion is simulated."""
 AGILE = MotionLimits(1.5, 2.0, 100.0)
 """Limits of pauses and changes of the speed for motions that are slower by themselves: those of `move_j` by default."""
-BLUNTED = 1.05
-"""Largest ratio of the shaped motion's torque to that of the unshaped motion, behind which it lags [-]."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +40,8 @@ class PlannedMove:
     """Trajectories of its reference, each from rest to rest, in their order."""
     velocity: float
     """Largest velocity of any joint [rad/s]."""
-    excess_of_torque: str | None
-    """By how much the motion will exceed a torque limit, in words; None if it will not."""
+    limited: tuple[Code, str] | None
+    """The limit that made it slower than asked, or that it will exceed, with a sentence; None if there is none."""
     skipped: tuple[str, ...] = ()
     """A sentence for each blend that is left out."""
     window: float = math.inf
@@ -55,6 +51,10 @@ class PlannedMove:
     begins, or where the segment ends without one [m]."""
     peak: float = math.inf
     """Largest `Filter.peak` with which they do [-]."""
+    room: tuple[float, float] = (math.inf, math.inf)
+    """Ratios of the arm's velocity and acceleration to the motion's [-]."""
+    surplus: tuple[float, float] = (0.0, 0.0)
+    """`Filter.surplus` of the filter that it was planned for [-]."""
 
 
 class MovePlanner:
@@ -69,8 +69,8 @@ class MovePlanner:
         self._description, self._filters = setup.description, filters
         payload = body(setup.payload)
         self._collisions = CollisionModel(setup.description, payload)
-        self._dynamics = InverseDynamics(setup.description, payload)
-        self._torque = np.array(setup.description.limits.torque)
+        self.fitter = Fitter(setup)
+        """Keeps motions within the limits of the joints."""
 
     def move(self, command: MoveJ, basis: MotionBasis, *, at_once: bool = False) -> PlannedMove:
         """Plan a motion from rest; the command's content has been checked.
@@ -127,23 +127,41 @@ class MovePlanner:
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
         """
-        spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
         rate = rate_of(basis.speed, limits.velocity, basis.slowest)
-        try:
+
+        def make(slower: Slower) -> PlannedMotion:
+            kept = replace(
+                limits,
+                velocity=limits.velocity * slower.velocity,
+                acceleration=limits.acceleration * slower.acceleration,
+            )
+            spared = replace(kept, acceleration=kept.acceleration * (1.0 - basis.excess))
             if arm is not None and isinstance(path, JointLine):
-                motion = quiet_motion(path, spared, arm, PERIOD, rate, agility)
-            elif isinstance(path, JointLine) and basis.excess > 0.0 and not at_once:
-                motion = keeping_motion(path, limits, self._filters.present(basis.filter), rate, agility)
-            else:
-                motion = quickest_motion(path, spared, PERIOD, rate, agility)
+                return quiet_motion(path, spared, arm, PERIOD, rate, agility)
+            if isinstance(path, JointLine) and basis.excess > 0.0 and not at_once:
+                return keeping_motion(path, kept, self._filters.present(basis.filter), rate, agility)
+            return quickest_motion(path, spared, PERIOD, rate, agility)
+
+        try:
+            fitted = self.fitter.fit(
+                make, basis, None if at_once else lambda: self._filters.present(basis.filter)
+            )
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
+        motion, slower = fitted.motion, fitted.slower
         found = self.meeting(motion, basis)
         if found is not None:
             share, meeting = found
             time = motion.time_at(share)
             raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
-        return PlannedMove((motion,), limits.velocity, self.excess_of_torque(motion, basis))
+        velocity, arms = limits.velocity * slower.velocity, arm_limits(self._description)
+        return PlannedMove(
+            (motion,),
+            velocity,
+            limited(fitted, limits if agility is None else None),
+            room=(arms.velocity / velocity, arms.acceleration / (limits.acceleration * slower.acceleration)),
+            surplus=basis.surplus,
+        )
 
     def _arm(self, basis: FilterBasis) -> ElasticArm | None:
         """Model of the arm if the filter wants quiet motions; None if it does not, or if there is no model."""
@@ -158,27 +176,23 @@ class MovePlanner:
             self._collisions.carry(basis.carried)
         return self._collisions.on_way(motion.path.whole)
 
-    def excess_of_torque(self, motion: PlannedMotion, basis: MotionBasis) -> str | None:
-        """Say by how much a motion will exceed a torque limit; None if it will not."""
-        dynamics, allowed, limits = self._dynamics, self._torque, motion.limits
-        dynamics.believe(basis.bodies)
-        bound = largest_torque(dynamics, motion.path, limits.velocity, limits.acceleration)
-        if (bound <= allowed).all() or (BLUNTED * self._before_shaping(motion) <= allowed).all():
-            return None
-        ahead = shaped_ahead(motion, self._filters.present(basis.filter))
-        if ahead is None:
-            return None
-        most = torque_along(dynamics, ahead, PERIOD)
-        joint = int(np.argmax(most / allowed))
-        name, limit = self._description.robot.joints[joint], allowed[joint]
-        if most[joint] <= limit:
-            return None
-        return (
-            f"torque of joint {name} will reach {most[joint]:.0f} N m, {most[joint] - limit:.1f} beyond its "
-            f"limit of {limit:g}: ask for less acceleration"
-        )
 
-    def _before_shaping(self, motion: PlannedMotion) -> Floats:
-        """Largest torques that the motion would need without a filter, shape (n,) [N m]."""
-        most: Floats = np.max([self._dynamics.effort(*state) for state in motion.states(LOOKS)], axis=0)
-        return most
+def limited(fitted: Fitted, asked: MotionLimits | None = None) -> tuple[Code, str] | None:
+    """Say what made a motion slower than asked, or what it exceeds; see `PlannedMove.limited`.
+
+    Args:
+        fitted: The motion.
+        asked: Limits that were asked for; None if something else determines its speed.
+    """
+    if fitted.exceeds is not None:
+        return "limit_torque", fitted.exceeds
+    if fitted.need is None:
+        return None
+    velocity, acceleration = fitted.slower
+    if asked is None:
+        what = f"duration is {fitted.motion.duration:.4g} s instead of {fitted.asked:.4g}"
+    elif velocity <= acceleration:
+        what = f"velocity is {asked.velocity * velocity:.4g} of {asked.velocity:.4g} rad/s"
+    else:
+        what = f"acceleration is {asked.acceleration * acceleration:.4g} of {asked.acceleration:.4g} rad/s²"
+    return fitted.need.code, f"{what}, so that {fitted.need.keeps}"

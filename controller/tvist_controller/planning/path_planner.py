@@ -14,7 +14,8 @@ from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, To
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.basis import MotionBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
-from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
+from tvist_controller.planning.fitting import Fitted, Slower
+from tvist_controller.planning.move_planner import MovePlanner, PlannedMove, limited
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import arm_limits, rate_of
@@ -89,19 +90,19 @@ class PathPlanner:
             runs = [[]]
         length = sum(map(_length, runs))
         tvist, done, motions = self._filters.present(basis.filter), 0.0, list[PlannedMotion]()
-        window = velocity = 0.0
+        window, velocity, told = 0.0, 0.0, None
         for run in runs:
-            motion, delay, highest = self._motion(run, command.jerk, tvist, basis)
+            fitted, delay, highest = self._motion(run, command.jerk, tvist, basis)
+            motion, told = fitted.motion, told or limited(fitted)
             velocity = max(velocity, highest)
             self._check_clear(motion, run, (done, length), basis)
             motions.append(motion)
             window = max(window, delay)
             done += _length(run)
-        excess = [self._moves.excess_of_torque(motion, basis) for motion in motions]
         return PlannedMove(
             tuple(motions),
             velocity,
-            next((one for one in excess if one is not None), None),
+            told,
             tuple(skipped),
             window,
             marks_of(runs, len(command.segments) if isinstance(command, MovePath) else 1),
@@ -190,12 +191,13 @@ class PathPlanner:
 
     def _motion(
         self, run: Run, jerk: float, tvist: Filter, basis: MotionBasis
-    ) -> tuple[PlannedMotion, float, float]:
-        """A motion, the delay of the shaper on it [s], and the largest velocity of a joint [rad/s]."""
+    ) -> tuple[Fitted, float, float]:
+        """A motion, the delay of the shaper on it [s], and the largest velocity of any joint [rad/s]."""
         limits, spared = self._description.limits, 1.0 - basis.excess
         if not run:  # the arm is there already
             still = JointLine(basis.q, basis.q)
-            return quickest_motion(still, arm_limits(self._description), PERIOD, basis.speed), 0.0, 0.0
+            motion = quickest_motion(still, arm_limits(self._description), PERIOD, basis.speed)
+            return Fitted(motion), 0.0, 0.0
         knots = joined(run)
         self._check_range(knots.s / knots.s[-1], knots.q, run[0].where)
         acceleration = np.array(limits.acceleration) * spared
@@ -208,8 +210,15 @@ class PathPlanner:
         law = law_of(run, curve, joints, jerk, delay)
         highest = fastest(law, curve)
         rate = rate_of(basis.speed, highest, basis.slowest)
-        agility = at_least(law.limits, AGILE.acceleration, AGILE.jerk)
-        return PlannedMotion(curve, law, PERIOD, rate, agility), delay, highest
+
+        def make(slower: Slower) -> PlannedMotion:
+            kept = law.slowed(law.duration / slower.rate)
+            return PlannedMotion(
+                curve, kept, PERIOD, rate, at_least(kept.limits, AGILE.acceleration, AGILE.jerk)
+            )
+
+        fitted = self._moves.fitter.fit(make, basis, lambda: self._filters.present(basis.filter))
+        return fitted, delay, highest * fitted.slower.rate
 
     @staticmethod
     def _delay(curve: SplineCurve, tvist: Filter) -> float:

@@ -24,6 +24,10 @@ DELAY, DELAY_PER_PART = 10, 4
 """Ticks from the call of a move along a line or path to its start, and ticks more for each further part of a path:
 time to plan it beside the ticks. They do not depend on how long planning takes, so equal programs move alike.
 """
+PAUSE = 300
+"""Ticks that a stop, or a plan of a `movej` within a tick, is paid with. These two take longer than all else in a tick,
+so fewer than one tick in a hundred may have one.
+"""
 MAX_PARTS = 50
 """Number of moves after which a path ends though its last move has a blend."""
 BRAKING = 2.0
@@ -48,10 +52,11 @@ class ProgramArm:
     Args:
         access: The robot.
         thread: Returns what identifies the thread that runs now.
+        spend: Takes evaluations from the budget of the program that runs.
     """
 
-    def __init__(self, access: Access, thread: Callable[[], object]) -> None:
-        self._access, self._motion, self._thread = access, access.motion, thread
+    def __init__(self, access: Access, thread: Callable[[], object], spend: Callable[[int], None]) -> None:
+        self._access, self._motion, self._thread, self.spend = access, access.motion, thread, spend
         self._inside: object | None = None
         """Thread whose move has not returned."""
         self._driver: object | None = None
@@ -64,6 +69,10 @@ class ProgramArm:
         self._outcome: str | None = None
         self._abandoned = False
         self._own = False
+        self._planning = 0
+        """Ticks for which the last plan that was ordered is still being made."""
+        self._paid = 0
+        """Tick at which all stops and plans are paid."""
         self._skipped = False
         """True after a call of `abort`; a motion that was being planned then is not started."""
         self.waypoint: Segment | None = None
@@ -147,17 +156,23 @@ class ProgramArm:
         return plan.found.marks
 
     def _planned(self, legs: list[Segment]) -> Generator[None, None, Plan]:
-        """The plan of a move. Lines and paths begin a fixed time after it is ordered."""
+        """The plan of a move. Lines and paths, and joint moves in debt, begin a fixed time after it is ordered."""
         access, command = self._access, command_of(legs)
-        if isinstance(command, MoveJ):
+        if isinstance(command, MoveJ) and self._debt < PAUSE:
+            self._owe()
             return access.plan(command)
-        ordered = access.order(command)
-        for _ in range(DELAY + DELAY_PER_PART * (len(legs) - 1)):
-            yield
-        yield from self._come_to_rest()  # a client may have moved the arm meanwhile
-        self._check_ready()
-        plan = ordered()
-        return plan if plan.holds(access.basis()) else access.plan(command)
+        while True:
+            while self._planning > 0:  # of a thread that was killed meanwhile: one after the other
+                yield
+            self._planning = DELAY + DELAY_PER_PART * (len(legs) - 1)
+            ordered = access.order(command)
+            for _ in range(self._planning):
+                yield
+            yield from self._come_to_rest()  # a client may have moved the arm meanwhile
+            self._check_ready()
+            plan = ordered()
+            if plan.holds(access.basis()):
+                return plan
 
     def _beyond(self, marks: tuple[tuple[int, float], ...], leg: int) -> bool:
         """Return whether the arm has begun the blend at the end of a leg."""
@@ -190,7 +205,7 @@ class ProgramArm:
             raise Fault("a client streams set-points to the arm, so the program cannot move it")
         if motion.activity in {Activity.GUIDED, Activity.MOVING, Activity.PAUSED}:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
-        while motion.activity.moving or motion.activity.protective:
+        while motion.activity.moving or motion.activity.protective or self._waits:
             yield
 
     # ------------------------------------------------------------------ guided motions
@@ -207,7 +222,7 @@ class ProgramArm:
         """
         yield from self.finish()
         with self._moving():
-            while self.stopping:
+            while self.stopping or self._waits:
                 yield
             self.steer(start)
             yield from wait()
@@ -217,6 +232,19 @@ class ProgramArm:
         """Whether a guided motion has to wait: for a stop under way, or in a protective stop of this tick."""
         activity = self._motion.activity
         return (activity.moving or activity.protective) and after(activity, "speed_j") is None
+
+    @property
+    def _debt(self) -> int:
+        """Ticks until all stops and plans are paid."""
+        return max(self._paid - self._access.latest().tick, 0)
+
+    def _owe(self) -> None:
+        self._paid = self._access.latest().tick + self._debt + PAUSE
+
+    @property
+    def _waits(self) -> bool:
+        """Whether the next motion has to wait, since stops and plans were too close to each other."""
+        return self._motion.activity is Activity.REST and self._debt > 2 * PAUSE
 
     def steer(self, start: Callable[[bool], int | None]) -> None:
         """Begin or change a guided motion within a call of `guide`; see there. In a protective stop nothing happens."""
@@ -270,6 +298,8 @@ class ProgramArm:
 
     def brake(self, stop: Callable[[], None]) -> None:
         """Begin a stop of what moves, which is the program's own will."""
+        if self._motion.activity.moving:
+            self._owe()
         self._own = True
         try:
             stop()
@@ -295,6 +325,7 @@ class ProgramArm:
         Args:
             lives: Returns whether a thread still runs.
         """
+        self._planning = max(self._planning - 1, 0)
         if self._driver is not None and not lives(self._driver):
             self._abandoned = True
         if self._abandoned:
@@ -306,7 +337,7 @@ class ProgramArm:
         """Forget all motions, since the program has ended."""
         self._inside = self._driver = self._number = self._guided = None
         self._paths.clear()
-        self._abandoned = False
+        self._abandoned, self._planning = False, 0
 
     def hear(self, event: Event) -> bool:
         """Handle an event of the robot; return whether it ended a motion of the program against its will."""

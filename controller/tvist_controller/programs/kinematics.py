@@ -1,6 +1,6 @@
 """Kinematics of the arm for programs: with the present tool, and with others."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from tvist_controller.paths.poses import placement, placement_vector
 from tvist_plant.description import RobotDescription
 from tvist_urscript import Fault
 
+SEARCH = 900
+"""Evaluations of inverse kinematics beyond its usual cost where it searches a curve of postures."""
 PoseNumbers = tuple[float, float, float, float, float, float]
 
 
@@ -21,10 +23,13 @@ class ProgramKinematics:
     Args:
         description: The robot.
         motion: Its motion, which has the present tool centre point.
+        spend: Takes evaluations from the budget of the program that runs.
     """
 
-    def __init__(self, description: RobotDescription, motion: MotionControl) -> None:
-        self._motion = motion
+    def __init__(
+        self, description: RobotDescription, motion: MotionControl, spend: Callable[[int], None]
+    ) -> None:
+        self._motion, self._spend = motion, spend
         self._inverse = InverseKinematics(description)
         self._flange = ToolKinematics(description)
         self._tcp: tuple[float, ...] = (0.0,) * 6
@@ -70,6 +75,9 @@ class ProgramKinematics:
         except InverseKinematicsError as error:
             shown = ", ".join(f"{value:.4g}" for value in pose)
             raise Fault(f"no joint positions reach the pose p[{shown}]: {error}") from error
+        finally:
+            if self._inverse.searched:
+                self._spend(SEARCH)
         found: tuple[float, ...] = tuple(q.tolist())
         return found
 

@@ -53,7 +53,7 @@ def functions(
     queue: StatementQueue,
 ) -> dict[str, Callable[..., Any]]:
     """Return the functions for the programs of one robot, by name."""
-    kinematics = ProgramKinematics(access.description, access.motion)
+    kinematics = ProgramKinematics(access.description, access.motion, arm.spend)
     classes = {
         motions: motions.MotionFunctions(access, arm, kinematics),
         poses: poses.PoseFunctions(access, kinematics),

@@ -31,6 +31,8 @@ from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
 
 TOLD_EVERY = 50
 """Ticks between two changes of the line in `io`, which changes with almost every tick."""
+GUIDED = 100
+"""Evaluations that the step of a guided motion of the program takes from the budget of its tick."""
 MAX_BESIDE = 8
 """Number of secondary programs that may run at once."""
 
@@ -62,7 +64,7 @@ class ProgramPlayer:
 
     def __init__(self, access: Access, safety: SafetyControl) -> None:
         self._access, self._motion, self._safety, self._emit = access, access.motion, safety, access.emit
-        self.arm = ProgramArm(access, self._thread)
+        self.arm = ProgramArm(access, self._thread, lambda work: self._machine().charge(work))
         self._popups = Popups(access.emit, self._machine)
         self._watchdogs = Watchdogs(access.peripherals)
         self.sockets = Sockets(access.emit, self._machine, lambda: self._now.origin if self._now else None)
@@ -84,6 +86,8 @@ class ProgramPlayer:
         """Programs in order of age."""
         self._starved: set[_Running] = set()
         """Programs for which nothing of the last tick's evaluations was left."""
+        self._left = 0
+        """Evaluations that the last tick left; below 0 they are a debt, which is paid before any program goes on."""
         self._now: _Running | None = None
         """The one whose turn it is."""
         self.line = 0
@@ -131,13 +135,14 @@ class ProgramPlayer:
         Args:
             tick: Number of the tick.
         """
+        left = self._left = min(self._left, 0) + EVALUATIONS
         if not self._all:
             return
         if self.state == "PLAYING":
             self._watch(tick)
-        left = EVALUATIONS
+        left -= GUIDED if self.arm.guides else 0
         # Whoever got nothing of the last tick's evaluations comes first, else the oldest.
-        for running in sorted(self._all, key=lambda one: one not in self._starved):
+        for running in sorted(self._all, key=lambda one: one not in self._starved) if left > 0 else ():
             if running not in self._all or (running is self._main and self._held):
                 continue
             if left > 0:
@@ -145,6 +150,7 @@ class ProgramPlayer:
                 self._starved.discard(running)
             else:
                 self._starved.add(running)
+        self._left = left
         self.arm.settle(self._lives)
         if self._main is not None and (self.line == 0 or tick % TOLD_EVERY == 0):
             self.line = self._main.machine.line
@@ -158,13 +164,13 @@ class ProgramPlayer:
         """Give a program its turn; return what it leaves of the evaluations."""
         self._now = running
         try:
-            left = running.machine.resume(left)
+            running.machine.resume(left)
         except ScriptError as error:
             self._fail(running, error)
         self._now = None
         if not running.machine.running:
             self._finish(running)
-        return left
+        return running.machine.left
 
     def hear(self, event: Event) -> None:
         """Handle an event of the robot."""
@@ -210,11 +216,14 @@ class ProgramPlayer:
         )
 
     def _finish(self, running: _Running) -> None:
-        """Handle the end of a program; the arm comes to rest with it."""
+        """Handle the end of a program; the arm comes to rest with it. `halt` ends all programs, whichever says it."""
         if running not in self._all:
             return
-        moves = running is self._main and (self.arm.moves or self.arm.guides)
+        halts = running.machine.halted
+        moves = (halts or running is self._main) and (self.arm.moves or self.arm.guides)
         self._close(running)
+        if halts:
+            self.end(f"{running.name} has halted")
         if moves:
             self._motion.stop(None, "the program has ended")
 
@@ -321,6 +330,7 @@ class ProgramPlayer:
         self.state = "PAUSED"
         if self._main is not None:
             self.line = self._main.machine.line
+            self._main.machine.left = 0  # in this tick, none of its threads has a turn any more
 
     def _check_running(self, command: str) -> None:
         """Refuse to start a program where the arm has no power or is in a protective stop."""

@@ -17,6 +17,7 @@ from tvist_controller.programs.functions import (
     terminals,
     unsimulated,
 )
+from tvist_controller.programs.library import SIGNATURES
 from tvist_urscript.signatures import REQUIRED, Signature
 
 HEAD = """# Functions of programs
@@ -32,6 +33,9 @@ A move with a radius (`r`) is blended into the next one. The call then returns a
 next move; what it writes to outputs, registers and the log on the way is done when the arm begins the blend. What it
 reads is of the present. A function that waits ends the path: the arm then stops at the point of the last move.
 """
+COSTS = """Evaluations that a call takes from [the budget](urscript.md#5-threads), in proportion to its time; all others
+take one. Inverse kinematics takes 900 more where a joint is free, since it then searches a curve of postures, or where
+an arm has no closed form."""
 SUBJECTS: tuple[tuple[str, ModuleType, type], ...] = (
     ("Motions", motions, motions.MotionFunctions),
     ("Kinematics and dynamics", poses, poses.PoseFunctions),
@@ -55,6 +59,12 @@ def page() -> str:
             for name, one in module.SIGNATURES.items()
         ]
         parts.append(f"## {title}\n\n{_table(('function', '', 'what'), rows)}\n")
+    costs = sorted({one.cost for one in SIGNATURES.values() if one.cost > 1}, reverse=True)
+    dear = [
+        (str(cost), ", ".join(f"`{name}`" for name, one in sorted(SIGNATURES.items()) if one.cost == cost))
+        for cost in costs
+    ]
+    parts.append(f"## Costs\n\n{COSTS}\n\n{_table(('evaluations', 'functions'), dear)}\n")
     missing = [
         (f"`{name}`", what)
         for name, (_, what) in sorted(unsimulated.SUBJECTS.items(), key=lambda row: row[::-1])

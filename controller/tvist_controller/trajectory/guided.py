@@ -24,6 +24,10 @@ class Guided(Trajectory):
         """Position, velocity and acceleration of the reference, each of shape (n,)."""
 
     @abstractmethod
+    def adopt(self, limits: MotionLimits) -> None:
+        """Keep other limits of the joints from now on; `pace` must follow."""
+
+    @abstractmethod
     def pace(self, speed: float, slowest: float | None) -> None:
         """Set the speed.
 

@@ -58,7 +58,7 @@ class JointSpeed(Speed):
     @property
     def duration(self) -> float:
         """Time until the velocities are reached at full speed [s]."""
-        return float(np.abs(self._goal - self._u).max()) / self._most
+        return float(np.abs(self._goal - self._u).max()) / min(self._most, self._arm.acceleration)
 
     def next(self) -> Floats:
         """Advance by one tick and return the position."""
@@ -69,16 +69,14 @@ class JointSpeed(Speed):
         u, rate = self._after(1.0)
         rising = np.sign(present) * (rate * u - present) / h
         permitted = rise_within(np.abs(present), self._arm, h)
-        share = 1.0
+        most = 1.0
         if (rising > permitted).any():
             over = rising > permitted
-            share = max(float((permitted[over] / rising[over]).min()), 0.5**HALVINGS)
+            most = max(float((permitted[over] / rising[over]).min()), 0.5**HALVINGS)
+        for share in self._shares(most):
             u, rate = self._after(share)
-        for _ in range(HALVINGS):
             if self._torque.allows(self._q, present, (rate * u - present) / h):
                 break
-            share *= 0.5
-            u, rate = self._after(share)
         qd = rate * u
         if not self._goal.any() and float(np.abs(qd).max()) <= STEADY:
             u = qd = np.zeros_like(qd)
@@ -92,7 +90,7 @@ class JointSpeed(Speed):
         h, goal = self._period, self._goal
         part = part_of(self.duration, share * self.rate * h)
         u = goal if part == 1.0 else self._u + part * (goal - self._u)
-        most = np.full(len(u), share * self._most * h)
+        most = np.full(len(u), share * min(self._most, self._arm.acceleration) * h)
         lowest, highest = fitting_rates(-self._qd, u, -most, most)
         # The present rate is among them, but for rounding.
         wanted = self._wanted_rate

@@ -12,6 +12,13 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 Bools = npt.NDArray[np.bool_]
 
 
+STOPS = 0.8
+"""Share of the acceleration that the torque permits with which a joint must be able to stop inside its range, since
+the permitted one changes on the way [-]."""
+HEAVY = 8.0
+"""Acceleration below which the torque hardly ever keeps a joint of an arm [rad/s^2]."""
+
+
 class TorqueRoom(Protocol):
     """The motion that the joints' torques permit."""
 
@@ -85,7 +92,8 @@ class Limiter:
         self.behind = 0.0
         """Time by which joints lag behind a signal that is at its limits, so that they cannot catch up [s]."""
         # Within this position, no state within the limits needs a check of the range.
-        ramp, swing = limits.acceleration / limits.jerk, limits.velocity / limits.acceleration
+        slow = limits.acceleration if torque is None else min(limits.acceleration, HEAVY)
+        ramp, swing = limits.acceleration / limits.jerk, limits.velocity / slow
         lasting = max(swing + ramp, 2.0 * math.sqrt(limits.velocity / limits.jerk))
         self._inner = float(self._reach.min()) - 2.0 * limits.velocity * (ramp + lasting)
         room = 1.0 + self.TOLERANCE
@@ -129,7 +137,7 @@ class Limiter:
             fits &= ~self._behind | self._meets(qd, step, bend)
         near = np.abs(q).max() > self._inner
         if near:
-            fits &= self._stoppable(*self._passed(q, step, bend))
+            fits &= self._stoppable(self._passed(q, step, bend), self._accelerations()[1])
         self.behind = 0.0
         if fits.all() and self._allowed(q, step, bend):
             self._state = None
@@ -196,17 +204,23 @@ class Limiter:
         meets &= np.abs(following - signal) <= limits.jerk * h
         return meets
 
-    def _stoppable(self, q: Floats, qd: Floats, qdd: Floats) -> Bools:
-        """Return which joints can come to rest inside their range, with two ticks to spare."""
-        limits, jerk = self._limits, self._limits.jerk
+    def _accelerations(self) -> tuple[float, float]:
+        """Accelerations that limit and torque permit now, and with which a stop is sure to be possible [rad/s^2]."""
+        limit = self._limits.acceleration
+        room = math.inf if self._torque is None else self._torque.acceleration(*self.state[:2])
+        return min(limit, room), min(limit, STOPS * room)
+
+    def _stoppable(self, state: Floats, limit: float) -> Bools:
+        """Return which joints can come to rest inside their range with an acceleration, with two ticks to spare."""
+        (q, qd, qdd), jerk = state, self._limits.jerk
         sign = np.sign(qd)
         speed, rise = np.abs(qd), sign * qdd
         ramp = np.abs(rise) / jerk
         # The shortest stop from zero acceleration, plus the way from here to its start, or minus the way from there
         # to here.
         top = speed + 0.5 * jerk * ramp**2
-        gentle = top < limits.acceleration**2 / jerk
-        swing = top / limits.acceleration + limits.acceleration / jerk
+        gentle = top < limit**2 / jerk
+        swing = top / limit + limit / jerk
         stop = top * np.where(gentle, np.sqrt(top / jerk), 0.5 * swing)
         rising = speed * ramp + jerk * ramp**3 / 3.0
         falling = top * ramp - jerk * ramp**3 / 6.0
@@ -231,9 +245,7 @@ class Limiter:
 
     def _held_back(self, q: Floats, qd: Floats, passed: Floats, fits: Bools) -> tuple[Floats, Bools]:
         """State, shape (3, n), if not all joints pass unchanged, and which joints do."""
-        limits, limit = self._limits, self._limits.acceleration
-        if self._torque is not None:
-            limit = min(limit, self._torque.acceleration(*self.state[:2]))
+        limits, (limit, sure) = self._limits, self._accelerations()
         state = passed if fits.all() else np.where(fits, passed, self._catch_up(q, qd, limit, fits))
         if self._torque is not None and not self._torque.allows(*state):
             gentle = fits & (np.abs(passed[2]) <= limit)
@@ -242,9 +254,11 @@ class Limiter:
                 state = np.where(fits, passed, self._catch_up(q, qd, limit, fits))
         sign = np.sign(state[2])
         fast = sign * state[1] + state[2] ** 2 / (2.0 * limits.jerk) > limits.velocity
+        # The last ticks of the way to a signal that rests near the end of the range need no ticks to spare.
+        lands = (qd == 0.0) & (np.abs(q) <= self._reach) & (np.abs(q - self.q) <= self.NEAR)
         for astray, goal in (
             (fast, sign * limits.velocity),
-            (~self._stoppable(*state), np.zeros_like(q)),
+            (~(self._stoppable(state, sure) | lands), np.zeros_like(q)),
         ):
             held = astray & ~fits
             if held.any():

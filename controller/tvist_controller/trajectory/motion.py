@@ -193,6 +193,12 @@ class PlannedMotion(Trajectory):
         other._pace = self._pace.fork()  # noqa: SLF001  one of its own kind
         return other
 
+    def paced_at(self, rate: float) -> Self:
+        """Return a copy that has not begun, at another rate [-]."""
+        other = self.fork()
+        other.speed, other._pace = rate, Pace(self.agility, self._period, rate)  # noqa: SLF001  one of its own kind
+        return other
+
     @property
     def time(self) -> float:
         """Elapsed time of the motion, at full speed [s]."""

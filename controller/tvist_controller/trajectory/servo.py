@@ -78,6 +78,11 @@ class Servo(Guided):
         k = max(min(max(gain, GAIN[0]), GAIN[1]), DAMPED / lag**2)
         self._step = _step(k, k * lag, self._period)
 
+    def adopt(self, limits: MotionLimits) -> None:
+        """See `Guided.adopt`."""
+        self.limits = self._arm = limits
+        self._follow(self.state)
+
     def pace(self, speed: float, slowest: float | None) -> None:
         """Set the speed that is reported, and the velocity limit."""
         self.rate = speed

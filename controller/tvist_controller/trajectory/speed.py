@@ -1,6 +1,7 @@
 """What approaches of a velocity have in common: how far a change goes in a tick, and at which rates it keeps limits."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -9,7 +10,9 @@ from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 HALVINGS = 8
-"""Number of times that a change of velocity is halved if the torque does not permit it."""
+"""Number of times that a change of velocity may be halved if the torque or the joints do not permit it."""
+TRIES = 4
+"""Number of these halvings that are tried in one tick, from twice the share of the tick before on."""
 STANDING = 1e-6
 """Velocity below which all joints count as standing where a motion is taken over [rad/s]."""
 STEADY = 1e-12
@@ -45,15 +48,32 @@ class Speed(Guided):
         rate: float = 1.0,
     ) -> None:
         self._q, self._qd, self._qdd = (np.array(values, dtype=float) for values in state)
-        self._arm, self._torque, self._period = limits, torque, period
-        self.limits = MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
-        """Limits of the reference; the jerk is that of the acceleration changing its sign within a tick."""
+        self._torque, self._period = torque, period
+        self.adopt(limits)
         fastest = float(np.abs(self._qd).max())
         self._stands = fastest <= STANDING
         if self._stands:
             self._qd = np.zeros_like(self._q)
         self.rate = max(rate, min(fastest / limits.velocity, 1.0))
         self._speed, self._slowest = rate, limits.velocity
+        self._share = 1.0
+        """Share of the acceleration that was tried last [-]."""
+
+    def adopt(self, limits: MotionLimits) -> None:
+        """See `Guided.adopt`. The jerk is that of the acceleration changing its sign within a tick."""
+        self._arm = limits
+        self.limits = MotionLimits(
+            limits.velocity, limits.acceleration, 2.0 * limits.acceleration / self._period
+        )
+
+    def _shares(self, most: float = 1.0) -> Iterator[float]:
+        """Shares of the acceleration to try in a tick, at last none: no tick may take long [-]."""
+        top = min(max(2.0 * self._share, 0.5**HALVINGS), 1.0)
+        for halved in range(TRIES):
+            self._share = top * 0.5**halved
+            yield min(top, most) * 0.5**halved
+        self._share = 0.0
+        yield 0.0
 
     @property
     def state(self) -> tuple[Floats, Floats, Floats]:

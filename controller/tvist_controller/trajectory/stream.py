@@ -57,6 +57,7 @@ class SetpointStream(Trajectory):
         self.limits = limits
         """Limits of the reference."""
         self._reach = math.inf if reach is None else np.array(reach, dtype=float)
+        self._torque = torque
         self._limiter = Limiter(self._rest, limits, period, reach=reach, torque=torque)
         self._play_out: PlayOut | None = None
         self._waiting: dict[int, Floats] = {}
@@ -102,6 +103,15 @@ class SetpointStream(Trajectory):
         reference = self._limiter.follow(q, qd)
         self.limited += self._limiter.limited
         return reference
+
+    def slow_down(self, limits: MotionLimits) -> None:
+        """Keep lower limits from now on."""
+        if limits != self.limits:
+            state, self.limits = self.state, limits
+            reach = np.broadcast_to(self._reach, state[0].shape)
+            self._limiter = Limiter(
+                state[0], limits, self._period, reach=reach, torque=self._torque, state=state
+            )
 
     @property
     def finished(self) -> bool:

@@ -8,34 +8,17 @@ from tvist_controller.trajectory.guided import StuckError
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.speed import (
-    HALVINGS,
     STEADY,
     Speed,
-    fitting_rates,
     part_of,
     rise_within,
 )
 
-BENT_SHARE = 0.5
-"""Share of the joints' acceleration that the curvature of their way may use up at a constant speed [-]."""
 USED = 0.95
 """Share of the joints' acceleration that is planned with; the rest is for the curvature within a tick [-]."""
-MORE = 1e-6
-"""Share by which rounding may exceed a limit [-]."""
-LOOK = 5.0
-"""Ticks over which that curvature is measured, ahead of the tool."""
-FARTHEST_LOOK = 0.05
-"""Largest angle of a joint over which it is measured [rad]."""
-SLOWEST = 0.01
-"""Share of the commanded speed below which the tool counts as stuck [-]."""
-LOST = 1e-4
-"""Singular value of the Jacobian below which the joints cannot move the tool in its direction [m or rad per rad]."""
-CORRECTIONS = 4
-"""Largest number of Newton steps with a kept Jacobian."""
-ACCURATE = 1e-11
-"""Error of the tool's pose at which they end [m or rad]."""
-OFF = 1e-7
-"""Error of the tool's pose that is not permitted [m or rad]."""
+LOST_SHARE = 1e-3
+"""Share of a twist in lost directions above which joints that stand cannot begin it [-]."""
+FOUND, _, SINGULAR = range(3)
 
 
 class ToolKinematics(Protocol):
@@ -47,11 +30,15 @@ class ToolKinematics(Protocol):
     def jacobian(self, q: Floats) -> Floats:
         """Return the Jacobian of its velocity [m/s] and angular velocity [rad/s], shape (6, n)."""
 
-    def turned(self, rotation: Floats, angle: Floats) -> Floats:
-        """Return a rotation matrix turned about the base frame's axes by a rotation vector, shape (3,) [rad]."""
+    def inverse(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return the Jacobian, and its pseudo-inverse without the directions that are lost, shape (n, 6)."""
 
-    def turn(self, start: Floats, end: Floats) -> Floats:
-        """Return the rotation vector that turns one rotation matrix into another, shape (3,) [rad]."""
+    def straight(
+        self, inverse: Floats, joints: Floats, twists: Floats, ranges: Floats, change: Floats,
+        rate: float, speed: float, slowest: float, acceleration: float, period: float,
+        place: tuple[Floats, Floats],
+    ) -> tuple[int, float, Floats, tuple[Floats, Floats]]:  # fmt: skip
+        """Follow a straight way for a tick: whether that is possible, and rate, joints, and place of the tool then."""
 
 
 class ToolSpeed(Speed):
@@ -127,26 +114,38 @@ class ToolSpeed(Speed):
         if self.finished:
             self._step = self._qd = self._qdd = np.zeros_like(self._q)
             return self._q
-        share, found = 1.0, None
-        for attempt in range(HALVINGS + 1):
-            candidate = self._after(share if attempt < HALVINGS else 0.0)
-            if candidate is not None:
-                found = candidate
-                q, _, _ = found
-                h = self._period
-                qdd = (q - self._q - self._step) / (h * h)
-                if self._torque.allows(self._q, self._step / h, qdd):
+        h, arm, joints = self._period, self._arm, np.stack((self._q, self._step))
+        jacobian, inverse = self.kinematics.inverse(self._q + 0.5 * self._step)
+        if not self._u.any() and _exceeds(self._goal - jacobian @ (inverse @ self._goal), self._goal):
+            raise StuckError("the joints cannot move the tool in its direction from this singular posture")
+        # A joint may get faster, but for the way to zero only what lets a stop keep its velocity.
+        speed, most = np.abs(self._qd), USED * arm.acceleration
+        rise = np.minimum(rise_within(speed, arm, h), most)
+        up, down = np.where(self._qd > 0.0, rise, most), np.where(self._qd < 0.0, rise, most)
+        ranges = np.stack((-down * (h * h), up * (h * h), h * np.maximum(arm.velocity, speed)))
+        duration, present = self.duration, (self._rotation, self._position)
+        found = None
+        for share in self._shares():
+            part = part_of(duration, share * self.rate * h)
+            u = self._goal if part == 1.0 else self._u + part * (self._goal - self._u)
+            status, rate, q, place = self.kinematics.straight(
+                inverse, joints, np.stack((self._u, u)), ranges, share * h * self._most,
+                self.rate, self._speed, self._slowest, arm.acceleration, h, present,
+            )  # fmt: skip
+            if status == SINGULAR:
+                raise StuckError("the tool cannot continue in its direction near a singular posture")
+            if status == FOUND:
+                found = q, u, rate, place
+                if self._torque.allows(self._q, self._step / h, (q - self._q - self._step) / (h * h)):
                     break
-            share *= 0.5
         if found is None:
             raise StuckError("the joints' limits do not let the tool continue in its direction")
         self._take(*found)
         return self._q
 
-    def _take(self, q: Floats, u: Floats, rate: float) -> None:
-        h, mean = self._period, 0.5 * (self.rate * self._u + rate * u)
-        self._position = self._position + h * mean[:3]
-        self._rotation = self.kinematics.turned(self._rotation, h * mean[3:])
+    def _take(self, q: Floats, u: Floats, rate: float, place: tuple[Floats, Floats]) -> None:
+        h = self._period
+        self._rotation, self._position = place
         step = q - self._q
         self._qdd = (step - self._step) / (h * h)
         self._qd = step / h + 0.5 * h * self._qdd
@@ -154,87 +153,10 @@ class ToolSpeed(Speed):
         if not self._goal.any() and float(np.abs(rate * u).max()) <= STEADY:
             self._u = np.zeros(6)
 
-    def _after(self, share: float) -> tuple[Floats, Floats, float] | None:
-        """Joints, twist in its own time and rate a tick later, with a share of the acceleration; None if impossible."""
-        h, goal, arm = self._period, self._goal, self._arm
-        part = part_of(self.duration, share * self.rate * h)
-        u = goal if part == 1.0 else self._u + part * (goal - self._u)
-        middle = self._q + 0.5 * self._step
-        inverse = _inverse(self.kinematics.jacobian(middle))
-        before, after = inverse @ (0.5 * h * self.rate * self._u), inverse @ (0.5 * h * u)
-        # Joints: the step before + r after is within the velocity, and its change within the acceleration.
-        speed = np.abs(self._qd)
-        rise = rise_within(speed, arm, h)
-        most = USED * arm.acceleration
-        up = np.where(self._qd > 0.0, np.minimum(rise, most), most) * h * h
-        down = np.where(self._qd < 0.0, np.minimum(rise, most), most) * h * h
-        lowest, highest = fitting_rates(before - self._step, after, -down, up)
-        if lowest > min(highest, max(self.rate, self._speed)) or highest < 0.0:
-            return None
-        rate = min(self._wanted(u, share, after / (0.5 * h)), highest)
-        rate = max(rate, lowest, 0.0)
-        q = self._solve(self._q + before + rate * after, 0.5 * (self.rate * self._u + rate * u), inverse)
-        if q is None:
-            return None
-        step = q - self._q
-        too_fast = np.abs(step) > (1.0 + MORE) * h * np.maximum(arm.velocity, speed)
-        too_hard = np.abs(step - self._step) > (1.0 + MORE) * h * h * arm.acceleration
-        return None if (too_fast | too_hard).any() else (q, u, rate)
-
-    def _wanted(self, u: Floats, share: float, slope: Floats) -> float:
-        """Rate that the tool's acceleration and the curvature of the joints' way permit.
-
-        Args:
-            u: Twist in its own time, shape (6,).
-            share: Share of the acceleration that may be used [-].
-            slope: Velocity of the joints for that twist, shape (n,) [rad/s].
-
-        Raises:
-            StuckError: It is too low.
-        """
-        change = share * self._most * self._period
-        lowest, highest = _tool_rates(self._u * self.rate, u, change)
-        rate = min(max(self._speed, lowest), highest)
-        fastest = float(np.abs(slope).max())
-        if fastest == 0.0:
-            return rate
-        ahead = min(LOOK * self._period * max(rate, SLOWEST), FARTHEST_LOOK / fastest)
-        later = _inverse(self.kinematics.jacobian(self._q + ahead * slope)) @ u
-        bend = max(float(np.abs(later - slope).max()) / ahead, 1e-9)
-        permitted = min(
-            np.sqrt(BENT_SHARE * self._arm.acceleration / bend),
-            self._slowest / max(fastest, float(np.abs(later).max())),
-        )
-        if permitted < SLOWEST:
-            raise StuckError("the tool cannot continue in its direction near a singular posture")
-        return min(rate, float(permitted))
-
-    def _solve(self, q: Floats, mean: Floats, inverse: Floats) -> Floats | None:
-        """Correct the joints until the tool is where its mean twist leads in this tick; None if that fails."""
-        h, kinematics = self._period, self.kinematics
-        position = self._position + h * mean[:3]
-        rotation = kinematics.turned(self._rotation, h * mean[3:])
-        for correction in range(CORRECTIONS + 1):
-            present, place = kinematics.pose(q)
-            error = np.concatenate((position - place, kinematics.turn(present, rotation)))
-            off = float(np.abs(error).max())
-            if off <= ACCURATE or correction == CORRECTIONS:
-                break
-            q = q + inverse @ error
-        return q if off <= OFF else None
-
     @property
     def finished(self) -> bool:
         """Whether the tool has come to rest as commanded."""
         return not (self._goal.any() or self._u.any())
-
-
-def _inverse(jacobian: Floats) -> Floats:
-    """Pseudo-inverse of a Jacobian, which leaves out the directions that are lost, shape (n, 6)."""
-    left, values, right = np.linalg.svd(jacobian, full_matrices=False)
-    kept = values > LOST
-    inverse: Floats = (right[kept].T / values[kept]) @ left[:, kept].T
-    return inverse
 
 
 def _sizes(twist: Floats) -> Floats:
@@ -242,6 +164,6 @@ def _sizes(twist: Floats) -> Floats:
     return np.array((np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])))
 
 
-def _tool_rates(present: Floats, u: Floats, change: Floats) -> tuple[float, float]:
-    """Rates at which no component of the twist differs from the present one by more than its permitted change."""
-    return fitting_rates(-present, u, -change, change)
+def _exceeds(lost: Floats, twist: Floats) -> bool:
+    """Return whether what is lost of a twist is more than rounding and what a nearly singular posture costs."""
+    return float(np.abs(lost).max()) > LOST_SHARE * float(np.abs(twist).max())

@@ -26,6 +26,14 @@ def over_all(heard: Sequence[Telemetry]) -> dict[str, float]:
     }
 
 
+def missed_share(heard: Sequence[Telemetry]) -> float:
+    """Share of the ticks due between the first and the last telemetry message that were missed [-]; NaN for none."""
+    if not heard or heard[0].due_ticks is None or heard[-1].due_ticks is None:
+        return float("nan")
+    due = heard[-1].due_ticks - heard[0].due_ticks
+    return (heard[-1].missed_ticks - heard[0].missed_ticks) / due if due else float("nan")
+
+
 def _bound(p50: np.ndarray[Any, Any], p99: np.ndarray[Any, Any], largest: np.ndarray[Any, Any]) -> float:
     limits = np.unique(np.concatenate([p50, p99, largest]))
     for limit in limits:

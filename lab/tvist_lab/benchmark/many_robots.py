@@ -10,6 +10,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from tvist_client.transports.session import close_session, open_session
+from tvist_lab.benchmark.lateness import missed_share
 from tvist_lab.benchmark.process import cpu_seconds
 from tvist_lab.served import ServedError, served
 from tvist_protocol import keys
@@ -106,12 +107,7 @@ async def worst_share(number: int, seconds: float) -> float:
             await asyncio.to_thread(close_session, session)
     except (TimeoutError, ServedError):
         return 1.0  # under too much load it does not even answer in time
-    return max(_share(told[SETTLE:]) for told in heard.values())
-
-
-def _share(told: list[Telemetry]) -> float:
-    first, last = told[0], told[-1]
-    return (last.missed_ticks - first.missed_ticks) / max(1, last.tick - first.tick)
+    return max(missed_share(told[SETTLE:]) for told in heard.values())
 
 
 def _ignore(_: zenoh.Sample) -> None:

@@ -11,9 +11,11 @@ from contextlib import asynccontextmanager, nullcontext
 import numpy as np
 
 from tvist_lab.benchmark.in_turn import mean_and_interval
+from tvist_lab.benchmark.lateness import missed_share
 from tvist_lab.benchmark.readers import readers
 from tvist_lab.served import Served, served
 from tvist_plant.plant import PERIOD
+from tvist_protocol.stream import Telemetry
 
 SEGMENT = 4.0
 """Duration of a segment [s]: shorter than Zenoh's lease, so that a robot which is halted meanwhile loses no client."""
@@ -41,7 +43,7 @@ async def on_time(minutes: float, tell: Callable[[str], None]) -> dict[str, dict
         tell: Called with a description of each measurement before it starts.
 
     Returns:
-        For each, in percent of the ticks: missed ones of the bare thread and of the robot, the mean difference over
+        For each, in percent of the ticks due: missed ones of the bare thread and of the robot, the mean difference over
         pairs, and the upper end of its 95 % interval (Student).
     """
     pairs = max(2, round(60.0 * minutes / (2.0 * SEGMENT)))
@@ -82,12 +84,15 @@ async def _in_turn(
 
 
 async def _robot_missed(server: Served) -> float:
-    """Percentage of a segment's ticks that the robot missed."""
+    """Percentage of the ticks due in a segment that the robot missed."""
     await server.robot.advance(SETTLE_TICKS)
-    before = await server.robot.state()
+    heard: list[Telemetry] = []
+    forget = server.robot.on_telemetry(heard.append)
     await server.robot.advance(round(SEGMENT / PERIOD))
-    after = await server.robot.state()
-    return 100.0 * (after.missed_ticks - before.missed_ticks) / (after.tick - before.tick)
+    while len(heard) < 2:  # it comes once a second
+        await server.robot.advance(SETTLE_TICKS)
+    forget()
+    return 100.0 * missed_share(heard)
 
 
 @asynccontextmanager

@@ -12,7 +12,7 @@ import numpy as np
 
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
-from tvist_lab.benchmark.lateness import over_all
+from tvist_lab.benchmark.lateness import missed_share, over_all
 from tvist_lab.benchmark.process import cpu_seconds, rss_mb
 from tvist_lab.served import Served, served
 from tvist_plant.plant import PERIOD
@@ -74,7 +74,13 @@ async def punctuality(server: Served, seconds: float) -> tuple[dict[str, float],
     missed = (await robot.state()).missed_ticks - missed_before
     for function in forget:
         function()
-    return {"seconds": seconds, "missed": missed, "states_received": states, **over_all(heard)}, share
+    return {
+        "seconds": seconds,
+        "missed": missed,
+        "states_received": states,
+        "missed_percent": 100.0 * missed_share(heard),
+        **over_all(heard),
+    }, share
 
 
 async def _setpoints(robot: Robot, arm: Arm, seconds: float) -> list[float]:

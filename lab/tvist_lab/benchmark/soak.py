@@ -19,7 +19,7 @@ from mcap.reader import make_reader
 from tvist_client.arm import Arm
 from tvist_client.errors import StreamStoppedError
 from tvist_client.servo import Servo
-from tvist_lab.benchmark.lateness import over_all
+from tvist_lab.benchmark.lateness import missed_share, over_all
 from tvist_lab.benchmark.process import cpu_seconds, rss_mb
 from tvist_lab.benchmark.readers import readers
 from tvist_lab.served import Served, served
@@ -85,7 +85,7 @@ class _Watch:
             "minutes": self._seconds / 60.0,
             "ticks": ticks,
             "missed": missed,
-            "missed_percent": 100.0 * missed / ticks,
+            "missed_percent": 100.0 * missed_share(self._heard),
             **over_all(self._heard),
             "rss_mb_warm": first,
             "rss_mb": at_end,

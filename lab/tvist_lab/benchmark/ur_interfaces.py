@@ -84,7 +84,7 @@ async def ur_interfaces(seconds: float, tell: Callable[[str], None]) -> dict[str
         "further_client_bare_ratio": further_cost / bare,
         "missed": missed,
         "missed_without_clients": missed_alone,
-        "missed_percent": 100.0 * missed * PERIOD / (part * ROUNDS),
+        "missed_percent": statistics.fmean(tick["missed_percent"] for tick in ticks),
         "late_p50_us": statistics.median(tick["late_p50_us"] for tick in ticks),
         "late_p99_us": statistics.median(tick["late_p99_us"] for tick in ticks),
         "samples_received": sum(one["received"] for one in said),

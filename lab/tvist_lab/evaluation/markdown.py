@@ -20,7 +20,7 @@ def page(result: dict[str, Any], command: str) -> str:
     arms = list(result["arms"])
     return f"""# ShaperBench
 
-This page was made by
+Measured on {result["date"]} by
 
 ```sh
 {command}

@@ -81,7 +81,10 @@ def read_moves(path: Path, description: RobotDescription, masses: Callable[[], f
         for entry in entries
     ]
     for number, move in enumerate(moves, 1):
-        _check(number, move, description)
+        try:
+            _check(number, move, description)
+        except MovesError as error:
+            raise MovesError(f"moves {path}: {error}") from error
     return moves
 
 

@@ -22,7 +22,6 @@ from tvist_lab.figures.robustness import robustness_figure
 from tvist_lab.figures.sensitivity import figure_4
 from tvist_lab.figures.settling_times import figure_15
 from tvist_lab.figures.sweep import sweep_figure
-from tvist_lab.figures.tick import tick_figure
 from tvist_lab.figures.workspace_map import workspace_map_figure
 
 __all__ = [
@@ -55,7 +54,6 @@ __all__ = [
     "settling_against_delay_figure",
     "settling_figure",
     "sweep_figure",
-    "tick_figure",
     "vibration_figure",
     "workspace_map_figure",
 ]

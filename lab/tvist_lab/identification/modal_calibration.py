@@ -22,8 +22,10 @@ from tvist_lab.identification.modal_plan import LEAST, ModalPlan
 from tvist_lab.identification.ring_downs import Ringing
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.workspace import identified, ranges
+from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration, ModalModel, Provenance, RingDownFit, Spread
 from tvist_protocol.info import Info
+from tvist_shaping.estimators.drivetrain import Drivetrain
 
 CONTRADICTION = 0.2
 """A ring-down contradicts the others if this share of it is explained only by its own poles [-]."""
@@ -73,7 +75,7 @@ def calibrate(
         [np.ravel(describe(fit.drivetrain.poles(arm.mass(r.q, r.payload))[0][:1])) for r in ringings]
     )
     noise = float(np.sqrt(np.mean([r.noise**2 for r in ringings])))
-    f_d_min, zeta_max = _range(arm, fit, info.limits.payload)
+    f_d_min, zeta_max = mode_range(arm.description, fit.drivetrain)
     model = ModalModel(
         parameters=arm.parameters(fit.logarithms, fit.deviations),
         f_d_min=f_d_min,
@@ -175,14 +177,19 @@ def _cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -
     return errors
 
 
-def _range(arm: ArmModes, fit: ModalFit, rated: float) -> tuple[float, float]:
-    """Lowest f_d and highest ζ that a filter has to support, with a margin."""
-    description = arm.description
+def mode_range(description: RobotDescription, drivetrain: Drivetrain) -> tuple[float, float]:
+    """Lowest f_d and highest ζ that a filter has to support up to the rated payload, with a margin.
+
+    Args:
+        description: The robot.
+        drivetrain: Its springs and drives.
+    """
     everywhere = identified(ranges(description)).spread(WORKSPACE, description.joints, 0)
     lowest, highest = np.inf, 0.0
-    whole = ArmModes(description, (paper_payload(description, 0.0), paper_payload(description, rated)))
+    payloads = [paper_payload(description, mass) for mass in (0.0, description.limits.payload)]
+    whole = ArmModes(description, payloads)
     for payload in range(2):
         for q in everywhere:
-            f_d, zeta = describe(fit.drivetrain.poles(whole.mass(q, payload))[0][:MODES])
+            f_d, zeta = describe(drivetrain.poles(whole.mass(q, payload))[0][:MODES])
             lowest, highest = min(lowest, float(f_d.min())), max(highest, float(zeta.max()))
     return MARGIN * lowest, 1.0 - MARGIN * (1.0 - highest)

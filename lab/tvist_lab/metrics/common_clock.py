@@ -9,6 +9,7 @@ from scipy.signal import hilbert
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.felt import felt
 from tvist_lab.metrics.motion import DIFFERENTIATOR_TICKS, MotionRows
+from tvist_lab.metrics.ring_down import fit_ring_down
 from tvist_lab.metrics.vibration import amplitude, band_pass, best_tool_acceleration, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
 
@@ -21,6 +22,8 @@ NOISE_PEAK = 5.0
 """Largest |α| that noise reaches in some seconds, over its rms in one axis [-]."""
 NOISE_TAIL = 0.2
 """Time at the end of a rest in which the sensor shows its noise [s]."""
+RINGS = 0.5
+"""Share of a signal's energy that one mode explains if it is an arm that rings, and not noise [-]."""
 
 Kinematics = Callable[[Floats], tuple[Floats, Floats]]
 """Converts joint angles, shape (n,) [rad], to the flange's position, shape (3,) [m], and rotation, shape (3, 3)."""
@@ -86,8 +89,15 @@ def still_after(recording: Recording, motion: MotionRows, threshold: float = STI
     time, alpha_xyz = felt(recording, motion, slice(motion.start, motion.end), smooth=True)
     alpha = amplitude(alpha_xyz)
     if recording.foreign and (noise := _noise(time, alpha_xyz)) * NOISE_PEAK > threshold:
+        tail = time >= time[-1] - 2.0 * NOISE_TAIL
+        window = {"time": time[tail] - time[tail][0], "skip": 0.0, "window": 2.0 * NOISE_TAIL}
+        rings = (
+            fit_ring_down(alpha_xyz[tail], recording.period, modes=2, offset=True, **window).r_squared > RINGS
+        )
         raise NotMeasurableError(
-            f"the sensor's noise of {noise:.3f} m/s² rms alone exceeds {threshold:g} m/s²"
+            f"the arm still rang with {noise:.3f} m/s² rms when the rest ended"
+            if rings
+            else f"the sensor's noise of {noise:.3f} m/s² rms alone exceeds {threshold:g} m/s²"
         )
     loud = np.flatnonzero(alpha > threshold)
     if not loud.size:

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from tvist_lab.metrics.vibration import low_pass_at
 from tvist_lab.recordings import Floats, Recording
@@ -11,6 +12,14 @@ SMOOTHED = 20.0
 """Cut-off frequency of the angles before they are differentiated [Hz]."""
 SLOW = 0.01
 """A joint that is slower than this may be at rest [rad/s]."""
+FAST = 2.0
+"""Smallest speed that a motion must reach, over the one that ends it [-]."""
+SWING = 0.5
+"""Time before and after a fast motion in which the arm swings back from its overshoot [s]."""
+SWUNG = 0.02
+"""Largest speed of a joint that swings back, over the fastest one within that time [-]."""
+DRIVEN = 0.15
+"""Longest time after a stop in which joints may still be driven [s]."""
 PAUSE = 0.1
 """Rests shorter than this belong to a motion, as at a reversal or while the arm vibrates [s]."""
 SMALLEST = 0.005
@@ -21,20 +30,23 @@ TAPER = 0.03
 """Longest time for which a joint may have moved below `SLOW` before and after [s]."""
 
 
-def measured_spans(recording: Recording) -> list[tuple[int, int]]:
-    """First and last row of each motion of `actual_q`, in order.
+def measured_spans(recording: Recording, name: str = "actual_q") -> list[tuple[int, int]]:
+    """First and last row of each motion of joint angles that are never quite at rest, in order.
 
-    A joint moves while its speed exceeds 0.01 rad/s, or six times what the encoders' noise adds. Start and stop are
-    then shifted outwards by the time in which a speed that changes steadily reaches this threshold, at most 30 ms.
+    A joint moves while its speed exceeds 0.01 rad/s, or six times what the encoders' noise adds, or 2 % of the fastest
+    speed within half a second, so that swinging back belongs to no motion. Each motion must reach twice that speed.
+    Start and stop are then shifted outwards by the time in which a speed that changes steadily reaches this threshold,
+    at most 30 ms.
     """
-    seen = np.flatnonzero(np.isfinite(recording["actual_q"]).all(axis=1))
+    seen = np.flatnonzero(np.isfinite(recording[name]).all(axis=1))
     if len(seen) < FEWEST:
         return []
-    time, measured = recording.time[seen], recording["actual_q"][seen]
+    time, measured = recording.time[seen], recording[name][seen]
     q = low_pass_at(time, measured, recording.period, SMOOTHED)
     velocity = np.asarray(np.gradient(q, time, axis=0))
     speed = np.max(np.abs(velocity), axis=1)
-    threshold = max(SLOW, 6.0 * _noise_of_speed(measured, recording.period))
+    least = max(SLOW, 6.0 * _noise_of_speed(measured, recording.period))
+    threshold = np.maximum(least, SWUNG * maximum_filter1d(speed, 2 * round(SWING / recording.period) + 1))
     rows = np.flatnonzero(speed > threshold)
     if not rows.size:
         return []
@@ -42,12 +54,42 @@ def measured_spans(recording: Recording) -> list[tuple[int, int]]:
     spans = []
     for run in np.split(rows, breaks + 1):
         first, last = int(run[0]), int(run[-1])
-        if np.max(np.abs(q[last] - q[first])) < SMALLEST:
+        if np.max(np.abs(q[last] - q[first])) < SMALLEST or np.max(speed[run] / threshold[run]) < FAST:
             continue
+        last = first + int(
+            np.flatnonzero(_onwards(q, velocity, first, last) > threshold[first : last + 1])[-1]
+        )
         first_row = np.searchsorted(time, time[first] - _taper(time, speed, first, 1))
         last_row = np.searchsorted(time, time[last] + _taper(time, speed, last, -1))
         spans.append((int(seen[max(first_row, 1)]), int(seen[min(last_row, len(time) - 1)])))
     return spans
+
+
+def still_driven(recording: Recording, start: int, stop: int) -> float:
+    """Time after the row of a stop for which the measured joints are faster than 2 % of the motion's speed [s]."""
+    past = int(np.searchsorted(recording.time, recording.time[stop] + DRIVEN + PAUSE))
+    rows = slice(start, past)
+    if (
+        "actual_q" not in recording
+        or not np.isfinite(recording["actual_q"][rows]).all()
+        or past - start < FEWEST
+    ):
+        return 0.0
+    time = recording.time[rows]
+    q = low_pass_at(time, recording["actual_q"][rows], recording.period, SMOOTHED)
+    speed = np.max(np.abs(np.gradient(q, time, axis=0)), axis=1)
+    fast = time[speed > SWUNG * np.max(speed)] - recording.time[stop]
+    return float(np.max(fast[fast <= DRIVEN], initial=0.0))
+
+
+def _onwards(q: Floats, velocity: Floats, first: int, last: int) -> Floats:
+    """Speed towards the end of a motion, negative where the arm swings back [rad/s]; of one to and fro, the speed."""
+    joint = int(np.argmax(np.abs(q[last] - q[first])))
+    way, travelled = q[last, joint] - q[first, joint], np.sum(np.abs(np.diff(q[first : last + 1, joint])))
+    rates = velocity[first : last + 1]
+    return np.asarray(
+        rates[:, joint] * np.sign(way) if abs(way) > 0.9 * travelled else np.max(np.abs(rates), axis=1)
+    )
 
 
 def _noise_of_speed(q: Floats, period: float) -> float:

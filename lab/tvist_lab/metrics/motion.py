@@ -1,5 +1,6 @@
 """Detection of motions in a recording."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tvist_lab.metrics.measured_motion import measured_spans
+from tvist_lab.metrics.measured_motion import SMALLEST, measured_spans
 from tvist_lab.metrics.servo_lag import servo_lag
 from tvist_lab.recordings import Floats, Recording
 
@@ -19,6 +20,12 @@ TICK = 0.002
 """Time in which that change counts as a jump [s]; more in a log with longer ticks."""
 REST = 0.02
 """A reference that rests for less than this, as in a reversal, is still in the same motion [s]."""
+AT_REST = 1e-6
+"""A target speed below this is at rest, in a log of another controller [rad/s]."""
+MOSTLY = 0.98
+"""Share of rows in motion from which on a target's speed is never zero: it is measured [-]."""
+TINY = 5e-4
+"""Largest way of a joint that only trembles [rad]."""
 EARLY = 0.05
 """Time before a motion found in the measured angles that does not count as rest any more [s]."""
 DIFFERENTIATOR_TICKS = 1
@@ -75,8 +82,9 @@ def motions(recording: Recording) -> list[MotionRows]:
     """Find the motions of a recording, in order.
 
     They are taken from the events `motion_started`, `motion_done` and `motion_stopped` if there are any, otherwise
-    from the reference itself, and in a log without reference from the target or the measured angles. Motions without
-    any movement are left out.
+    from the reference itself, and in a log without reference from the target's speed, the target or the measured
+    angles: many robots publish the measured angles as a target while they rest. Motions without any movement are left
+    out, and in logs of other controllers those of less than 5 mrad wherever noise could be taken for one.
 
     Raises:
         RecordingError: There is neither `reference_q` nor `target_q` nor `actual_q`.
@@ -84,18 +92,27 @@ def motions(recording: Recording) -> list[MotionRows]:
     if len(recording) < 2:
         return []
     if "target_q" not in recording:
-        return _measured_motions(recording)
+        return _measured_motions(recording, "actual_q")
     step = _step_per_tick(recording, "reference_q" if "reference_q" in recording else "target_q")
     jump = JUMP * recording.period / TICK if recording.foreign else JUMP
     moving = (step > MOVING) & (step <= jump)
+    target_moving = _step_per_tick(recording, "target_q") > MOVING
+    driven = _driven(recording)
+    if driven is not None:
+        moving = target_moving = driven
     spans = _spans_of_events(recording) or _spans_of_reference(recording, moving)
+    if recording.foreign and "reference_q" not in recording:
+        large = [span for span in spans if _displacement(recording, *span[:2]) >= SMALLEST]
+        covered = sum(past - first for first, past, *_ in spans) / len(recording)
+        if driven is None and (covered > MOSTLY or _trembles(recording, spans)):
+            return _measured_motions(recording, "target_q")
+        spans = spans if driven is None else large
     found: list[MotionRows] = []
     for lo, hi, identifier, stopped in spans:
         rows = lo + np.flatnonzero(moving[lo:hi])
         if rows.size:
             found.append(MotionRows(int(rows[0]) - 1, int(rows[-1]), 0, 0, identifier, stopped))
     jumps = np.flatnonzero(step > jump)
-    target_moving = _step_per_tick(recording, "target_q") > MOVING
     for index, motion in enumerate(found):
         end = found[index + 1].start + 1 if index + 1 < len(found) else len(recording)
         end = min([end, *jumps[jumps > motion.start]])
@@ -106,8 +123,28 @@ def motions(recording: Recording) -> list[MotionRows]:
     return found
 
 
-def _measured_motions(recording: Recording) -> list[MotionRows]:
-    spans = measured_spans(recording)
+def _driven(recording: Recording) -> NDArray[np.bool_] | None:
+    """Rows in which the target's speed is not zero, if another controller's log has it and it is zero at rest."""
+    if not recording.foreign or "reference_q" in recording or "target_qd" not in recording:
+        return None
+    moving = np.asarray((np.abs(recording["target_qd"]) > AT_REST).any(axis=1))
+    moving[0] = False
+    return moving if moving.any() and np.mean(moving) < MOSTLY else None
+
+
+def _displacement(recording: Recording, first: int, past: int) -> float:
+    """Largest way of a joint in some rows of the target [rad]."""
+    return float(np.max(np.ptp(recording["target_q"][first - 1 : past], axis=0), initial=0.0))
+
+
+def _trembles(recording: Recording, spans: Sequence[tuple[int, int, Any, bool]]) -> bool:
+    """Return whether the target changes at rest as measured angles do: most of its motions are tiny."""
+    tiny = [_displacement(recording, *span[:2]) < TINY for span in spans]
+    return sum(tiny) > max(1, len(tiny) // 4)
+
+
+def _measured_motions(recording: Recording, name: str) -> list[MotionRows]:
+    spans = measured_spans(recording, name)
     found = []
     for (first, last), following in zip_longest(spans, spans[1:]):
         end = len(recording)

@@ -1,9 +1,10 @@
 """(f_d, ζ) of the mode that vibrates after a stop, from the three axes of the tool's accelerometer."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import solve_toeplitz
 from scipy.optimize import least_squares
 
 from tvist_lab.recordings import Floats
@@ -28,22 +29,44 @@ SIGNIFICANT = 36.0
 """Gain of n ln SSE that noise reaches by chance in less than one fit of a hundred, at 100 to 500 Hz [-]."""
 CORRELATED = 0.02
 """Time over which the residual of a fit may be correlated, as of an unmodelled mode [s]."""
+COLOURS = 4
+"""Order of the autoregression that describes the spectrum of a residual."""
 
 
 @dataclass(frozen=True)
-class RingDown:
-    """A damped sine fitted to a ring-down; if `ok` is false, its values must not be used."""
+class Mode:
+    """A damped sine."""
 
     f_d: float
-    """Damped frequency of the selected mode [Hz]."""
+    """Damped frequency [Hz]."""
     zeta: float
-    """Damping ratio of the mode [-]."""
+    """Damping ratio [-]."""
     amplitude: float
     """Largest |α| of the mode at the stop [m/s²]."""
     f_d_error: float
     """Standard error of f_d [Hz]."""
     zeta_error: float
     """Standard error of ζ [-]."""
+
+    @property
+    def f_d_interval(self) -> tuple[float, float]:
+        """Interval that contains the true f_d with a probability of 95 % [Hz]."""
+        return _interval(self.f_d, self.f_d_error)
+
+    @property
+    def zeta_interval(self) -> tuple[float, float]:
+        """Interval that contains the true ζ with a probability of 95 % [-]."""
+        return _interval(self.zeta, self.zeta_error)
+
+    def amplitude_at(self, time: float) -> float:
+        """Largest |α| of the mode some time after the stop [m/s²]."""
+        return self.amplitude * math.exp(-decay_rate(self.f_d, self.zeta) * time)
+
+
+@dataclass(frozen=True)
+class RingDown(Mode):
+    """The mode selected in a ring-down; if `ok` is false, its values must not be used."""
+
     rms: float
     """rms of the residual of the fit, over all axes [m/s²]."""
     r_squared: float
@@ -56,16 +79,8 @@ class RingDown:
     """Whether the mode is measurable."""
     reason: str = ""
     """Why it is not measurable, for people."""
-
-    @property
-    def f_d_interval(self) -> tuple[float, float]:
-        """Interval that contains the true f_d with a probability of 95 % [Hz]."""
-        return _interval(self.f_d, self.f_d_error)
-
-    @property
-    def zeta_interval(self) -> tuple[float, float]:
-        """Interval that contains the true ζ with a probability of 95 % [-]."""
-        return _interval(self.zeta, self.zeta_error)
+    found: tuple[Mode, ...] = ()
+    """All modes, the strongest at the stop first."""
 
 
 def fit_ring_down(
@@ -111,21 +126,21 @@ def fit_ring_down(
     else:
         first = int(np.searchsorted(time, skip - 1e-9))
         late = time[first:]
-    ring = _Ring(alpha[first:], late, period, (*slow_poles, 0.0) if offset else slow_poles, share, evidence)
+    ring = Ring(alpha[first:], late, period, (*slow_poles, 0.0) if offset else slow_poles, share, evidence)
     if window is not None:
         return ring.cut(window).fit(modes)
     if ring.length < WINDOWS[0]:
-        return _not_measurable(
+        return not_measurable(
             f"only {ring.length:.3f} s were recorded after the stop, {WINDOWS[0]} s are needed"
         )
     fit = ring.cut(WINDOW).fit(modes)
-    sigma = _sigma(fit.f_d, fit.zeta)
+    sigma = decay_rate(fit.f_d, fit.zeta)
     audible = math.log(max(fit.amplitude / max(fit.rms, 1e-12), 2.0)) / sigma
     chosen = min(max(audible, WINDOWS[0]), WINDOWS[1])
     return ring.cut(chosen).fit(modes) if chosen != fit.window else fit
 
 
-class _Ring:
+class Ring:
     """A ring-down and the projection that eliminates its amplitudes."""
 
     def __init__(
@@ -134,8 +149,8 @@ class _Ring:
         time: Floats,
         period: float,
         slow_poles: tuple[float, ...],
-        share: float,
-        evidence: float | None,
+        share: float = 1.0,
+        evidence: float | None = None,
     ) -> None:
         self.alpha, self.time = alpha, time
         self.share, self.evidence = share, evidence
@@ -145,10 +160,10 @@ class _Ring:
         self.highest = min(FREQUENCIES[1], 0.45 / period)
         self._slow = [np.exp(-pole * time) for pole in slow_poles]
 
-    def cut(self, window: float) -> "_Ring":
+    def cut(self, window: float) -> "Ring":
         """Return the first part of the ring-down."""
         past = int(np.searchsorted(self.time, self.time[0] + window - 0.5 * self.period))
-        return _Ring(
+        return Ring(
             self.alpha[:past], self.time[:past], self.period, self.slow_poles, self.share, self.evidence
         )
 
@@ -156,7 +171,7 @@ class _Ring:
         """Columns of the linear part for (f_d, ζ) of each mode, shape (T, 2 modes + slow poles)."""
         columns = []
         for f_d, zeta in parameters.reshape(-1, 2):
-            decay = np.exp(-_sigma(f_d, zeta) * self.time)
+            decay = np.exp(-decay_rate(f_d, zeta) * self.time)
             phase = 2.0 * np.pi * f_d * self.time
             columns += [decay * np.cos(phase), decay * np.sin(phase)]
         return np.column_stack(columns + self._slow)
@@ -187,17 +202,38 @@ class _Ring:
             for zeta in (0.04, 0.12, 0.3)
         ]
         starts = sorted(grid)[:3]
-        fits = [self._refine(np.append(parameters, [f_d, zeta])) for _, f_d, zeta in starts]
+        fits = [self.refine(np.append(parameters, [f_d, zeta])) for _, f_d, zeta in starts]
         return min(fits, key=lambda fit: fit[0])[1]
 
-    def _refine(self, start: Floats) -> tuple[float, Floats]:
+    def refine(self, start: Floats) -> tuple[float, Floats]:
+        """Half the sum of squares that is left, and (f_d, ζ) of each mode, searched from a starting point."""
         count = start.size // 2
         lower = np.tile([FREQUENCIES[0], DAMPING[0]], count)
         upper = np.tile([self.highest, DAMPING[1]], count)
         fit = least_squares(
-            self.unexplained, start, bounds=(lower, upper), x_scale=np.tile([1.0, 0.03], count), max_nfev=60
-        )
+            self.unexplained, start, jac=self._jacobian, bounds=(lower, upper),
+            x_scale=np.tile([1.0, 0.03], count), max_nfev=60,
+        )  # fmt: skip
         return float(fit.cost), np.asarray(fit.x)
+
+    def _jacobian(self, parameters: Floats) -> Floats:
+        """Derivatives of the residual (Kaufman, BIT 15, 1975), shape (3 T, P)."""
+        basis = self.basis(parameters)
+        orthonormal, triangle = np.linalg.qr(basis)
+        weights = np.linalg.lstsq(triangle, orthonormal.T @ self.alpha)[0]
+        columns = []
+        for k, (f_d, zeta) in enumerate(parameters.reshape(-1, 2)):
+            turning, quarter = basis[:, 2 * k : 2 * k + 2], [[0.0, 1.0], [-1.0, 0.0]]
+            wave = turning @ weights[2 * k : 2 * k + 2]
+            ahead = turning @ quarter @ weights[2 * k : 2 * k + 2]
+            rate = decay_rate(f_d, zeta)
+            for slope in (
+                2.0 * np.pi * ahead - rate / f_d * wave,
+                -rate / (zeta * (1.0 - zeta * zeta)) * wave,
+            ):
+                change = self.time[:, None] * slope
+                columns.append((orthonormal @ (orthonormal.T @ change) - change).ravel())
+        return np.column_stack(columns)
 
     def _pays(self, fewer: Floats, more: Floats) -> bool:
         """Return whether another mode explains more than noise would."""
@@ -207,54 +243,66 @@ class _Ring:
         wanted = added * math.log(samples) if self.evidence is None else self.evidence
         return bool(samples * math.log(before / after) > wanted)
 
-    def _judge(self, parameters: Floats) -> RingDown:
-        """Return the selected mode, its standard errors, and whether they are small enough."""
+    def modes_at(self, parameters: Floats) -> tuple[list[Mode], Floats]:
+        """Modes with their amplitudes and standard errors, and what they leave of the signal, shape (T, 3)."""
         weights, *_ = np.linalg.lstsq(self.basis(parameters), self.alpha)
         left = self.unexplained(parameters)
-        count = parameters.size // 2
-        amplitudes = [float(np.linalg.norm(weights[2 * k : 2 * k + 2], ord=2)) for k in range(count)]
-        loud = np.flatnonzero(np.array(amplitudes) >= self.share * max(amplitudes))
-        counts = int(min(loud, key=lambda k: parameters[2 * k]))
-        f_d, zeta = parameters.reshape(-1, 2)[counts]
-        errors = self._standard_errors(parameters, left, weights.size)[2 * counts : 2 * counts + 2]
+        errors = self._standard_errors(parameters, left, weights.size).reshape(-1, 2)
+        modes = [
+            Mode(
+                float(f_d), float(zeta), float(np.linalg.norm(weights[2 * k : 2 * k + 2], ord=2)),
+                float(errors[k, 0]), float(errors[k, 1]),
+            )
+            for k, (f_d, zeta) in enumerate(parameters.reshape(-1, 2))
+        ]  # fmt: skip
+        return modes, left.reshape(self.alpha.shape)
+
+    def _judge(self, parameters: Floats) -> RingDown:
+        """Return the selected mode, its standard errors, and whether they are small enough."""
+        modes, left = self.modes_at(parameters)
+        loudest = max(mode.amplitude for mode in modes)
+        mode = min((m for m in modes if m.amplitude >= self.share * loudest), key=lambda m: m.f_d)
         energy = float(np.sum(self.alpha**2))
-        rms = float(np.sqrt(np.mean(left**2)))
         fit = RingDown(
-            f_d=float(f_d),
-            zeta=float(zeta),
-            amplitude=amplitudes[counts],
-            f_d_error=float(errors[0]),
-            zeta_error=float(errors[1]),
-            rms=rms,
+            **vars(mode),
+            rms=float(np.sqrt(np.mean(left**2))),
             r_squared=1.0 - float(np.sum(left**2)) / energy if energy > 0.0 else 0.0,
             window=self.length,
-            modes=count,
+            modes=len(modes),
             ok=True,
+            found=tuple(sorted(modes, key=lambda one: -one.amplitude)),
         )
         reason = _objection(fit, self.highest)
-        return RingDown(**{**vars(fit), "ok": not reason, "reason": reason})
+        return replace(fit, ok=not reason, reason=reason)
 
     def _standard_errors(self, parameters: Floats, left: Floats, linear: int) -> Floats:
         """Return the standard errors of each mode's f_d and ζ, from the Jacobian without the amplitudes' share.
 
-        A residual that is correlated in time, as of a mode that was not fitted, has a larger error than white noise:
-        the larger one of both counts (Newey and West, Econometrica 55, 1987, Bartlett's weights).
+        A residual that is correlated in time, as of a filtered sensor or a mode that was not fitted, has a larger error
+        than white noise. The larger one counts of what the residual's spectrum says at each mode's frequency, and of
+        what its correlation does (Newey and West, Econometrica 55, 1987, Bartlett's weights).
         """
-        step = np.tile([1e-4, 1e-5], parameters.size // 2)
-        jacobian = np.column_stack(
-            [
-                (self.unexplained(parameters + d) - self.unexplained(parameters - d)) / (2.0 * np.sum(d))
-                for d in np.diag(step)
-            ]
-        )
+        jacobian = self._jacobian(parameters)
         freedom = max(left.size - parameters.size - linear, 1)
         information = jacobian.T @ jacobian
         if not np.linalg.cond(information) < 1e14:
             return np.full(parameters.size, np.inf)
         inverse = np.linalg.inv(information)
-        white = np.diag(inverse) * float(left @ left) / freedom
+        coloured = np.repeat(self.colour(left, parameters[::2]), 2)
+        white = np.diag(inverse) * float(left @ left) / freedom * coloured
         correlated = np.diag(inverse @ self._score_covariance(jacobian, left) @ inverse) * left.size / freedom
         return np.asarray(np.sqrt(np.maximum(white, correlated)))
+
+    def colour(self, left: Floats, frequencies: Floats) -> Floats:
+        """Power of a residual at some frequencies over that of white noise, at least 1, by autoregression."""
+        left = left.reshape(self.alpha.shape)
+        lags = np.array([float(np.sum(left[lag:] * left[: len(left) - lag])) for lag in range(COLOURS + 1)])
+        if len(left) < 8 * COLOURS or lags[0] <= 0.0:
+            return np.ones(len(frequencies))
+        filtered = solve_toeplitz(lags[:-1] + lags[0] * 1e-6 * (np.arange(COLOURS) == 0), lags[1:])
+        turns = np.exp(-2j * np.pi * np.outer(frequencies * self.period, np.arange(1, COLOURS + 1)))
+        innovation = (lags[0] - float(filtered @ lags[1:])) / lags[0]
+        return np.asarray(np.maximum(innovation / np.abs(1.0 - turns @ filtered) ** 2, 1.0))
 
     def _score_covariance(self, jacobian: Floats, left: Floats) -> Floats:
         """Covariance of the residual's share in the direction of each parameter, shape (P, P)."""
@@ -268,7 +316,7 @@ class _Ring:
         return np.asarray(total)
 
 
-def _sigma(f_d: float, zeta: float) -> float:
+def decay_rate(f_d: float, zeta: float) -> float:
     """Decay rate of a mode [1/s]."""
     return float(2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta * zeta))
 
@@ -295,6 +343,7 @@ def _objection(fit: RingDown, highest: float) -> str:
     return ""
 
 
-def _not_measurable(reason: str) -> RingDown:
+def not_measurable(reason: str) -> RingDown:
+    """Return a ring-down of which nothing may be used, and why."""
     nan = math.nan
     return RingDown(nan, nan, nan, nan, nan, nan, nan, nan, 0, ok=False, reason=reason)

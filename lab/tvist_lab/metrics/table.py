@@ -6,12 +6,14 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
+from tvist_lab.metrics.agreed_modes import agreed_modes, lighter_beside
 from tvist_lab.metrics.common_clock import peak_acceleration, still_after, vibration_after_stop
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.felt import felt
+from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.residual import Residual, residual
-from tvist_lab.metrics.ring_down import SIGNIFICANT, SKIP, SLOW_POLE, RingDown, fit_ring_down
+from tvist_lab.metrics.ring_down import SIGNIFICANT, SKIP, SLOW_POLE, Mode, RingDown, fit_ring_down
 from tvist_lab.metrics.servo_lag import servo_lag
 from tvist_lab.metrics.settling import Settling, settling
 from tvist_lab.recordings import MissingColumnError, Recording
@@ -71,6 +73,9 @@ class MotionResult:
     """Damping ratio of the same mode [-]."""
     zeta_interval: tuple[float, float] | None = None
     """Interval that contains the true damping ratio with a probability of 95 % [-]."""
+    modes: Sequence[Mapping[str, Any]] = ()
+    """Up to three modes, the strongest first: `f_d_hz` and its `interval`, `zeta` and `zeta_interval`, and `amplitude`,
+    the largest |α| at the stop [m/s²]."""
     servo_lag_ms: float | None = None
     """Time by which the measured angles follow the target [ms]."""
     notes: Mapping[str, str] = field(default_factory=dict)
@@ -124,6 +129,9 @@ def measure(recording: Recording, motion: MotionRows) -> MotionResult:
     after = attempt(vibration_after_stop, "peak_m_s2", "envelope_m_s2")
     strongest = attempt(peak_acceleration, "peak_acceleration_rad_s2")
     ringing = attempt(_ring_down, "f_d_hz", "f_d_interval_hz", "zeta", "zeta_interval")
+    if ringing is not None:
+        doubts = filter(None, (_suspicion(mode, ringing.found) for mode in ringing.found))
+        notes |= dict.fromkeys(("zeta",) if (doubt := next(doubts, "")) else (), doubt)
     lag = motion.lag if recording.foreign else servo_lag(recording, motion.start, motion.shaped_stop)
     if lag is None:
         notes["servo_lag_ms"] = "no measured angles follow a target"
@@ -145,6 +153,7 @@ def measure(recording: Recording, motion: MotionRows) -> MotionResult:
         f_d_interval_hz=None if ringing is None else ringing.f_d_interval,
         zeta=None if ringing is None else ringing.zeta,
         zeta_interval=None if ringing is None else ringing.zeta_interval,
+        modes=() if ringing is None else tuple(map(_mode, ringing.found)),
         servo_lag_ms=None if lag is None else 1e3 * lag,
         notes=notes,
     )
@@ -155,6 +164,26 @@ def _ring_down(recording: Recording, motion: MotionRows) -> RingDown:
     if not fit.ok:
         raise NotMeasurableError(fit.reason)
     return fit
+
+
+def _mode(mode: Mode) -> dict[str, Any]:
+    return {
+        "f_d_hz": mode.f_d,
+        "interval": mode.f_d_interval,
+        "zeta": mode.zeta,
+        "zeta_interval": mode.zeta_interval,
+        "amplitude": mode.amplitude,
+    }
+
+
+def _suspicion(mode: Mode, modes: Sequence[Mode]) -> str:
+    """Return a note about a mode's damping, if it has too much of it beside a lighter mode."""
+    if (near := lighter_beside(mode, modes)) is None:
+        return ""
+    return (
+        f"the damping of {mode.zeta:.2f} at {mode.f_d:.1f} Hz is doubtful beside {near.zeta:.2f} at {near.f_d:.1f} Hz: "
+        "the arm may still have been driven, or two modes may have been taken for one"
+    )
 
 
 def ring_down_of(recording: Recording, motion: MotionRows) -> RingDown:
@@ -171,9 +200,8 @@ def ring_down_of(recording: Recording, motion: MotionRows) -> RingDown:
     late = time - recording.time[first]
     if recording.foreign:
         skip = SKIP if "target_q" in recording else SKIP_OF_MEASURED
-        return fit_ring_down(
-            alpha, recording.period, modes=2, time=late, offset=True, skip=skip, evidence=SIGNIFICANT
-        )
+        begin = max(skip, still_driven(recording, motion.start, first))
+        return agreed_modes(alpha, late, recording.period, begin)
     return fit_ring_down(
         alpha, recording.period, modes=2, time=late, slow_poles=(SLOW_POLE,), evidence=SIGNIFICANT
     )

@@ -11,6 +11,7 @@ from tvist_protocol.programs import ProgramClosePopup
 from tvist_protocol.replies import Reply
 from tvist_server.config import ServeConfig
 from tvist_server.ending import Ending
+from tvist_server.gateways.starting import Prepare
 from tvist_server.server import Server
 
 HERE = "127.0.0.1"
@@ -28,6 +29,7 @@ class ProgramServer:
         inputs: Inputs to set before, each as NAME=VALUE.
         ending: Shutdown by signals.
         timeout: Robot time after which the run ends although the program goes on [s].
+        prepare: What takes long before the robot is made, see `Server`.
 
     Raises:
         ConfigError: The configuration is invalid.
@@ -38,7 +40,13 @@ class ProgramServer:
     """
 
     def __init__(
-        self, config: ServeConfig, text: str, inputs: Sequence[str], ending: Ending, timeout: float | None
+        self,
+        config: ServeConfig,
+        text: str,
+        inputs: Sequence[str],
+        ending: Ending,
+        timeout: float | None,
+        prepare: Prepare | None = None,
     ) -> None:
         self._ending = ending
 
@@ -46,7 +54,7 @@ class ProgramServer:
             self.watch = ProgramWatch(controller, self._close_popup, ending.request, timeout=timeout)
             return self.watch
 
-        self.server = Server(config, observe)
+        self.server = Server(config, observe, prepare=prepare)
         (self._robot,) = self.server.robots
         try:
             # Clients of UR's interfaces on this machine have a hand in the program, as beside one of their own.

@@ -2,13 +2,16 @@
 
 import io
 import re
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 
-from tvist_lab.recordings.log_columns import LogError, Rows, recording_of
+from tvist_lab.recordings.log_columns import LogError, Rows, check_names, recording_of
+from tvist_lab.recordings.named_columns import in_si, named
+from tvist_lab.recordings.packed import content
 from tvist_lab.recordings.recording import Floats, Recording
 from tvist_lab.words import counted
 
@@ -31,8 +34,6 @@ REALTIME = {
 }
 """Names of UR's real-time interface, and RTDE's for the same."""
 
-_COMMA = re.compile(r"[-+]?\d+,\d+(e[-+]?\d+)?", re.IGNORECASE)
-
 
 @dataclass(frozen=True)
 class _Lines:
@@ -47,20 +48,29 @@ class _Lines:
     notes: tuple[str, ...]
 
 
-def read_csv(path: Path) -> Recording:
-    """Read a log in CSV: separated by spaces, commas, semicolons or tabs, with a header of RTDE's names.
+def read_csv(path: Path, columns: str | None = None) -> Recording:
+    """Read a log in CSV: separated by spaces, commas, semicolons or tabs, with a header of RTDE's names or others.
 
-    Torn lines, which have too few or too many cells, are left out, and a note names the first.
+    Torn lines, which have too few or too many cells, are left out, and a note names the first. Numbers may have decimal
+    commas where these do not separate cells.
+
+    Args:
+        path: The file.
+        columns: Names of its columns, as `named` reads them; None for RTDE's.
 
     Raises:
-        LogError: The file has no header of names, cells that are no numbers, decimal commas, or no rows; or see
-            `recording_of`.
+        LogError: The file has no header of names, cells that are no numbers, decimal commas between commas, or no rows;
+            or see `named` and `recording_of`.
         OSError: The file cannot be read.
     """
     lines = _lines(path)
     values = _numbers(path, lines)
-    names = [_rtde_name(name, lines.names) for name in lines.names]
-    return recording_of(Rows(path, names, values, lines.numbers, notes=lines.notes))
+    if columns is None:
+        names, units = [_rtde_name(name, lines.names) for name in lines.names], dict[str, str]()
+    else:
+        names, units = named(path, columns, lines.names)
+    values, notes = in_si(names, values, units)
+    return recording_of(Rows(path, names, values, lines.numbers, notes=(*lines.notes, *notes)))
 
 
 def _rtde_name(name: str, names: list[str]) -> str:
@@ -72,7 +82,7 @@ def _rtde_name(name: str, names: list[str]) -> str:
 
 
 def _lines(path: Path) -> _Lines:
-    raw = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
+    raw = content(path).removeprefix(b"\xef\xbb\xbf")
     ends_whole = raw.endswith(b"\n")
     all_lines = raw.splitlines()
     top, names, separator = _header(path, all_lines)
@@ -104,10 +114,11 @@ def _lines(path: Path) -> _Lines:
     kept = [body[at] for at in np.flatnonzero(whole)]
     if (strange := next((at for at, line in kept if not line.isascii()), None)) is not None:
         raise LogError(f"{path}, line {strange}: there is something else than numbers")
+    text = b"\n".join(line for _, line in kept) + b"\n"
     return _Lines(
         names,
         separator,
-        b"\n".join(line for _, line in kept) + b"\n",
+        text if separator == "," else text.replace(b",", b"."),
         np.array([at for at, _ in kept], dtype=np.float64),
         tuple(notes),
     )
@@ -130,7 +141,8 @@ def _header(path: Path, lines: list[bytes]) -> tuple[int, list[str], str]:
         raise LogError(
             f"{path}, line {top + 1}: there must be a header with RTDE's names, as in timestamp,actual_q_0"
         )
-    if twice := sorted({name for name in names if name and names.count(name) > 1}):
+    check_names(f"{path}, line {top + 1}", names)
+    if twice := sorted(name for name, count in Counter(names).items() if name and count > 1):
         raise LogError(f"{path}, line {top + 1}: the column {twice[0]} is there twice")
     return top, names, separator
 
@@ -164,6 +176,7 @@ def _frame(lines: _Lines, schema: dict[str, pl.DataType]) -> pl.DataFrame:
         io.BytesIO(lines.text),
         has_header=False,
         separator=lines.separator,
+        quote_char=None,  # a quote that does not end would hide the lines after it
         schema=schema,
         null_values=list(EMPTY),
         truncate_ragged_lines=True,
@@ -178,6 +191,4 @@ def _check_cells(path: Path, lines: _Lines, text: pl.DataFrame, frame: pl.DataFr
         if len(bad):
             cell = cells[bad[0]]
             where = f"{path}, line {int(lines.numbers[bad[0]])}, column {name}"
-            if _COMMA.fullmatch(cell):
-                raise LogError(f"{where}: {cell} has a decimal comma; write numbers with a decimal point")
             raise LogError(f"{where}: {cell[:40]!r} is no number")

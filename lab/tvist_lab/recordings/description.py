@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 
@@ -21,7 +22,7 @@ FORMAT = 1
 class ColumnDescription(msgspec.Struct, frozen=True):
     """One column."""
 
-    width: int | None
+    width: Annotated[int, msgspec.Meta(ge=0, le=100_000)] | None
     """Number of entries in a row; null for a number."""
     unit: str
     """Unit or units (SI)."""

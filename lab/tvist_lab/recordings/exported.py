@@ -1,18 +1,18 @@
 """Recordings from Parquet, npz and mat: those that `tvist export` wrote, and others with columns of RTDE's names."""
 
 import os
-import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import polars as pl
 
+from tvist_lab.recordings.apart import Arrays, in_words, read_apart, unpacked
 from tvist_lab.recordings.description import KEY, Description, checked_description, described, sidecar
 from tvist_lab.recordings.log_columns import Rows, recording_of
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
+from tvist_plant.user_file import check_is_file
 from tvist_protocol.content import parse_json
 from tvist_protocol.errors import ProtocolError
 
@@ -28,23 +28,19 @@ def read_parquet(path: str | os.PathLike[str]) -> Recording:
         RecordingError: The file cannot be read, or holds no recording.
     """
     path = Path(path)
-    try:
-        text = pl.read_parquet_metadata(path).get(KEY)
-        table = pl.read_parquet(path)
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise ExportedError(f"{path} cannot be read: {_reason(error)}") from error
-    numeric = [column for column in table if column.dtype.is_numeric() or column.dtype == pl.Boolean]
-    flat = {column.name: column.cast(pl.Float64).fill_null(np.nan).to_numpy() for column in numeric}
+    flat = _read(path, read_apart)
+    text = flat.pop(KEY, None)
     if text is None:
         return _log(path, flat)
-    description = _described(path, text)
+    description = _described(path, str(text))
     columns = {}
+    rows = len(next(iter(flat.values()), ()))
     for name, about in description.columns.items():
         names = [name] if about.width is None else [f"{name}_{index}" for index in range(about.width)]
-        if missing := [entry for entry in names if entry not in flat]:
-            raise ExportedError(f"{path} has no column {missing[0]}, which its description names")
+        if missing := next((entry for entry in names if entry not in flat), None):
+            raise ExportedError(f"{path} has no column {missing}, which its description names")
         parts = [flat[entry] for entry in names]
-        columns[name] = parts[0] if about.width is None else _joined(parts, len(table))
+        columns[name] = parts[0] if about.width is None else _joined(parts, rows)
     return _recording(path, description, columns)
 
 
@@ -55,12 +51,7 @@ def read_npz(path: str | os.PathLike[str]) -> Recording:
         RecordingError: The file cannot be read, or holds no recording.
     """
     path = Path(path)
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, AttributeError) as error:
-        raise ExportedError(f"{path} cannot be read: {_reason(error)}") from error
-    return _of_arrays(path, arrays)
+    return _of_arrays(path, _read(path, unpacked))
 
 
 def read_mat(path: str | os.PathLike[str]) -> Recording:
@@ -69,16 +60,8 @@ def read_mat(path: str | os.PathLike[str]) -> Recording:
     Raises:
         RecordingError: The file cannot be read, or holds no recording.
     """
-    from scipy.io import loadmat
-
     path = Path(path)
-    try:
-        arrays = loadmat(path, chars_as_strings=True)
-    except NotImplementedError as error:
-        raise ExportedError(f"{path} is of MATLAB's version 7.3: save it with -v7") from error
-    except Exception as error:  # a damaged file can raise nearly anything
-        raise ExportedError(f"{path} cannot be read: {_reason(error)}") from error
-    return _of_arrays(path, {name: array for name, array in arrays.items() if not name.startswith("__")})
+    return _of_arrays(path, _read(path, read_apart))
 
 
 READERS: dict[str, Callable[[Path], Recording]] = {
@@ -92,6 +75,7 @@ READERS: dict[str, Callable[[Path], Recording]] = {
 def with_sidecar(recording: Recording, path: Path) -> Recording:
     """Add events, info and notes from the file beside a CSV, if `tvist export` wrote one that belongs to it."""
     try:
+        check_is_file(sidecar(path), "description")
         (note, *_) = parse_json(sidecar(path).read_bytes())["notes"]
         description = checked_description(note[KEY])
     except (OSError, ProtocolError, RecordingError, LookupError, TypeError, ValueError):
@@ -105,11 +89,18 @@ def with_sidecar(recording: Recording, path: Path) -> Recording:
     return replace(added, notes=(*added.notes, *recording.notes))
 
 
+def _read(path: Path, reader: Callable[[Path], Arrays]) -> Arrays:
+    try:
+        return reader(path)
+    except Exception as error:  # a damaged file can raise nearly anything
+        raise ExportedError(f"{path} cannot be read: {in_words(error)}") from error
+
+
 def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> Recording:
     numbers = {
         name: array.astype(np.float64)
         for name, array in arrays.items()
-        if array.dtype.kind in "biuf" and array.ndim in (1, 2)
+        if array.dtype.kind in "biuf" and array.ndim in (1, 2) and len(array)
     }
     if KEY not in arrays:
         flat: dict[str, Floats] = {}
@@ -119,12 +110,16 @@ def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> Recording:
             else:
                 flat |= {f"{name}_{index}": array[:, index] for index in range(array.shape[1])}
         return _log(path, flat)
-    description = _described(path, str(arrays[KEY].reshape(-1)[0]))
+    description = _described(path, "".join(map(str, arrays[KEY].reshape(-1)[:1])))
     columns = {}
     for name, about in description.columns.items():
         if name not in numbers:
             raise ExportedError(f"{path} has no array {name}, which its description names")
         array = numbers[name]
+        if array.size != len(array) * (1 if about.width is None else about.width):
+            raise ExportedError(
+                f"{path}: array {name} has the shape {array.shape}, not the one of its description"
+            )
         columns[name] = array.reshape(-1) if about.width is None else array.reshape(len(array), about.width)
     return _recording(path, description, columns)
 
@@ -154,9 +149,3 @@ def _recording(path: Path, description: Description, columns: dict[str, Floats])
         return description.recording(columns)
     except RecordingError as error:
         raise ExportedError(f"{path}: {error}") from error
-
-
-def _reason(error: Exception) -> str:
-    return (
-        (error.strerror if isinstance(error, OSError) else None) or str(error).strip() or type(error).__name__
-    )

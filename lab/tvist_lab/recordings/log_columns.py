@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_lab.words import counted
+from tvist_plant.user_file import is_name
+from tvist_protocol.errors import quoted
 
 TIME = "timestamp"
 """Name of the column of times, as in RTDE [s]."""
@@ -24,8 +27,13 @@ PERIODS = (1e-4, 0.1)
 LONG_GAP = 0.02
 """Shortest time without rows that a note reports [s]."""
 
+SWAPPED = 3
+"""Largest number of rows by which one may stand too late or too early in a file to be put in its place."""
+SHOWN = 6
+"""Largest number of missing entries of a vector that a note names."""
+
 _MEASURED = re.compile(r"(actual|target|shaped)_(q|qd|qdd|TCP_pose|TCP_speed|tool_accelerometer)_\d+")
-_INDEXED = re.compile(r"(?P<name>.*\D)_(?P<index>\d+)")
+_INDEXED = re.compile(r"(?P<name>.*\D)_(?P<index>\d{1,6})", re.ASCII)
 
 
 class LogError(RecordingError):
@@ -52,18 +60,20 @@ class Rows:
 def recording_of(rows: Rows) -> Recording:
     """Join the columns of each vector, and check and number the rows.
 
-    Rows that repeat the time of the row before them, or have no time, are left out; a note counts them.
+    Rows that repeat the time of the row before them, or have no time, are left out, and neighbours that were swapped
+    are sorted by their time; notes count them.
 
     Raises:
         LogError: A number is beyond 1e6; there is no time or no joint angles, fewer than two rows, or time goes back
             or is not in seconds.
     """
+    check_names(rows.path, rows.names)
     _check_numbers(rows)
     columns, notes = _vectors(rows)
     if TIME not in columns or columns[TIME].ndim != 1:
-        raise LogError(f"{rows.path} has no column {TIME}; {_found(rows)}")
+        raise LogError(f"{rows.path} has no column {TIME}: {_remedy(rows)}")
     if not any(name in columns and columns[name].ndim == 2 for name in ("target_q", "actual_q")):
-        raise LogError(f"{rows.path} has neither target_q_0 … nor actual_q_0 …; {_found(rows)}")
+        raise LogError(f"{rows.path} has neither target_q_0 … nor actual_q_0 …: {_remedy(rows)}")
     kept, more = _increasing(rows, columns[TIME])
     _check_period(rows, columns[TIME][kept])
     notes += more
@@ -74,6 +84,13 @@ def recording_of(rows: Rows) -> Recording:
         notes += gaps
         columns = _shaped(columns)
     return Recording(columns, notes=(*rows.notes, *notes), foreign=not ours)
+
+
+def check_names(where: object, names: Sequence[str]) -> None:
+    """Refuse a column's name that cannot be shown, as of a damaged file."""
+    for name in names:
+        if not is_name(name):
+            raise LogError(f"{where}: {quoted(name)} is no column's name: it must be short and printable")
 
 
 def _check_numbers(rows: Rows) -> None:
@@ -88,9 +105,14 @@ def _check_numbers(rows: Rows) -> None:
         )
 
 
-def _found(rows: Rows) -> str:
-    shown = ", ".join(list(rows.names)[:12])
-    return f"its columns are {shown}{', …' if len(rows.names) > 12 else ''}"
+def _remedy(rows: Rows) -> str:
+    return f"name them with --columns time=…,q=joint_{{}}; {found_columns(rows.names)}"
+
+
+def found_columns(names: Sequence[str]) -> str:
+    """Return the names of a file's columns as the part of a sentence."""
+    there = [name for name in names if name]
+    return f"its columns are {', '.join(there[:12])}{', …' if len(there) > 12 else ''}"
 
 
 def _vectors(rows: Rows) -> tuple[dict[str, Floats], list[str]]:
@@ -108,8 +130,10 @@ def _vectors(rows: Rows) -> tuple[dict[str, Floats], list[str]]:
     notes = []
     for name, entries in places.items():
         order = sorted(entries)
-        expected = range(max(max(order) + 1, WIDTHS.get(name, 0)))
-        if missing := [f"{name}_{index}" for index in expected if index not in entries]:
+        expected = range(max(order[-1] + 1, WIDTHS.get(name, 0)))
+        if (count := len(expected) - len(order)) > 0:
+            first = islice((f"{name}_{index}" for index in expected if index not in entries), SHOWN)
+            missing = [*first, f"{count - SHOWN} more"] if count > SHOWN else [*first]
             joints = name.endswith(("_q", "_qd", "_qdd", "_moment", "_current"))
             what = "the other joints count" if joints else f"{name} is left out"
             notes.append(f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing: {what}")
@@ -127,6 +151,16 @@ def _increasing(rows: Rows, time: Floats) -> tuple[NDArray[np.intp], list[str]]:
         first = int(rows.lines[np.flatnonzero(~np.isfinite(time))[0]])
         notes.append(_left_out(rows, len(time) - len(timed), f"without {TIME}", first))
     step = np.diff(time[timed])
+    order = np.argsort(time[timed], kind="stable")
+    away = np.abs(order - np.arange(len(order)))
+    if 0 < np.max(away, initial=0) <= SWAPPED:
+        first = int(rows.lines[timed[np.flatnonzero(step < 0.0)[0] + 1]])
+        notes.append(
+            f"{counted(int(np.count_nonzero(step < 0.0)), 'row')} out of order sorted by {TIME}, the first in "
+            f"{rows.unit} {first}"
+        )
+        timed = timed[order]
+        step = np.diff(time[timed])
     if (back := np.flatnonzero(step < 0.0)).size:
         row = timed[back[0] + 1]
         raise LogError(

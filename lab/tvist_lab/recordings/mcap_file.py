@@ -331,4 +331,4 @@ class _Content:
 
     def _error(self, what: str) -> RecordingFileError:
         also = f"; it {self.damage}" if self.damage else ""
-        return RecordingFileError(f"{self.path} {what}{also}")
+        return RecordingFileError(f"{self.path} {what:.300}{also:.300}")

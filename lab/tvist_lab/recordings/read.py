@@ -4,17 +4,23 @@ import os
 from pathlib import Path
 
 from tvist_lab.recordings.mcap_records import MAGIC as MCAP
+from tvist_lab.recordings.packed import GZIP, content
 from tvist_lab.recordings.recording import Recording, RecordingError
+from tvist_plant.user_file import UserFileError, check_is_file
 
 SHOWN = 4096
 """Number of first bytes by which text is told from packets."""
 
 
-def read(path: str | os.PathLike[str]) -> Recording:
+def read(path: str | os.PathLike[str], columns: str | None = None) -> Recording:
     """Read a recording of this controller, or a log of another one.
 
     Recordings: MCAP, and what `tvist export` writes (CSV, Parquet, npz, mat). Logs: CSV with RTDE's names, dumps of
-    UR's port 30003, rosbag2 in MCAP (a file, or its folder).
+    UR's port 30003, rosbag2 in MCAP (a file, or its folder). CSV and dumps may be compressed by gzip.
+
+    Args:
+        path: The file.
+        columns: How a CSV names what is needed, as in `time=t:ms,q=joint_{}:deg`; see `named_columns.named`.
 
     Returns:
         Named columns in SI units; `notes` say what was left out.
@@ -25,16 +31,21 @@ def read(path: str | os.PathLike[str]) -> Recording:
     """
     path = Path(path)
     try:
-        return _read(path)
+        return _read(path, columns)
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror or error}") from error
+    except UserFileError as error:
+        raise RecordingError(str(error)) from error
 
 
-def _read(path: Path) -> Recording:
+def _read(path: Path, names: str | None) -> Recording:
     if path.is_dir():
-        return _read(_bag(path))
+        return _read(_bag(path), names)
+    check_is_file(path, "recording")
     with path.open("rb") as stream:
         head = stream.read(SHOWN)
+    if head.startswith(GZIP):
+        head = content(path)[:SHOWN]
     if not head:
         raise RecordingError(f"{path} is empty")
     if path.suffix == ".mcap" and not head.startswith(MCAP):
@@ -52,7 +63,7 @@ def _read(path: Path) -> Recording:
     from tvist_lab.recordings.csv_log import read_csv
     from tvist_lab.recordings.exported import with_sidecar
 
-    return with_sidecar(read_csv(path), path)
+    return with_sidecar(read_csv(path, names), path)
 
 
 def _bag(folder: Path) -> Path:

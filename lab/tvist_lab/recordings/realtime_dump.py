@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from tvist_lab.recordings.log_columns import LogError, Rows, recording_of
+from tvist_lab.recordings.packed import content
 from tvist_lab.recordings.recording import Recording
 
 SIZES = (1044, 1060, 1108, 1116, 1140, 1220)
@@ -42,7 +43,7 @@ def read_dump(path: Path) -> Recording:
         LogError: The file contains no packets, or those of software 1.8; or see `recording_of`.
         OSError: The file cannot be read.
     """
-    data = path.read_bytes()
+    data = content(path)
     starts, size, skipped = _packets(path, data)
     doubles = np.array([np.frombuffer(data, ">f8", (size - 4) // 8, at + 4) for at in starts])
     names: list[str] = []

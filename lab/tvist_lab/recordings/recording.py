@@ -46,6 +46,8 @@ STATE_COLUMNS = (
 """Fields of a `state`, each of which becomes a column of the same name."""
 TRUTH_PREFIX = "truth_"
 """Prefix of the column names of fields of `truth`."""
+EPOCH = 1e8
+"""Times beyond this are no robot's uptime, but seconds since 1970 [s]."""
 
 
 class RecordingError(ValueError):
@@ -155,6 +157,12 @@ class Recording:
     def time(self) -> Floats:
         """Time of each row [s], shape (T,)."""
         return self["timestamp"]
+
+    @property
+    def origin(self) -> float:
+        """Time from which tables count [s]: the first row's if rows have the time of day, else 0."""
+        first = float(self.time[0]) if len(self.time) else 0.0
+        return first if first > EPOCH else 0.0
 
     @property
     def joints(self) -> int:

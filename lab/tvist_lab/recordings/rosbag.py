@@ -1,6 +1,7 @@
 """rosbag2 recordings in MCAP: joint states, an accelerometer, and a controller's target, by message type."""
 
 import io
+import re
 from collections.abc import Callable
 from contextlib import redirect_stderr
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from tvist_lab.recordings.log_columns import LogError, Rows, recording_of
 from tvist_lab.recordings.mcap_records import DAMAGE, records
 from tvist_lab.recordings.recording import Floats, Recording
+from tvist_protocol.errors import quoted
 
 JOINTS, ACCELEROMETER, TARGET, POSE = "JointState", "Imu", "JointTrajectoryControllerState", "PoseStamped"
 READ = {f"{package}/msg/{name}": name for package, name in (
@@ -23,6 +25,9 @@ READ = {f"{package}/msg/{name}": name for package, name in (
 """Types of messages that are read, and their short names."""
 ORDER = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 """Joints of a UR robot from base to tool; ROS lists them in any order."""
+
+MOST_JOINTS = 100
+"""Largest number of joints of a message; a robot with a gripper has some ten."""
 
 
 @dataclass
@@ -124,7 +129,7 @@ def _decoder(
         with redirect_stderr(io.StringIO()):  # the parser prints what it raises
             decode = factory.decoder_for(channel.message_encoding, schema)
     except Exception as error:
-        raise LogError(f"{path}: the schema of {channel.topic} is damaged: {error}") from error
+        raise LogError(f"{path}: the schema of {channel.topic} is damaged: {quoted(error)}") from error
     if decode is None:
         raise LogError(
             f"{path}: {channel.topic} is written as {channel.message_encoding} with a schema in "
@@ -136,13 +141,22 @@ def _decoder(
 def _take(path: Path, topic: _Topic, record: Message) -> None:
     try:
         message = topic.decode(record.data)
-    except Exception as error:
-        raise LogError(f"{path}: a message of type {topic.kind} cannot be decoded: {error}") from error
-    stamp = message.header.stamp
-    time = stamp.sec + 1e-9 * stamp.nanosec
+        stamp = message.header.stamp
+        time = float(stamp.sec + 1e-9 * stamp.nanosec)
+        row = _row(topic, message)
+    except Exception as error:  # the schema is the file's own, so that fields can be missing or of any kind
+        raise LogError(
+            f"{path}: a message of type {topic.kind} cannot be decoded: {quoted(error)}"
+        ) from error
     if time == 0.0:
         topic.unstamped += 1
         time = 1e-9 * record.log_time
+    topic.times.append(time)
+    topic.rows.append(row)
+
+
+def _row(topic: _Topic, message: Any) -> dict[str, list[float]]:
+    """Numbers of a message by column."""
     match topic.kind:
         case "JointState":
             row = _joints(topic, message.name, message.position, "actual_q")
@@ -153,18 +167,24 @@ def _take(path: Path, topic: _Topic, record: Message) -> None:
             row |= _joints(topic, message.joint_names, wanted.velocities, "target_qd")
         case "Imu":
             force = message.linear_acceleration
-            row = {"actual_tool_accelerometer": [force.x, force.y, force.z]}
+            row = {"actual_tool_accelerometer": list(map(float, (force.x, force.y, force.z)))}
         case _:
             pose = message.pose
             turn = pose.orientation
             vector = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_rotvec()
-            row = {"actual_TCP_pose": [pose.position.x, pose.position.y, pose.position.z, *vector]}
-    topic.times.append(time)
-    topic.rows.append(row)
+            place = map(float, (pose.position.x, pose.position.y, pose.position.z))
+            row = {"actual_TCP_pose": [*place, *vector]}
+    return row
 
 
 def _joints(topic: _Topic, names: list[str], values: Any, column: str) -> dict[str, list[float]]:
-    """Values in the order of the joints; nothing if the message has none, or not one for each joint."""
+    """Values in the order of the joints; nothing if the message has none, or not one for each joint.
+
+    Raises:
+        ValueError: There are more than `MOST_JOINTS`.
+    """
+    if len(names) > MOST_JOINTS:
+        raise ValueError(f"{len(names)} joints, at most {MOST_JOINTS} are read")
     if len(values) != len(names) or not len(names):
         return {}
     if topic.joints is None:
@@ -176,7 +196,7 @@ def _joints(topic: _Topic, names: list[str], values: Any, column: str) -> dict[s
 def _place(name: str) -> tuple[int, list[int | str]]:
     """Sort key of a joint: a UR robot's from base to tool, others by the numbers in their names."""
     known = [place for place, joint in enumerate(ORDER) if joint in name]
-    digits = "".join(c if c.isdigit() else " " for c in name).split()
+    digits = re.findall(r"\d{1,9}", name)
     return (known[0] if known else len(ORDER), [*map(int, digits), name] if not known else [])
 
 

@@ -22,7 +22,7 @@ from tvist_lab.words import counted
 
 COLUMNS = {
     "motion": "Number of the motion.",
-    "start s": "Time of the log at which the motion starts.",
+    "start s": "Time of the log at which the motion starts; since the first row if the log has the time of day.",
     "stop s": "Time of the log at which its target, the shaped reference, stops.",
     "Δ ms": "Time by which shaping lengthens the reference.",
     "t_stb ms": "Time from first entering a band of 0.03 mm around the attained position until staying inside.",
@@ -46,17 +46,18 @@ class _File:
     measured: Measured
 
 
-def recordings_page(paths: Sequence[Path], command: str) -> Page:
+def recordings_page(paths: Sequence[Path], command: str, columns: str | None = None) -> Page:
     """Build the report of recordings or logs; the first one is what the others are compared with.
 
     Args:
         paths: Files of any format that `tvist_lab.recordings.read` reads, at least one.
         command: The command that makes the report, for its provenance.
+        columns: Names of the columns of a CSV, as `read` takes them.
 
     Raises:
         RecordingError: A file cannot be read, or has no joint angles; the message names it.
     """
-    files = _files(paths)
+    files = _files(paths, columns)
     base, *others = files
     compared = [(other, compare(base.measured, other.measured)) for other in others]
     sections = [Section("Motions", tables=[_table(file) for file in files])]
@@ -94,9 +95,10 @@ def _verdict(base: _File, compared: Sequence[tuple[_File, Comparison]]) -> list[
     return list(dict.fromkeys(sentences))
 
 
-def _files(paths: Sequence[Path]) -> list[_File]:
+def _files(paths: Sequence[Path], columns: str | None = None) -> list[_File]:
     return [
-        _File(path, name, Measured.of(read(path))) for path, name in zip(paths, _names(paths), strict=True)
+        _File(path, name, Measured.of(read(path, columns)))
+        for path, name in zip(paths, _names(paths), strict=True)
     ]
 
 
@@ -110,8 +112,8 @@ def _table(file: _File) -> PageTable:
     rows = [
         (
             str(index),
-            f"{result.start_s:.3f}",
-            f"{result.stop_s:.3f}",
+            f"{result.start_s - file.measured.recording.origin:.3f}",
+            f"{result.stop_s - file.measured.recording.origin:.3f}",
             _text(result.delay_ms, 0),
             _text(result.stabilisation_ms, 0),
             _text(result.cycle_ms, 0),

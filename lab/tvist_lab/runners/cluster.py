@@ -14,7 +14,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -26,6 +26,7 @@ from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 from tvist_lab.runners.interface import Failed, Outcome, Result, Task, TaskError
 from tvist_lab.runners.parcels import do, pack, unpack
 from tvist_lab.runners.processes import cores
+from tvist_server.own_folder import OwnFolder
 
 SHARE = 16
 """Least number of batches for each worker thread, so that all end at about the same time."""
@@ -74,7 +75,12 @@ class Cluster:
                 yield client
             return
         processes = self.processes or cores()
-        with _local(processes) as cluster, Client(cluster, set_as_default=False) as client:
+        with (
+            closing(OwnFolder()) as folder,
+            dask.config.set({"temporary-directory": str(folder.path)}),
+            _local(processes) as cluster,
+            Client(cluster, set_as_default=False) as client,
+        ):
             yield client
             with suppress(
                 TimeoutError
@@ -114,6 +120,8 @@ def _local(processes: int) -> Iterator[LocalCluster]:
 
     They inherit a mask from the thread that starts them, which inherits it from this one, as do those that replace a
     killed one. Starting the resource tracker removes the mask, so that it has to run before.
+
+    A Dask scheduler runs whatever it is sent: certificates of this run alone keep other users of this machine out.
     """
     multiprocessing.resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -125,6 +133,7 @@ def _local(processes: int) -> Iterator[LocalCluster]:
             dashboard_address=None,
             memory_limit=0,
             silence_logs=logging.CRITICAL,
+            security=True,
         )
     except (OSError, RuntimeError) as error:
         why = " ".join(str(error.__cause__ or error).split())

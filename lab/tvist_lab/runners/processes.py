@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from tvist_lab.runners.interface import Failed, Outcome, Result, Task
 from tvist_lab.runners.parcels import attempt, do, pack, unpack
+from tvist_server.ending import end_with_parent, signals_held
 
 AHEAD = 4
 """Number of chunks handed out for each process, so that none waits for the next one."""
@@ -18,6 +19,13 @@ AHEAD = 4
 def cores() -> int:
     """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def begin() -> None:
+    """Let this process end when the one that hands out the work does, and not before."""
+    # Control+C reaches all processes of a terminal; the first one ends the others.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
 
 
 @dataclass(frozen=True)
@@ -44,9 +52,7 @@ class Processes:
                 yield index, attempt(work, task)
             return
         others = set(multiprocessing.active_children())
-        # Control+C reaches all processes of a terminal; this one ends the others, which ignore it.
-        ignored = (signal.SIGINT, signal.SIG_IGN)
-        pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), signal.signal, ignored)
+        pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), begin)
         done = False
         try:
             yield from self._through(pool, work, tasks, AHEAD * processes)
@@ -78,7 +84,8 @@ class Processes:
                 else:
                     indices.append(index)
                     packed.append(one)
-            out[pool.submit(do, work, packed)] = indices
+            with signals_held():  # this may start a process, which would not get all that it needs to begin
+                out[pool.submit(do, work, packed)] = indices
             if len(out) >= most:
                 yield from _arrived(out)
         while out:

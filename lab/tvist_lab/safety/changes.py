@@ -6,8 +6,9 @@ import numpy as np
 
 from tvist_controller.api import CLEARANCE, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_lab.safety import stops, streams
-from tvist_lab.safety.subject import Subject
+from tvist_lab.safety import draws, stops, streams
+from tvist_lab.safety.draws import WITHIN
+from tvist_lab.safety.subject import Subject, speeds
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
@@ -28,13 +29,15 @@ class ChangeOutcome:
     """The command and its reply."""
     near: float
     """How much the reference violated the clearance between two bodies afterwards; must be 0 or less [m]."""
+    speeds: tuple[float, float]
+    """Largest velocity and acceleration of a joint, relative to its limits; must be `WITHIN` or less [-]."""
     refused: bool
     """Whether the robot refused the change with `collision`."""
 
     @property
     def kept(self) -> bool:
-        """Whether the clearance was kept."""
-        return self.near <= 0.0
+        """Whether clearance and limits were kept."""
+        return self.near <= 0.0 and max(self.speeds) <= WITHIN
 
 
 def judge(description: RobotDescription, seed: int) -> ChangeOutcome:
@@ -63,6 +66,7 @@ def judge(description: RobotDescription, seed: int) -> ChangeOutcome:
         what=f"{kind.__name__}: {said}",
         # At rest any payload may be declared, since it does not move.
         near=-1.0 if resting else CLEARANCE - collisions.nearest(np.array(robot.references[before:])),
+        speeds=speeds(description, np.array(robot.references)),
         refused=isinstance(reply, Refused) and reply.code == "collision",
     )
 
@@ -80,7 +84,8 @@ def _draw(description: RobotDescription, random: np.random.Generator) -> Change:
     payload = far_payload(random, description.limits.payload)
     one: Change = (c.SetPayload, {"mass": payload.mass, "com": payload.com, "inertia": payload.inertia})
     others: list[Change] = [
-        (c.SetShaper, {"name": str(random.choice(stops.SHAPERS))}),
+        (c.SetShaper, {"name": draws.shaper(description, random)}),
+        (c.SetEstimator, {"name": "modal"}),
         (c.SetEstimator, {"name": "fixed", "f_d": (float(random.uniform(4, 20)),), "zeta": (0.1,)}),
         (c.SetSpeed, {"fraction": float(random.uniform(0.0, 1.0))}),
         (SetTcp, {"offset": (0.0, 0.0, float(random.uniform(0.0, 0.3)), 0.0, 0.0, 0.0)}),
@@ -100,7 +105,7 @@ def _under_way(description: RobotDescription, seed: int, random: np.random.Gener
         robot = Subject(
             description, stream.start, paper_payload(description, stream.mass), shaper=stream.shaper
         )
-        robot.send(c.ServoStart, velocity=stream.velocity, acceleration=stream.acceleration, jerk=2000.0)
+        robot.send(c.ServoStart, velocity=stream.velocity, acceleration=stream.acceleration, jerk=stream.jerk)
         way = stream.towards - stream.start
         duration = float(np.abs(way).max()) / stream.velocity + 0.1
         for tick in range(int(random.integers(20, 500))):

@@ -1,5 +1,6 @@
 """Results of a search as a page of the documentation."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from tvist_controller.api import CLEARANCE, FAR, stopping
@@ -22,6 +23,9 @@ def page(result: dict[str, Any], command: str) -> str:
         "",
         "## What was tested",
         "",
+        f"Robots, which took turns, each with its own calibration: {', '.join(result['robots'])}. The limits of the",
+        "motions were at most the arm's own; above these, the robot had to refuse.",
+        "",
         "| search | cases | promises broken |",
         "|---|---|---|",
     ]
@@ -30,9 +34,9 @@ def page(result: dict[str, Any], command: str) -> str:
         for name, part in result.items()
         if isinstance(part, dict)
     ]
-    if "stops" in result:
+    if "kinds" in result.get("stops", {}):
         lines += _stops(result["stops"])
-    if "streams" in result:
+    if "stopped_by_the_robot" in result.get("streams", {}):
         lines += _streams(result["streams"])
     if "changes" in result:
         part = result["changes"]
@@ -43,12 +47,11 @@ def page(result: dict[str, Any], command: str) -> str:
             f"Of {part['count']} changes of payload, shaper, estimator, speed and tool, {part['refused']} were refused",
             "with `collision`: the arm with the declared payload would have hit something on the rest of its path.",
         ]
-    return "\n".join([*lines, *_info(result["robot"]), ""])
+    return "\n".join([*lines, *_info(result["robots"]), ""])
 
 
 _WHAT = {
-    "stops": "stops of every kind at random moments of accepted moves, limits from 1.5 rad/s and 2 rad/s² to 3.14 and "
-    "8, payload 0 to 5 kg, plain and shaped",
+    "stops": "stops of every kind at random moments of accepted moves, payloads up to the rated one, every shaper",
     "streams": "streams of set-points towards the floor, the arm itself and the limits, cut or ended at random",
     "changes": "changes during a motion",
     "sequences": "sequences of 40 random commands, a third of them with programs in URScript",
@@ -65,6 +68,7 @@ def _stops(part: dict[str, Any]) -> list[str]:
         f"or off its line by more than {_angle(part['worst_off_rad'])}, {_late(part['worst_late_ticks'])}.",
         f"The rigid torque {_beside(part['worst_torque_share'])} the larger of 90 % of the limit and the",
         "torque that the motion would have needed.",
+        *_speeds(part),
     ]
     if deep is not None:
         lines.append(
@@ -111,10 +115,18 @@ def _streams(part: dict[str, Any]) -> list[str]:
         "",
         f"The robot itself stopped {part['stopped_by_the_robot']} of {part['count']} streams. In the worst case, the",
         f"reference was {_depth(part['worst_below_clearance_m'])}.",
+        *_speeds(part),
     ]
     if deep is not None:
         lines.append(f"The flexible arm was {_depth(deep)}.")
     return lines
+
+
+def _speeds(part: dict[str, Any]) -> list[str]:
+    velocity, acceleration = (100 * part[f"worst_{name}_share"] for name in ("velocity", "acceleration"))
+    return [
+        f"No joint had more than {velocity:.1f} % of its velocity and {acceleration:.1f} % of its acceleration."
+    ]
 
 
 def _depth(below: float) -> str:
@@ -127,9 +139,10 @@ def _depth(below: float) -> str:
     return f"{-distance:.1f} mm deep in another body"
 
 
-def _info(robot: str) -> list[str]:
+def _info(robots: Sequence[str]) -> list[str]:
     rows = [
-        f"| {row.payload:g} | {100 * row.speed:.0f} % | {row.joint} | {row.duration:.2f} | {row.way:.2f} |"
+        f"| {robot} | {row.payload:g} | {100 * row.speed:.0f} % | {row.joint} | {row.duration:.2f} | {row.way:.2f} |"
+        for robot in robots
         for row in stopping(load(robot))
     ]
     return [
@@ -139,7 +152,7 @@ def _info(robot: str) -> list[str]:
         "These are the values in `info`, for the stretched arm and the joint that takes longest to stop,",
         "from a share of its velocity limit.",
         "",
-        "| payload [kg] | speed | joint | duration [s] | distance [rad] |",
-        "|---|---|---|---|---|",
+        "| robot | payload [kg] | speed | joint | duration [s] | distance [rad] |",
+        "|---|---|---|---|---|---|",
         *rows,
     ]

@@ -1,9 +1,10 @@
 """All searches, on all cores, and their results."""
 
+import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -11,8 +12,8 @@ from tvist_lab.runners import Processes, in_order
 from tvist_lab.safety import changes, programs, sequences, stops, streams
 from tvist_plant.description import RobotDescription, load
 
-T = TypeVar("T")
-
+Judge: TypeAlias = Callable[[RobotDescription, int], Any]
+"""Tries a case by its number on a robot; returns its outcome, or a sentence if it broke a promise and has none."""
 APART = 1_000_000
 """Difference between the case numbers of two consecutive seeds."""
 PROGRAMS = 3
@@ -38,7 +39,7 @@ def search(
     counts: Counts,
     seed: int,
     *,
-    robot: str = "ur5e",
+    robots: Sequence[str] = ("ur5e",),
     flexible: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
@@ -47,7 +48,7 @@ def search(
     Args:
         counts: Number of cases of each search.
         seed: Seed of the cases.
-        robot: Robot file, or name of a robot that comes with the package.
+        robots: Robot files, or names of robots that come with the package; they take turns.
         flexible: Whether to simulate the flexible arm in stops and streams as well, to see how far it enters the
             clearance that the reference keeps.
         progress: Called after each case with the search it belongs to.
@@ -55,28 +56,33 @@ def search(
     Returns:
         For each requested search: count, `broken` with a sentence for each violated guarantee, and figures.
     """
-    description = load(robot)
-    result: dict[str, Any] = {"seed": seed, "robot": robot, "flexible": flexible}
+    arms = [load(robot) for robot in robots]
+    result: dict[str, Any] = {"seed": seed, "robots": list(robots), "flexible": flexible}
 
-    def run(what: str, count: int, work: Callable[[int], T]) -> list[T]:
-        found = []
-        for one in in_order(Processes(), work, range(seed * APART, seed * APART + count)):
-            found.append(one)
+    def run(what: str, count: int, judge: Judge) -> tuple[dict[str, Any], list[Any]]:
+        tasks = [(arms[case % len(arms)], seed * APART + case) for case in range(count)]
+        outcomes, wrong = [], []
+        for (arm, number), found in zip(
+            tasks, in_order(Processes(), partial(_try, judge), tasks), strict=True
+        ):
+            if not isinstance(found, str | None):
+                outcomes.append(found)
+            if isinstance(found, str) or (found is not None and not found.kept):
+                wrong.append(f"{arm.robot.name}, {what} {number}: {found}")
             progress(what)
-        return found
+        return {"count": count, "broken": wrong}, outcomes
 
     if counts.stops:
-        stopped = run("stops", counts.stops, partial(_stop, description, flexible))
-        result["stops"] = _stops(stopped)
+        part, stopped = run("stops", counts.stops, partial(_stop, flexible))
+        result["stops"] = part | (_stops(stopped) if stopped else {})
     if counts.streams:
-        streamed = run("streams", counts.streams, partial(_stream, description, flexible))
-        result["streams"] = _streams(streamed)
+        part, streamed = run("streams", counts.streams, partial(_stream, flexible))
+        result["streams"] = part | (_streams(streamed) if streamed else {})
     if counts.changes:
-        changed = run("changes", counts.changes, partial(changes.judge, description))
-        result["changes"] = {**_judged(changed), "refused": sum(one.refused for one in changed)}
+        part, changed = run("changes", counts.changes, changes.judge)
+        result["changes"] = part | {"refused": sum(one.refused for one in changed)}
     if counts.sequences:
-        told = run("sequences", counts.sequences, partial(_sequence, description))
-        result["sequences"] = {"count": len(told), "broken": [one for one in told if one is not None]}
+        result["sequences"], _ = run("sequences", counts.sequences, partial(_sequence, len(arms)))
     return result
 
 
@@ -85,16 +91,24 @@ def broken(result: dict[str, Any]) -> list[str]:
     return [one for part in result.values() if isinstance(part, dict) for one in part["broken"]]
 
 
-def _stop(description: RobotDescription, flexible: bool, number: int) -> stops.Outcome:
+def _try(judge: Judge, task: tuple[RobotDescription, int]) -> Any:
+    """Judge a case; an exception of the robot breaks a promise, too."""
+    try:
+        return judge(*task)
+    except Exception as error:  # noqa: BLE001
+        return "".join(traceback.format_exception(error, limit=-3))
+
+
+def _stop(flexible: bool, description: RobotDescription, number: int) -> stops.Outcome:
     return stops.judge(description, stops.draw(description, number), flexible=flexible)
 
 
-def _stream(description: RobotDescription, flexible: bool, number: int) -> streams.StreamOutcome:
+def _stream(flexible: bool, description: RobotDescription, number: int) -> streams.StreamOutcome:
     return streams.judge(description, streams.draw(description, number), flexible=flexible)
 
 
-def _sequence(description: RobotDescription, number: int) -> str | None:
-    kind = programs.ProgramSequence if number % PROGRAMS == PROGRAMS - 1 else sequences.Sequence
+def _sequence(robots: int, description: RobotDescription, number: int) -> str | None:
+    kind = programs.ProgramSequence if number // robots % PROGRAMS == PROGRAMS - 1 else sequences.Sequence
     try:
         kind(description, number).run()
     except sequences.BrokenError as error:
@@ -116,7 +130,7 @@ def _stops(outcomes: Sequence[stops.Outcome]) -> dict[str, Any]:
                 "ran_out": sum(one.late == 0 for one in of_kind),
             }
     return {
-        **_judged(outcomes),
+        "worst_torque_of_moves_share": max(one.heavy for one in outcomes),
         "worst_ahead_rad": max(one.ahead for one in outcomes),
         "worst_off_rad": max(one.off for one in outcomes),
         "worst_late_ticks": max(one.late for one in outcomes),
@@ -128,23 +142,17 @@ def _stops(outcomes: Sequence[stops.Outcome]) -> dict[str, Any]:
 
 def _streams(outcomes: Sequence[streams.StreamOutcome]) -> dict[str, Any]:
     return {
-        **_judged(outcomes),
         "stopped_by_the_robot": sum(one.stopped for one in outcomes),
         **_nearest(outcomes),
     }
 
 
-def _judged(
-    outcomes: Sequence[stops.Outcome | streams.StreamOutcome | changes.ChangeOutcome],
-) -> dict[str, Any]:
-    """Return the number of cases, and those that violated a guarantee."""
-    return {"count": len(outcomes), "broken": [repr(one) for one in outcomes if not one.kept]}
-
-
 def _nearest(outcomes: Sequence[stops.Outcome | streams.StreamOutcome]) -> dict[str, Any]:
-    """Return the smallest distance between two bodies, for the reference and, if simulated, the flexible arm."""
+    """Return the highest speeds, and the smallest distance of two bodies: by the reference and by the flexible arm."""
     arm = [one.penetration for one in outcomes if not np.isnan(one.penetration)]
     return {
+        "worst_velocity_share": max(one.speeds[0] for one in outcomes),
+        "worst_acceleration_share": max(one.speeds[1] for one in outcomes),
         "worst_below_clearance_m": max(one.near for one in outcomes),
         "worst_penetration_of_the_flexible_arm_m": max(arm) if arm else None,
     }

@@ -27,6 +27,7 @@ class Author:
 
     def __init__(self, description: RobotDescription, q: Floats, random: Random) -> None:
         self._limit, self._q, self._random = np.array(description.limits.position), q, random
+        self._fastest, self._hardest = min(description.limits.velocity), min(description.limits.acceleration)
         self._kinematics = ToolKinematics(description)
 
     def program(self, name: str) -> str:
@@ -70,7 +71,7 @@ class Author:
         """Move to joint positions, or to a pose."""
         random = self._random
         goal = self._posture(1.0) if random.random() < 0.7 else self._pose()
-        a, v = random.choice([random.uniform(0.5, 8.0), random.uniform(8.0, 35.0)]), random.uniform(0.2, 2.8)
+        v, a = random.choice([1.0, 1.05, *random.uniform(0.07, 1.0, 6)]) * self._fastest, self._acceleration()
         return [f"movej({goal}, a={a:.3f}, v={v:.3f}{self._blend()})"]
 
     def movel(self) -> list[str]:
@@ -112,8 +113,13 @@ class Author:
     def speedj(self) -> list[str]:
         """Turn the joints."""
         random = self._random
-        qd = random.uniform(-1.5, 1.5, len(self._q)) * (random.random() > 0.15)
-        return [f"speedj({qd.round(3).tolist()}, {random.uniform(0.5, 20.0):.3f}{self._time()})"]
+        qd = (
+            random.choice([0.6, 1.0])
+            * random.uniform(-1, 1, len(self._q))
+            * self._fastest
+            * (random.random() > 0.15)
+        )
+        return [f"speedj({qd.round(3).tolist()}, {self._acceleration():.3f}{self._time()})"]
 
     def speedl(self) -> list[str]:
         """Move the tool."""
@@ -178,6 +184,10 @@ class Author:
         if self._random.random() < 0.2:
             return f"pose_add(get_target_tcp_pose(), p[0, 0, {self._random.uniform(-0.1, 0.1):.3f}, 0, 0, 0])"
         return f"p{np.round(space.pose_near(self._kinematics, self._q, self._random, share), 4).tolist()}"
+
+    def _acceleration(self) -> float:
+        random, most = self._random, self._hardest
+        return float(random.choice([random.uniform(0.5, 8.0), random.uniform(8.0, most), most]))
 
     def _pace(self) -> str:
         return f"a={self._random.uniform(0.3, 4.0):.3f}, v={self._random.uniform(0.05, 0.8):.3f}"

@@ -8,14 +8,12 @@ import numpy as np
 
 from tvist_controller.api import CLEARANCE, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_lab.safety import space
+from tvist_lab.safety import draws, space
 from tvist_lab.safety.changes import far_payload
-from tvist_lab.safety.stops import SHAPERS
-from tvist_lab.safety.subject import CLIENT, SESSION, Subject
+from tvist_lab.safety.draws import WITHIN
+from tvist_lab.safety.subject import CLIENT, SESSION, Subject, speeds
 from tvist_lab.safety.undisturbed import ROUNDING, Undisturbed
-from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
-from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.faults import FAULTS as FAULT_FIELDS
 from tvist_protocol.replies import Accepted, Refused
@@ -26,8 +24,6 @@ COMMANDS = 40
 """Number of commands in a sequence."""
 PAUSES = (0, 1, 2, 5, 20, 60, 150, 400)
 """Possible numbers of ticks between two commands."""
-VELOCITY, ACCELERATION = 1.003, 1.01
-"""Largest shaped velocity and acceleration, relative to the joints' limits [-]."""
 FAULTS = (
     "protective_stop", "safeguard_stop", "emergency_stop", "system_emergency_stop", "power_loss", "violation",
     "fault", "reduced", *("normal",) * 3, "nan",
@@ -57,11 +53,11 @@ class Sequence:
         self.seed, self.description = seed, description
         self._random = np.random.default_rng([seed, 15])
         self._free = CollisionModel(description, body(paper_payload(description, 0.0)))
-        mass = float(self._random.choice([0.0, 5.0, self._random.uniform(0, 5)]))
+        mass = draws.mass(description, self._random)
         self._free.carry(body(paper_payload(description, mass)))
         self.robot = Subject(
             description, self._posture(), paper_payload(description, mass),
-            shaper=str(self._random.choice(SHAPERS)), flexible=flexible,
+            shaper=draws.shaper(self.description, self._random), flexible=flexible,
         )  # fmt: skip
         self.done: list[str] = []
         """Commands that were sent, with their replies."""
@@ -69,6 +65,8 @@ class Sequence:
         self._excused = False
         self._sequence = 0
         self._at = self._towards = self.robot.references[-1]
+        self._pace = 0.004
+        """Largest step of a stream's set-points [rad]; those of the larger one are limited."""
         self._braked = False
         self._injected = ""
 
@@ -99,7 +97,7 @@ class Sequence:
 
     def _posture(self) -> Floats:
         while True:
-            q: Floats = WORKSPACE.random(1, self.description.joints, int(self._random.integers(2**31)))[0]
+            q: Floats = draws.postures(self.description, self._random, 1)[0]
             if self._free.meeting(q) is None:
                 return q
 
@@ -126,7 +124,7 @@ class Sequence:
     def _stream(self) -> None:
         """Send a set-point on the way to a random target."""
         way = self._towards - self._at
-        step = 0.004 * np.clip(way, -1.0, 1.0)
+        step = self._pace * np.clip(way, -1.0, 1.0)
         if self._random.random() < 0.005:
             self._towards = self._random.uniform(-3, 3, self.description.joints)
         self._at = self._at + step
@@ -145,12 +143,10 @@ class Sequence:
         if len(q) == 3 and not self._braked:
             if (np.abs(q[-1]) > np.array(limits.position) + ROUNDING).any():
                 raise self._broken(f"a reference is at {q[-1].tolist()}, beyond a joint's range")
-            if (fast := np.abs(q[-1] - q[-2]).max() / PERIOD) > VELOCITY * min(limits.velocity):
-                raise self._broken(f"a reference moves at {fast:.4f} rad/s")
-            # Shapers with negative impulses exceed their reference by their peak.
-            most = ACCELERATION * robot.controller.cycle.line_filter.peak * min(limits.acceleration)
-            if (hard := np.abs(np.diff(q, 2, axis=0)).max() / PERIOD**2) > most:
-                raise self._broken(f"a reference accelerates by {hard:.3f} rad/s²")
+            shaper = robot.controller.cycle.tvist.name
+            for what, share in zip(("velocity", "acceleration"), speeds(self.description, q), strict=True):
+                if share > WITHIN:
+                    raise self._broken(f"a reference with {shaper} has {share:.4f} of the limit of {what}")
             self._watch_clearance(q)
         if self._ahead is not None:
             tick = robot.controller.tick_number - self._ahead.since
@@ -207,28 +203,45 @@ class Sequence:
 
     # ------------------------------------------------------------------ commands
 
-    def _limits(self) -> dict[str, float]:
-        random = self._random
-        return {
-            # Below the joints' own limits, since a varying filter by itself exceeds its reference's by up to a tenth.
-            "velocity": float(random.uniform(0.2, 2.8)),
-            "acceleration": float(random.choice([random.uniform(0.5, 8.0), random.uniform(8.0, 35.0)])),
-            "jerk": float(random.choice([50.0, 100.0, 500.0, 2000.0])),
-        }
+    def _limited(self, kind: type[Any], **fields: object) -> object:
+        """Send a command for a motion with random limits, after one with a limit above the arm's own, now and then."""
+        if self._random.random() < 0.1:
+            name, value = draws.above(self.description, self._random)
+            before, reply = (
+                self.robot.controller.motion.activity,
+                self.robot.send(kind, **fields, **{name: value}),
+            )
+            wanted = isinstance(reply, Refused) and reply.code in {
+                draws.CODES[name],
+                "wrong_mode",
+                "busy",
+                "limit_position",
+            }
+            if not wanted or before is not self.robot.controller.motion.activity:
+                raise self._broken(f"{kind.__name__} with {name} {value} is not refused: {reply}")
+        return self.robot.send(kind, **fields, **draws.limits(self.description, self._random))
 
     def move(self) -> object:
-        """Move to a random posture."""
-        target = self._posture()
-        if self._random.random() < 0.3:
+        """Move to a random posture, sometimes to or past the end of a joint's range."""
+        target, random = self._posture(), self._random
+        if random.random() < 0.3:
             here = self.robot.references[-1]
             target = here + 0.1 * (target - here)
-        return self.robot.send(c.MoveJ, q=tuple(target.tolist()), **self._limits())
+        if random.random() < 0.05:
+            joint = int(random.integers(len(target)))
+            ends = random.choice([-1.0, 1.0]) * random.choice([1.0, 1.0001])
+            target[joint] = ends * self.description.limits.position[joint]
+        reply = self._limited(c.MoveJ, q=tuple(target.tolist()))
+        if (np.abs(target) > self.description.limits.position).any() and not isinstance(reply, Refused):
+            raise self._broken(f"a move past the end of a joint's range is not refused: {reply}")
+        return reply
 
     def stream(self) -> object:
         """Start a stream."""
         self._sequence, self._at = 0, self.robot.controller.cycle.reference
         self._towards = self._random.uniform(-3, 3, self.description.joints)
-        return self.robot.send(c.ServoStart, **self._limits())
+        self._pace = float(self._random.choice([0.004, 0.02]))
+        return self._limited(c.ServoStart)
 
     def halt(self) -> object:
         """Stop, with or without a token."""
@@ -252,10 +265,12 @@ class Sequence:
 
     def shaper(self) -> object:
         """Change the shaper."""
-        return self.robot.send(c.SetShaper, name=str(self._random.choice(SHAPERS)))
+        return self.robot.send(c.SetShaper, name=draws.shaper(self.description, self._random))
 
     def estimator(self) -> object:
         """Change the estimator."""
+        if self._random.random() < 0.2:
+            return self.robot.send(c.SetEstimator, name="modal")
         f_d, zeta = self._random.uniform(4, 20), self._random.uniform(0.0, 0.3)
         return self.robot.send(c.SetEstimator, name="fixed", f_d=(float(f_d),), zeta=(float(zeta),))
 

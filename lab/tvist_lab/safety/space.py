@@ -75,8 +75,14 @@ def servo(robot: Subject, random: Random) -> Reply:
 
 def joint_speed(robot: Subject, random: Random) -> Reply:
     """Turn the joints at random velocities."""
-    qd = random.uniform(-1.5, 1.5, robot.description.joints) * (random.random() > 0.15)
-    acceleration = float(random.choice([random.uniform(0.5, 8.0), random.uniform(8.0, 35.0)]))
+    limits = robot.description.limits
+    shares = random.uniform(-0.6, 0.6, robot.description.joints)
+    if random.random() < 0.3:
+        shares[random.integers(len(shares))] = random.choice([-1.0, 1.0, 1.0001])
+    qd = shares * limits.velocity * (random.random() > 0.15)
+    acceleration = float(
+        random.choice([random.uniform(0.5, 8.0), random.uniform(8.0, min(limits.acceleration))])
+    )
     shaped = bool(random.random() < 0.2)
     return robot.send(m.SpeedJ, qd=tuple(qd.tolist()), acceleration=acceleration, shaped=shaped)
 

@@ -15,8 +15,9 @@ from tvist_controller.api import (
     resting_after,
 )
 from tvist_lab.recordings import Floats
-from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused, torques
-from tvist_lab.workspace import WORKSPACE
+from tvist_lab.safety import draws
+from tvist_lab.safety.draws import WITHIN
+from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused, speeds, torques
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
@@ -32,23 +33,6 @@ ROUNDING = 1e-9
 """Differences between positions below this are rounding errors [rad]."""
 TORQUE_ROUNDING = 1e-3
 """Share by which a torque may exceed its bound between the moments that are checked in planning [-]."""
-SHAPERS = (
-    "none",
-    "zv",
-    "mzv",
-    "zvd",
-    "zvddd",
-    "ei3",
-    "um_zv",
-    "um_zvd",
-    "auto",
-    "auto-target",
-    "short",
-    "elastic",
-    "elastic-position",
-    "elastic-auto",
-)
-
 Halt = Callable[[Subject, np.random.Generator], object]
 
 KINDS: dict[str, Halt] = {
@@ -98,6 +82,10 @@ class Outcome:
     """Share by which the rigid torque exceeded the larger of 90 % of the limit and the uninterrupted move's torque
     [-].
     """
+    heavy: float
+    """Share by which the rigid torque of the uninterrupted move exceeded a limit [-]."""
+    speeds: tuple[float, float]
+    """Largest velocity and acceleration of a joint, relative to its limits; must be `WITHIN` or less [-]."""
     near: float
     """How much the reference violated the clearance between two bodies [m]."""
     penetration: float
@@ -120,7 +108,8 @@ class Outcome:
             self.ahead <= ROUNDING
             and self.off <= ROUNDING
             and self.late <= 0
-            and self.torque <= TORQUE_ROUNDING
+            and max(self.torque, self.heavy) <= TORQUE_ROUNDING
+            and max(self.speeds) <= WITHIN
             and self.near <= 0.0
             and (self.speed > BARELY or self.way <= BARELY_WAY or self.case.kind in PAUSES)
         )
@@ -130,11 +119,10 @@ def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tupl
     """Return a case by its number; its move is one that the robot accepts."""
     random = np.random.default_rng([seed, 11])
     collisions = CollisionModel(description, body(paper_payload(description, 0.0)))
-    n = description.joints
     while True:
-        mass = float(random.choice([0.0, 5.0, random.uniform(0.0, 5.0)]))
+        mass = draws.mass(description, random)
         collisions.carry(body(paper_payload(description, mass)))
-        start, target = two_postures(random, n)
+        start, target = draws.postures(description, random, 2)
         if random.random() < 0.3:  # short moves without a cruise phase
             target = start + random.uniform(0.02, 0.3) * (target - start)
         if collisions.meeting(start) is None and collisions.on_way(JointLine(start, target).whole) is None:
@@ -145,24 +133,14 @@ def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tupl
         start=start,
         target=target,
         mass=mass,
-        shaper=str(random.choice(SHAPERS)),
-        velocity=float(random.uniform(1.5, 3.14)),
-        acceleration=float(random.uniform(2.0, 8.0)),
-        jerk=float(random.choice([100.0, 500.0, 2000.0])),
+        shaper=draws.shaper(description, random),
+        **draws.limits(description, random, slowest=0.4),
         speed=float(random.choice([1.0, 1.0, 1.0, random.uniform(0.1, 1.0)])),
         moment=0,
     )
     moved = resting_after(_left_alone(description, case))
     last = EARLY if random.random() < 0.1 else max(moved, 2)
     return Case(**{**vars(case), "moment": int(random.integers(1, last))})
-
-
-def two_postures(random: np.random.Generator, joints: int) -> Floats:
-    """Return two random postures of the workspace with turned wrists, shape (2, joints) [rad]."""
-    pair = WORKSPACE.random(2, joints, int(random.integers(2**31)))
-    for posture in pair:
-        posture[4:] = random.uniform(-2, 2, joints - 4)
-    return pair
 
 
 def judge(description: RobotDescription, case: Case, *, flexible: bool = False) -> Outcome:
@@ -183,7 +161,8 @@ def judge(description: RobotDescription, case: Case, *, flexible: bool = False) 
     off = np.abs(stopped - case.start - shares[0][:, None] * along).max()
     after = slice(case.moment, None)  # from the newest reference at the stop on
     limits = TORQUE_SHARE * np.array(description.limits.torque)
-    asked = np.abs(torques(description, payload, alone[case.moment - 1 :])).max(axis=0)
+    needed = np.abs(torques(description, payload, alone))
+    asked = needed[case.moment - 1 :].max(axis=0)
     taken = np.abs(torques(description, payload, stopped[case.moment - 1 :])).max(axis=0)
     collisions = CollisionModel(description, body(payload))
     penetration = float("nan")
@@ -197,6 +176,8 @@ def judge(description: RobotDescription, case: Case, *, flexible: bool = False) 
         off=float(off),
         late=ends[0] - ends[1],
         torque=float((taken / np.maximum(limits, asked)).max() - 1.0),
+        heavy=float((needed / description.limits.torque).max() - 1.0),
+        speeds=max(speeds(description, stopped), speeds(description, alone), key=max),
         near=CLEARANCE - collisions.nearest(stopped[after]),
         penetration=penetration,
         duration=PERIOD * max(ends[0] - case.moment, 0),

@@ -7,8 +7,9 @@ import numpy as np
 
 from tvist_controller.api import CLEARANCE, CollisionModel, JointLine, body, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_lab.safety.stops import SHAPERS, two_postures
-from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused
+from tvist_lab.safety import draws
+from tvist_lab.safety.draws import WITHIN
+from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused, speeds
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
@@ -29,6 +30,8 @@ ENDS: dict[str, Callable[[Subject], object]] = {
     "safeguard stop": lambda robot: robot.send(SimulationInject, fault="safeguard_stop"),
 }
 """Ways to end a stream."""
+BEYOND = 1e-8
+"""By so much the filter's interpolation may overshoot a reference that stops at the end of a joint's range [rad]."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,7 @@ class StreamCase:
     period: float
     velocity: float
     acceleration: float
+    jerk: float
     end: str
     ends_at: float
     """Time at which it is ended [s]."""
@@ -65,22 +69,25 @@ class StreamOutcome:
     """Whether the robot ended the stream because two bodies would have met."""
     beyond: float
     """Largest excess over a joint's range; must be 0 or less [rad]."""
+    speeds: tuple[float, float]
+    """Largest velocity and acceleration of a joint, relative to its limits; must be `WITHIN` or less [-]."""
+    counted: bool
+    """Whether set-points were counted as limited if many were faster than the stream's limit."""
 
     @property
     def kept(self) -> bool:
         """Whether every figure is within its bound."""
-        return self.near <= 0.0 and self.beyond <= 0.0
+        return self.near <= 0.0 and self.beyond <= BEYOND and max(self.speeds) <= WITHIN and self.counted
 
 
 def draw(description: RobotDescription, seed: int) -> StreamCase:
     """Return a case by its number; most cases lead to a meeting."""
     random = np.random.default_rng([seed, 12])
     collisions = CollisionModel(description, body(paper_payload(description, 0.0)))
-    n = description.joints
-    mass = float(random.choice([0.0, 5.0, random.uniform(0.0, 5.0)]))
+    mass = draws.mass(description, random)
     collisions.carry(body(paper_payload(description, mass)))
     while True:
-        start, towards = two_postures(random, n)
+        start, towards = draws.postures(description, random, 2)
         if random.random() < 0.5:  # through the floor
             towards[1] = start[1] + random.choice([-1.0, 1.0]) * random.uniform(1.0, 3.0)
         if collisions.meeting(start) is not None:
@@ -92,10 +99,9 @@ def draw(description: RobotDescription, seed: int) -> StreamCase:
         start=start,
         towards=towards,
         mass=mass,
-        shaper=str(random.choice(SHAPERS)),
+        shaper=draws.shaper(description, random),
         period=float(random.choice([0.002, 0.002, 0.008, 0.02])),
-        velocity=float(random.uniform(0.3, 3.14)),
-        acceleration=float(random.choice([random.uniform(0.5, 8.0), random.uniform(8.0, 40.0)])),
+        **draws.limits(description, random),
         end=str(random.choice(list(ENDS))),
         ends_at=float(random.uniform(0.05, LENGTH)),
         lost=float(random.choice([0.0, 0.0, 0.05, 0.3])),
@@ -117,12 +123,17 @@ def judge(description: RobotDescription, case: StreamCase, *, flexible: bool = F
         clock="realtime",
     )  # fmt: skip
     reply = robot.send(
-        c.ServoStart, period=case.period, velocity=case.velocity, acceleration=case.acceleration, jerk=2000.0
+        c.ServoStart,
+        period=case.period,
+        velocity=case.velocity,
+        acceleration=case.acceleration,
+        jerk=case.jerk,
     )
     assert not refused(reply), reply
     way, every = case.towards - case.start, max(round(case.period / PERIOD), 1)
     duration = float(np.abs(way).max()) / case.velocity * random.uniform(0.8, 2.0) + 0.1
     reach = np.array(description.limits.position)
+    sent: list[Floats] = []
     for tick in range(round(LENGTH / PERIOD)):
         if tick == round(case.ends_at / PERIOD):
             ENDS[case.end](robot)
@@ -134,11 +145,16 @@ def judge(description: RobotDescription, case: StreamCase, *, flexible: bool = F
             time = tick * PERIOD
             bump = case.wave * np.sin(20.0 * time) * min(5.0 * time, 1.0)
             q = case.start + eased(time / duration) * way + bump
-            robot.setpoint(tick // every, np.clip(q, -reach, reach))
+            sent.append(np.clip(q, -reach, reach))
+            robot.setpoint(tick // every, sent[-1])
         robot.tick()
     robot.until_rest(5000)
     robot.tick(20)
     references = np.array(robot.references)
+    steps = (
+        np.abs(np.diff(sent, axis=0)).max(axis=1) / case.period if case.lost == 0.0 and len(sent) > 1 else []
+    )
+    rushed = np.count_nonzero(np.greater(steps, 1.5 * case.velocity)) > 10
     collisions = CollisionModel(description, body(paper_payload(description, case.mass)))
     penetration = float("nan")
     if flexible:
@@ -149,4 +165,6 @@ def judge(description: RobotDescription, case: StreamCase, *, flexible: bool = F
         penetration=penetration,
         stopped=any(event.code == "collision" for event in robot.events),
         beyond=float((np.abs(references) - reach).max()),
+        speeds=speeds(description, references),
+        counted=robot.controller.motion.streams.counters()[2] > 0 or not rushed,
     )

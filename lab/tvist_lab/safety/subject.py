@@ -1,6 +1,6 @@
 """The robot under test: a controller in this process, driven tick by tick, with a record of its motion."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,9 @@ from tvist_controller.api import (
     Setup,
     body,
     central_differences,
-    load_calibration,
 )
 from tvist_lab.recordings import Floats
+from tvist_lab.safety.own_calibration import own_calibration
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, Measurement
@@ -88,21 +88,25 @@ class Subject:
 
     def __post_init__(self) -> None:
         """Create the robot and take control."""
-        undamped = self.shaper.startswith("um_")  # for less damping than some postures have
         setup = Setup(
             description=self.description,
             q=tuple(self.q.tolist()),
             payload=self.payload,
-            calibration=load_calibration("ur5e_5kg"),
-            shaper="none" if undamped else self.shaper,
+            calibration=own_calibration(self.description),
+            shaper=self.shaper,
             clock=self.clock,
         )
-        self.controller = Controller(setup, None if self.flexible else RigidArm(body(self.payload)))
+        plant = None if self.flexible else RigidArm(body(self.payload))
+        try:
+            self.controller, undamped = Controller(setup, plant), False
+        except ValueError:  # some shapers are for less damping than the arm has in some postures
+            self.controller, undamped = Controller(replace(setup, shaper="none"), plant), True
         self.token = self.take_control()
         self.references.append(np.array(self.q))
         if undamped:
             self.send(c.SetEstimator, name="fixed", f_d=(8.0,), zeta=(0.1,))
-            self.send(c.SetShaper, name=self.shaper)
+            reply = self.send(c.SetShaper, name=self.shaper)
+            assert not refused(reply), reply
 
     def take_control(self) -> str:
         """Take control and return the token."""
@@ -154,6 +158,13 @@ def torques(description: RobotDescription, payload: Declared, references: Floats
     dynamics = InverseDynamics(description, body(payload))
     states = zip(*central_differences(references, PERIOD), strict=True)
     return np.array([dynamics.torque(*state) for state in states])
+
+
+def speeds(description: RobotDescription, references: Floats) -> tuple[float, float]:
+    """Largest velocity and acceleration of any joint along references, shape (k, n), as shares of its limits [-]."""
+    limits = description.limits
+    velocity, acceleration = (np.abs(np.diff(references, order, axis=0)) / PERIOD**order for order in (1, 2))
+    return float((velocity / limits.velocity).max()), float((acceleration / limits.acceleration).max())
 
 
 def refused(reply: Reply) -> bool:

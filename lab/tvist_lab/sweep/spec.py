@@ -114,9 +114,9 @@ def read_spec(path: Path) -> Spec:
 
 
 def _check_different(path: Path, text: str, axis: str, values: tuple[object, ...]) -> None:
+    places: dict[object, int] = {}
     for place, value in enumerate(values):
-        if value in values[:place]:
-            first = values.index(value)
+        if (first := places.setdefault(value, place)) != place:
             raise SpecError(
                 f"sweep {path}{_line(text, axis)}: {axis}[{place}] repeats {axis}[{first}]: each value counts once"
             )

@@ -13,9 +13,12 @@ class Estimator(ABC):
     Attributes:
         clipped: Whether a mode of the last estimate was outside `f_d_min` or `zeta_max` and was clamped to it, so
             that the arm's mode differs. It is always False for an estimator whose bounds are those of its modes.
+        abrupt: Whether modes may change almost at once from one configuration to the next, as where two of them come
+            close.
     """
 
     clipped: bool = False
+    abrupt: bool = False
 
     @property
     @abstractmethod

@@ -70,6 +70,7 @@ class Modal(Estimator):
     """
 
     drivetrain: Drivetrain
+    abrupt = True
 
     def __init__(
         self,

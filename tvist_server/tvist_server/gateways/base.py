@@ -19,11 +19,18 @@ class GatewayError(Exception):
     """A gateway cannot open; the message says why and what to do."""
 
 
-class Desk(Protocol):
-    """Receives the messages that arrive at a gateway. Its methods may be called from any thread and do not block."""
+class Queried(Protocol):
+    """Answers the queries that arrive at a gateway. Its methods may be called from any thread and do not block."""
 
     def request(self, data: bytes, answer: Answer) -> None:
         """Take an encoded command; `answer` is called once: immediately if it is rejected, else from another thread."""
+
+    def info(self, answer: Callable[[bytes], None]) -> None:
+        """Answer a request for `info`; `answer` is called once with the encoded message, from any thread."""
+
+
+class Desk(Queried, Protocol):
+    """Receives all messages that arrive at a gateway, as `Queried` does."""
 
     def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:
         """Take a command that the gateway made itself.
@@ -36,9 +43,6 @@ class Desk(Protocol):
 
     def setpoint(self, data: bytes) -> None:
         """Take an encoded set-point."""
-
-    def info(self, answer: Callable[[bytes], None]) -> None:
-        """Answer a request for `info`; `answer` is called once with the encoded message, from another thread."""
 
     def client_seen(self, client: str, session: str = "") -> None:
         """Note that a client's liveliness token has appeared.

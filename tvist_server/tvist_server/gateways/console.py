@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from queue import SimpleQueue
 
 from tvist_controller.sink import Topic
+from tvist_protocol.errors import harmless
 from tvist_protocol.stream import Event, EventKind
 from tvist_server.gateways.base import Gateway, Message
 
@@ -104,7 +105,7 @@ class Console:
 
     def _write(self) -> None:
         while (line := self._queue.get()) is not None:
-            log.warning("%s", line)
+            log.warning("%s", harmless(line))
 
 
 class ConsoleGateway(Gateway):

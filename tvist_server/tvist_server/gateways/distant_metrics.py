@@ -12,7 +12,7 @@ class DistantMetrics(MetricsGateway):
     """Keeps the newest messages of a robot that another process serves.
 
     Args:
-        session: The router to which that process is connected.
+        session: The router to which that process is connected, in the namespace.
         namespace: Namespace of the robot; empty if it has none.
         robot: Name of the robot.
     """
@@ -21,13 +21,9 @@ class DistantMetrics(MetricsGateway):
         super().__init__(namespace, robot)
         # Nobody looks at 500 states a second: Zenoh keeps the newest, without a call of Python for each.
         newest: RingChannel[zenoh.Sample] = RingChannel(1)
-        self._states = session.declare_subscriber(keys.within(namespace, keys.state(robot)), newest)
-        session.declare_subscriber(
-            keys.within(namespace, keys.event(robot)), Callback(self._on_event, indirect=False)
-        )
-        session.declare_subscriber(
-            keys.within(namespace, keys.telemetry(robot)), Callback(self._on_telemetry, indirect=False)
-        )
+        self._states = session.declare_subscriber(keys.state(robot), newest)
+        session.declare_subscriber(keys.event(robot), Callback(self._on_event, indirect=False))
+        session.declare_subscriber(keys.telemetry(robot), Callback(self._on_telemetry, indirect=False))
 
     def look(self) -> None:
         """Take the newest state."""

@@ -115,21 +115,12 @@ class Metrics(Collector):
             robot_mode.add_metric(labels, state.robot_mode)
             safety.add_metric(labels, state.safety_mode)
         yield from (ticks, robot_mode, safety)
-        rate = GaugeMetricFamily(
-            "tvist_ticks_per_second", "Control periods in the last second.", labels=LABELS
-        )
-        load = GaugeMetricFamily(
-            "tvist_load_ratio", "Share of the last second that ticks of this robot took.", labels=LABELS
-        )
         late = GaugeMetricFamily(
             "tvist_tick_lateness_seconds",
             "Lateness of ticks in the last second.",
             labels=(*LABELS, "quantile"),
         )
         for labels, telemetry in told:
-            rate.add_metric(labels, telemetry.ticks_per_second)
-            if telemetry.load is not None:
-                load.add_metric(labels, telemetry.load)
             lateness = {
                 "0.5": telemetry.late_p50_us,
                 "0.99": telemetry.late_p99_us,
@@ -137,12 +128,14 @@ class Metrics(Collector):
             }
             for quantile, value in lateness.items():
                 late.add_metric((*labels, quantile), value * MICRO)
-        yield from (rate, load, late)
-        for name, what, field in COUNTERS:
-            family = CounterMetricFamily(name, what, labels=LABELS)
-            for labels, telemetry in told:
-                family.add_metric(labels, getattr(telemetry, field))
-            yield family
+        yield late
+        for make, figures in ((GaugeMetricFamily, GAUGES), (CounterMetricFamily, COUNTERS)):
+            for name, what, field in figures:
+                family = make(name, what, labels=LABELS)
+                values = [(labels, getattr(telemetry, field)) for labels, telemetry in told]
+                for labels, value in [one for one in values if one[1] is not None]:
+                    family.add_metric(labels, value)
+                yield family
         events = CounterMetricFamily("tvist_events", "Events of each kind.", labels=(*LABELS, "kind"))
         for robot in self._robots:
             for kind, count in robot.events.copy().items():
@@ -150,8 +143,19 @@ class Metrics(Collector):
         yield events
 
 
+GAUGES = (
+    ("tvist_ticks_per_second", "Control periods begun in the last second.", "ticks_per_second"),
+    ("tvist_load_ratio", "Share of the last second that ticks of this robot took.", "load"),
+    ("tvist_overloaded", "1 if the robot is overloaded, or 0.", "overloaded"),
+)
+"""Gauges of the telemetry: name, meaning, field."""
 COUNTERS = (
-    ("tvist_missed_ticks", "Control periods that began too late.", "missed_ticks"),
+    ("tvist_due_ticks", "Control periods that were due: those begun, and those left out.", "due_ticks"),
+    (
+        "tvist_missed_ticks",
+        "Of these, those that began a period late or more, or were left out.",
+        "missed_ticks",
+    ),
     ("tvist_commands", "Commands received.", "commands"),
     ("tvist_commands_refused", "Commands refused.", "refused"),
     ("tvist_setpoints_received", "Set-points received.", "setpoints_received"),

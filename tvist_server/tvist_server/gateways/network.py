@@ -15,7 +15,7 @@ from zenoh.handlers import Callback
 from tvist_client.errors import NotConnectedError
 from tvist_client.transports.certificates import settings as certificate_for
 from tvist_client.transports.certificates import why_refused
-from tvist_server.gateways.base import Desk, GatewayError
+from tvist_server.gateways.base import Desk, GatewayError, Queried
 from tvist_server.gateways.zenoh import ZenohGateway
 
 CONFIG: Mapping[str, Any] = {
@@ -84,13 +84,15 @@ class Network:
         settings = guard if lockstep else {**REALTIME, **guard}
         if namespace:
             settings = {**settings, "namespace": namespace}
-        self._session = (
+        self.session = (
             _connected(connect, endpoints, settings, security) if connect else _open(endpoints, settings)
         )
+        """The session, in the namespace."""
         self._gateways: list[ZenohGateway] = []
+        self._expected: dict[str, ZenohGateway] = {}
         self._closed = False
         self._on_router = on_router if connect else None
-        self._session.info.declare_transport_events_listener(Callback(self._on_transport, indirect=False))
+        self.session.info.declare_transport_events_listener(Callback(self._on_transport, indirect=False))
         _OPEN.add(self)
 
     def gateway(self, robot: str, desk: Desk, *, lockstep: bool, truth: bool) -> ZenohGateway:
@@ -102,7 +104,28 @@ class Network:
             lockstep: Whether a client advances time: then no state may be lost, and the publisher waits.
             truth: Whether to publish the topic with values that a real robot cannot measure.
         """
-        gateway = ZenohGateway(self._session, robot, desk, lockstep=lockstep, truth=truth)
+        gateway = self._expected.pop(robot, None) or self._added(robot, desk)
+        gateway.serve(desk, lockstep=lockstep, truth=truth)
+        return gateway
+
+    def expect(self, robots: Sequence[str], starting: Queried, *, here: bool = True) -> None:
+        """Answer queries for robots that are starting.
+
+        Args:
+            robots: Names of the robots.
+            starting: Answers until `gateway` gives each a desk.
+            here: Whether they will have gateways here; otherwise another session answers as soon as it can.
+        """
+        for robot in robots:
+            self._expected[robot] = self._added(robot, starting, complete=here)
+
+    def forget(self) -> None:
+        """Leave the robots that were expected to other sessions: Zenoh does not always prefer a complete answer."""
+        for gateway in self._expected.values():
+            gateway.withdraw()
+
+    def _added(self, robot: str, starting: Queried, *, complete: bool = True) -> ZenohGateway:
+        gateway = ZenohGateway(self.session, robot, starting, complete=complete)
         self._gateways.append(gateway)
         return gateway
 
@@ -114,7 +137,7 @@ class Network:
         for gateway in self._gateways:
             gateway.close()
         _OPEN.discard(self)
-        self._session.close()  # type: ignore[no-untyped-call]
+        self.session.close()  # type: ignore[no-untyped-call]
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         there = event.kind == zenoh.SampleKind.PUT
@@ -152,7 +175,7 @@ def _connected(
         if "listen" in str(error):
             raise GatewayError(_explain(error, ", ".join(listen))) from error
         refused = next(
-            (why for endpoint in connect if security and (why := why_refused(endpoint, security, "router"))),
+            (why for endpoint in connect if (why := why_refused(endpoint, security, "router"))),
             f"no router answers within {CONNECT_S} s: check that it is running and listens there (`tvist router`)",
         )
         raise GatewayError(f"no connection to {', '.join(connect)}: {refused}") from error

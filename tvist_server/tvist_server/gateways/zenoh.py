@@ -16,44 +16,49 @@ from tvist_controller.sink import Topic
 from tvist_protocol import keys
 from tvist_protocol.codec import MAX_BYTES
 from tvist_protocol.replies import Refused, Reply
-from tvist_server.gateways.base import Desk, Gateway, Message
+from tvist_server.gateways.base import Desk, Gateway, Message, Queried
 from tvist_server.gateways.replies import ENCODING, Answers
 
 
 class ZenohGateway(Gateway):
-    """One robot on Zenoh, created by `Network.gateway`.
+    """One robot on Zenoh, created by `Network`: it answers queries, and serves the robot once that is ready.
 
     Args:
         session: An open session, to be closed after this gateway.
         robot: Name of the robot, which is part of every key.
-        desk: Desk that receives the messages that arrive.
-        lockstep: Whether a client advances time: then no state may be lost, and the publisher waits.
-        truth: Whether to publish the topic with values that a real robot cannot measure.
+        starting: Answers queries until `serve` is called.
+        complete: Whether queries come here even if another session answers them, too.
     """
 
     def __init__(
-        self, session: zenoh.Session, robot: str, desk: Desk, *, lockstep: bool, truth: bool
+        self, session: zenoh.Session, robot: str, starting: Queried, *, complete: bool = True
     ) -> None:
         self.setpoints_refused = 0
         self._session = session
         self._robot = robot
-        self._desk = desk
+        self._desk: Desk | None = None
+        self._queried = starting
         self._closed = False
         self._answers = Answers()
-        try:
-            self._declare(lockstep=lockstep, truth=truth)
-        except BaseException:
-            self.close()
-            raise
+        serve = {keys.command(robot): self._on_command, keys.info(robot): self._on_info}
+        self._queryables = [
+            session.declare_queryable(key, Callback(partial(handler, key), indirect=False), complete=complete)
+            for key, handler in serve.items()
+        ]
 
-    def _declare(self, *, lockstep: bool, truth: bool) -> None:
+    def withdraw(self) -> None:
+        """Leave the queries to another session."""
+        for queryable in self._queryables:
+            queryable.undeclare()  # type: ignore[no-untyped-call]
+
+    def serve(self, desk: Desk, *, lockstep: bool, truth: bool) -> None:
+        """Let clients reach the robot; arguments as for `Network.gateway`."""
         session, robot = self._session, self._robot
+        self._desk = desk
         session.liveliness().declare_subscriber(
             keys.any_client(robot), Callback(self._on_client, indirect=False), history=True
         )
-        serve = {keys.command(robot): self._on_command, keys.info(robot): self._on_info}
-        for key, handler in serve.items():
-            session.declare_queryable(key, Callback(partial(handler, key), indirect=False), complete=True)
+        self._queried = desk  # which knows the clients by now
         setpoint = keys.setpoint(robot)
         session.declare_subscriber(setpoint, Callback(partial(self._on_setpoint, setpoint), indirect=False))
         self._publishers = _publishers(session, robot, lockstep=lockstep, truth=truth)
@@ -86,12 +91,12 @@ class ZenohGateway(Gateway):
             why = f"the message has {len(payload)} bytes, at most {MAX_BYTES} are allowed"
             answer(_malformed("", why, MAX_BYTES))
         else:
-            self._desk.request(payload.to_bytes(), answer)
+            self._queried.request(payload.to_bytes(), answer)
 
     def _on_info(self, key: str, query: zenoh.Query) -> None:
         answer = self._answer(key, query)
         if answer is not None:
-            self._desk.info(answer)
+            self._queried.info(answer)
 
     def _answer(self, key: str, query: zenoh.Query) -> Callable[[Reply | bytes], None] | None:
         """Return the function that answers a query; None if the gateway is closed."""
@@ -106,7 +111,7 @@ class ZenohGateway(Gateway):
         return answer
 
     def _on_setpoint(self, key: str, sample: zenoh.Sample) -> None:
-        if self._closed:
+        if self._closed or self._desk is None:
             return
         if str(sample.key_expr) != key or len(sample.payload) > MAX_BYTES:
             self.setpoints_refused += 1
@@ -116,7 +121,7 @@ class ZenohGateway(Gateway):
     def _on_client(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)
         name, session = keys.client_name(self._robot, key), keys.client_session(self._robot, key)
-        if self._closed or name is None:
+        if self._closed or self._desk is None or name is None:
             return
         if sample.kind == zenoh.SampleKind.PUT:
             self._desk.client_seen(name, session)
@@ -125,7 +130,7 @@ class ZenohGateway(Gateway):
 
     def session_gone(self, session: str) -> None:
         """Note that a session has ended. Its liveliness tokens may outlast it while another session holds a copy."""
-        if not self._closed:
+        if not self._closed and self._desk is not None:
             self._desk.session_gone(session)
 
 

@@ -27,14 +27,11 @@ from mcap.stream_reader import breakup_chunk
 
 from tvist_protocol.channels import tag
 from tvist_protocol.recorded import END_METADATA
+from tvist_server.recording.kept import MAGIC, RECORD
 
-MAGIC = b"\x89MCAP0\r\n"
-"""First and last bytes of a file."""
 BUFFER = 2**20
 """Number of bytes copied at once."""
 
-_RECORD = struct.Struct("<BQ")
-"""Beginning of a record: its kind, and its length."""
 _MESSAGE_INDEX = struct.Struct("<HI")
 """Beginning of a message index: its channel, and the length of its entries, 16 bytes each."""
 
@@ -108,10 +105,10 @@ def _index(stream: IO[bytes]) -> _Index:
     """Go through a file from record to record."""
     index = _Index(end=len(MAGIC))
     size = os.fstat(stream.fileno()).st_size
-    while index.end + _RECORD.size <= size:
+    while index.end + RECORD.size <= size:
         stream.seek(index.end)
-        kind, length = _RECORD.unpack(stream.read(_RECORD.size))
-        after = index.end + _RECORD.size + length
+        kind, length = RECORD.unpack(stream.read(RECORD.size))
+        after = index.end + RECORD.size + length
         if kind == Opcode.DATA_END or after > size:
             break
         if kind in (Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.METADATA):
@@ -122,7 +119,7 @@ def _index(stream: IO[bytes]) -> _Index:
 
 def _note(index: _Index, kind: int, data: bytes) -> None:
     content = ReadDataStream(BytesIO(data))
-    length = len(data) + _RECORD.size
+    length = len(data) + RECORD.size
     if kind == Opcode.METADATA:
         index.metadata.append(MetadataIndex(index.end, length, Metadata.read(content).name))
     elif kind == Opcode.CHUNK:

@@ -1,6 +1,7 @@
 """File of a recording that grows from the first message to the last."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -35,7 +36,10 @@ class OneFile:
         try:
             self._writer = RecordingWriter(self._stream, topic_of, heading)
         except OSError:
-            self._stream.close()
+            if not overwrite:
+                path.unlink()  # what the disk had no room for would only stand in the way of the next start
+            with suppress(OSError):
+                self._stream.close()
             raise
 
     def write(self, message: Recorded) -> None:

@@ -1,5 +1,6 @@
 """The recorder: takes messages from the tick without blocking it, and writes them in a separate thread."""
 
+import logging
 import os
 import time
 from collections import deque
@@ -20,10 +21,13 @@ from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import Recorded, topics
 from tvist_protocol.stream import Event, State, Truth
+from tvist_server.recording.kept import OccupiedError, set_aside
 from tvist_server.recording.one_file import OneFile
 from tvist_server.recording.ring import Ring
 from tvist_server.recording.whereabouts import DeletedError, whereabouts
 from tvist_server.recording.writer import heading
+
+log = logging.getLogger(__name__)
 
 QUEUE_SIZE = 8192
 """Number of messages that may wait. State, truth and a set-point every tick make 1500 messages a second, so this
@@ -58,7 +62,8 @@ class Recorder(Sink):
         start: How the server was started: everything besides the journal that a replay needs, as JSON types.
         overwrite: Whether to replace an existing file.
         keep: Number of ticks that the recording keeps at least; it forgets those before, and the end of the recording
-            joins what is left to one file. None: it keeps all.
+            joins what is left to one file. Recordings of the five latest runs at the same path are kept under numbers.
+            None: it keeps all, and the file must not exist.
         queue_size: Number of messages that may wait for the writer.
         wait: Whether to wait when the queue is full: for robots whose time waits too, with the clocks lockstep and
             free.
@@ -68,7 +73,7 @@ class Recorder(Sink):
             continues in it.
 
     Raises:
-        RecordingError: The file exists or cannot be written, or `start` cannot be encoded.
+        RecordingError: The file exists, is no recording, or cannot be written, or `start` cannot be encoded.
     """
 
     def __init__(
@@ -174,12 +179,18 @@ class Recorder(Sink):
             if keep is None:
                 self._file = OneFile(self.path, topic_of, first, overwrite=overwrite)
             else:
+                kept = None if overwrite else set_aside(self.path)
+                if kept is not None:
+                    log.warning("%s held the recording of an earlier run, which is now %s", self.path, kept)
                 self._file = Ring(self.path, topic_of, first, overwrite=overwrite, keep=keep)
         except FileExistsError as error:
             existing = error.filename or self.path
             raise RecorderError(
-                f"{existing} exists already and is not overwritten: choose another file"
+                f"{existing} exists already and is not overwritten: choose another file, or record with --keep 10min, "
+                "which keeps it under another name"
             ) from None
+        except OccupiedError as error:
+            raise RecorderError(f"{error}: choose another file") from None
         except OSError as error:
             raise RecorderError(f"{self.path} cannot be written: {_reason(error)}") from error
 

@@ -98,7 +98,10 @@ class Ring:
         try:
             self._writer = RecordingWriter(self._stream, self._topic_of, self._heading | more, part=True)
         except OSError:
-            self._stream.close()
+            if mode == "xb":
+                path.unlink()  # what the disk had no room for would count as the recording of a run
+            with suppress(OSError):
+                self._stream.close()
             raise
 
     def _turn(self, tick: int) -> None:

@@ -21,6 +21,7 @@ from tvist_protocol.recorded import (
     to_json,
     viewer_schema,
 )
+from tvist_server.recording.kept import claim
 
 CHUNK_SIZE = 64 * 1024
 """Bytes compressed at once: some 70 states, which take half a millisecond and are lost if the process is killed. A
@@ -58,7 +59,7 @@ class RecordingWriter:
             longer than a tick.
 
     Raises:
-        OSError: The stream cannot be written to.
+        OSError: The stream cannot be written to, or another process writes the same file.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class RecordingWriter:
         part: bool = False,
     ) -> None:
         self._stream = stream
+        claim(stream)
         self._writer = Writer(
             stream,
             chunk_size=CHUNK_SIZE,

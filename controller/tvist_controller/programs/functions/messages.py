@@ -6,14 +6,16 @@ from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.popups import Popups
 from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import PopupKind
-from tvist_urscript import Value, signature, to_str
+from tvist_urscript import Array, Value, signature, to_str
 
+LONGEST_TEXT = 350
+"""Elements of a list that fit into a text."""
 LONGEST_SLEEP = 1e6
 """[s]"""
 
 SIGNATURES = {
-    "textmsg": signature('s1, s2=""', cost=20),
-    "popup": signature('s, title="Popup", warning=False, error=False, blocking=False', blocks=True, cost=10),
+    "textmsg": signature('s1, s2=""', cost=30),
+    "popup": signature('s, title="Popup", warning=False, error=False, blocking=False', blocks=True, cost=20),
     "sync": signature("", blocks=True),
     "sleep": signature("t", blocks=True),
 }
@@ -33,12 +35,12 @@ class MessageFunctions:
 
     def textmsg(self, s1: Value, s2: Value) -> None:
         """Write a line to the log, which clients of the primary interface get."""
-        text = readable(f"{to_str(s1)}{to_str(s2)}")
+        text = readable(f"{self._written(s1)}{self._written(s2)}")
         self._arm.then(lambda: self._access.emit("text", why=text))
 
     def popup(self, s: Value, title: Value, warning: object, error: object, blocking: object) -> Turns:
         """Show a message; with `blocking`, wait until somebody closes it."""
-        text, head = readable(to_str(s)), readable(to_str(title))
+        text, head = readable(self._written(s)), readable(self._written(title))
         kind: PopupKind = (
             "error" if flag("error", error) else "warning" if flag("warning", warning) else "message"
         )
@@ -48,6 +50,11 @@ class MessageFunctions:
         if waits:
             while self._popups.shown:
                 yield
+
+    def _written(self, value: Value) -> str:
+        if isinstance(value, Array):
+            self._arm.spend(3 * min(value.size, LONGEST_TEXT))
+        return to_str(value)
 
     def sync(self) -> Turns:
         """Wait for the next tick."""

@@ -27,18 +27,18 @@ TURN: Final = 0.25
 """Length that a turn of 1 rad counts as [m]."""
 
 SIGNATURES = {
-    "movej": signature("q, a=1.4, v=1.05, t=0, r=0", blocks=True, cost=20),
-    "movel": signature("pose, a=1.2, v=0.25, t=0, r=0", blocks=True, cost=20),
-    "movep": signature("pose, a=1.2, v=0.25, r=0", blocks=True, cost=20),
-    "movec": signature("pose_via, pose_to, a=1.2, v=0.25, r=0, mode=0", blocks=True, cost=20),
-    "optimovej": signature("goal, a=0.3, v=0.3, r=0", blocks=True, cost=20),
-    "optimovel": signature("goal, a=0.3, v=0.3, r=0", blocks=True, cost=20),
-    "servoj": signature("q, a=0, v=0, t=0.002, lookahead_time=0.1, gain=300", blocks=True, cost=20),
-    "servoc": signature("pose, a=1.2, v=0.25, r=0", blocks=True, cost=20),
-    "speedj": signature("qd, a=1.4, t=None", blocks=True, cost=20),
-    "speedl": signature("xd, a=1.2, t=None, aRot=None", blocks=True, cost=20),
-    "stopj": signature("a=2", blocks=True, cost=20),
-    "stopl": signature("a=1.2, aRot=None", blocks=True, cost=20),
+    "movej": signature("q, a=1.4, v=1.05, t=0, r=0", blocks=True, cost=180),
+    "movel": signature("pose, a=1.2, v=0.25, t=0, r=0", blocks=True, cost=60),
+    "movep": signature("pose, a=1.2, v=0.25, r=0", blocks=True, cost=60),
+    "movec": signature("pose_via, pose_to, a=1.2, v=0.25, r=0, mode=0", blocks=True, cost=100),
+    "optimovej": signature("goal, a=0.3, v=0.3, r=0", blocks=True, cost=180),
+    "optimovel": signature("goal, a=0.3, v=0.3, r=0", blocks=True, cost=60),
+    "servoj": signature("q, a=0, v=0, t=0.002, lookahead_time=0.1, gain=300", blocks=True, cost=120),
+    "servoc": signature("pose, a=1.2, v=0.25, r=0", blocks=True, cost=200),
+    "speedj": signature("qd, a=1.4, t=None", blocks=True, cost=100),
+    "speedl": signature("xd, a=1.2, t=None, aRot=None", blocks=True, cost=120),
+    "stopj": signature("a=2", blocks=True, cost=150),
+    "stopl": signature("a=1.2, aRot=None", blocks=True, cost=150),
 }
 
 

@@ -13,12 +13,12 @@ from tvist_urscript import Array, Fault, Pose, signature
 
 _INVERSE = "x, qnear=None, maxPositionError=1e-10, maxOrientationError=1e-10, tcp=None"
 SIGNATURES = {
-    "get_inverse_kin": signature(_INVERSE, cost=25),
-    "get_inverse_kin_has_solution": signature(_INVERSE, cost=25),
-    "get_forward_kin": signature("q=None, tcp=None", cost=10),
-    "is_within_safety_limits": signature("pose, qNear=None", cost=25),
-    "get_jacobian": signature("q=None, tcp=None", cost=10),
-    "get_mass_matrix": signature("q=None, include_rotors_inertia=True", cost=10),
+    "get_inverse_kin": signature(_INVERSE, cost=150),
+    "get_inverse_kin_has_solution": signature(_INVERSE, cost=150),
+    "get_forward_kin": signature("q=None, tcp=None", cost=80),
+    "is_within_safety_limits": signature("pose, qNear=None", cost=200),
+    "get_jacobian": signature("q=None, tcp=None", cost=110),
+    "get_mass_matrix": signature("q=None, include_rotors_inertia=True", cost=280),
 }
 
 

@@ -17,11 +17,11 @@ SIGNATURES = {
         for kind in ("boolean", "integer", "float")
     },
     **{
-        f"write_output_{kind}_register": signature("address, value")
+        f"write_output_{kind}_register": signature("address, value", cost=4)
         for kind in ("boolean", "integer", "float")
     },
     "get_flag": signature("n"),
-    "set_flag": signature("n, value"),
+    "set_flag": signature("n, value", cost=3),
 }
 
 

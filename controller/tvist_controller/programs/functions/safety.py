@@ -2,12 +2,12 @@
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import positive, shown
-from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.watchdogs import Watchdogs
 from tvist_urscript import Fault, signature
 
 SIGNATURES = {
-    "protective_stop": signature("", cost=10),
+    "protective_stop": signature("", blocks=True, cost=10),
     "rtde_set_watchdog": signature('variable_name, min_frequency, action="pause"', cost=5),
 }
 
@@ -24,9 +24,12 @@ class SafetyFunctions:
     def __init__(self, access: Access, arm: ProgramArm, watchdogs: Watchdogs) -> None:
         self._access, self._arm, self._watchdogs = access, arm, watchdogs
 
-    def protective_stop(self) -> None:
-        """Make a protective stop, which pauses the program at the next statement that lets time pass."""
-        self._access.motion.protect("the program asked for a protective stop")
+    def protective_stop(self) -> Turns:
+        """Make a protective stop, which pauses the program here; a secondary program waits until it is unlocked."""
+        motion = self._access.motion
+        motion.protect("the program asked for a protective stop")
+        while motion.activity.protective:
+            yield
 
     def rtde_set_watchdog(self, variable_name: object, min_frequency: object, action: object) -> None:
         """Pause or stop the program when a client writes an input of RTDE less often than a frequency [Hz]."""

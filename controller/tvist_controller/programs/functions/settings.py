@@ -21,7 +21,7 @@ SIGNATURES = {
     "set_payload_cog": signature("cog", blocks=True, cost=20),
     "set_target_payload": signature("m, cog, inertia=None, transition_time=0", blocks=True, cost=20),
     "set_gravity": signature("d"),
-    "zero_ftsensor": signature("", cost=40),
+    "zero_ftsensor": signature("", cost=80),
 }
 
 

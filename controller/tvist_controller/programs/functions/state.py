@@ -40,9 +40,18 @@ _PLAIN = (
 )
 SIGNATURES = {
     **{name: signature("") for name in _PLAIN},
-    "get_tcp_force": signature("", cost=10),
-    "force": signature("", cost=10),
-    "get_actual_joint_positions_history": signature("steps=0"),
+    **{
+        name: signature("", cost=50)
+        for name in (
+            "get_actual_tcp_pose",
+            "get_target_tcp_pose",
+            "get_target_tcp_speed",
+            "get_actual_tool_flange_pose",
+            "get_target_waypoint",
+        )
+    },
+    **{name: signature("", cost=80) for name in ("get_tcp_force", "force", "get_joint_torques")},
+    "get_actual_joint_positions_history": signature("steps=0", cost=4),
 }
 
 

@@ -11,14 +11,17 @@ STANDARD, CONFIGURABLE, TOOL = range(8), range(8, 16), range(16, 18)
 """Bits of the digital terminals."""
 
 SIGNATURES = {
-    **{f"set_{kind}digital_out": signature("n, b") for kind in ("", "standard_", "configurable_", "tool_")},
+    **{
+        f"set_{kind}digital_out": signature("n, b", cost=4)
+        for kind in ("", "standard_", "configurable_", "tool_")
+    },
     **{
         f"get_{kind}digital_{side}": signature("n")
         for kind in ("", "standard_", "configurable_", "tool_")
         for side in ("in", "out")
     },
-    "set_analog_out": signature("n, f"),
-    "set_standard_analog_out": signature("n, f"),
+    "set_analog_out": signature("n, f", cost=6),
+    "set_standard_analog_out": signature("n, f", cost=6),
     "set_analog_outputdomain": signature("port, domain"),
     "set_analog_inputrange": signature("port, range"),
     "set_standard_analog_input_domain": signature("port, domain"),

@@ -1,0 +1,189 @@
+"""Modes on which fits of a ring-down from several moments and with several numbers of modes agree.
+
+A real arm is still driven for a while after its target has stopped: its joints overshoot and swing back, and a single
+fit takes that for a mode. It also rings in several modes of like size, and f_d rises by some percent as they decay.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from tvist_lab.metrics.ring_down import (
+    CERTAIN,
+    DAMPING,
+    SIGNIFICANT,
+    WINDOWS,
+    Mode,
+    Ring,
+    RingDown,
+    decay_rate,
+    not_measurable,
+)
+from tvist_lab.recordings import Floats
+
+STARTS = 5
+"""Number of moments at which a fit begins."""
+STEP = 0.04
+"""Longest time between them [s]; the vibration must be audible in all of them."""
+ORDERS = (1, 2, 3, 4)
+"""Numbers of modes that are tried."""
+LONGEST = 0.6
+"""Duration of a fit [s]; over a longer one, f_d rises too much."""
+AUDIBLE = 2.5
+"""Smallest amplitude of a mode where its fit begins, over the rms of what the fit leaves [-]."""
+NEAR = 0.07
+"""Largest difference of f_d between two fits of the same mode [-]."""
+FOUND_IN = 0.7
+"""Smallest share of the fits that must have found a mode [-]."""
+MOST = 3
+"""Largest number of modes that are returned."""
+FAINT = 0.1
+"""Smallest amplitude of a mode over that of the strongest [-]."""
+HEAVY = 0.1
+"""Damping ratio from which on a mode beside a lighter one may be a driven motion, or two modes taken for one [-]."""
+BESIDE = 1.5
+"""Largest ratio of the frequencies of two such modes [-]."""
+
+_Fit = tuple[list[Mode], float]
+"""Modes and rms of what they leave, each with time counted from the moment at which the fit begins."""
+
+
+def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> RingDown:
+    """Fit damped sines from several moments on, and keep the modes that most of the fits have found.
+
+    f_d and ζ are means over the fits, weighted by their variances. The interval is that of the best fit, widened by
+    what the others differ from the mean beyond their own noise (Hausman, Econometrica 46, 1978).
+
+    Args:
+        alpha: Acceleration of the tool, shape (T, 3) [m/s²].
+        time: Times of the samples after the stop, shape (T,) [s].
+        period: Time between samples where none is missing [s].
+        begin: Time after the stop from which on the arm is not driven any more, as far as one knows [s].
+
+    Returns:
+        The strongest mode. `ok` is false, with a `reason`, if the fits do not agree on one.
+    """
+    first = int(np.searchsorted(time, begin - 1e-9))
+    whole = Ring(alpha[first:], time[first:], period, (0.0,))
+    if whole.length < WINDOWS[0]:
+        return not_measurable(
+            f"only {whole.length:.3f} s were recorded after the stop, {WINDOWS[0]} s are needed"
+        )
+    starts, fits, step = [begin], list(_fits(whole.cut(LONGEST))), 0.0
+    heard = max((_audible(mode, rms, begin) for modes, rms in fits for mode in modes), default=0.0)
+    step = max(min(STEP, heard / (STARTS + 1), (whole.length - WINDOWS[0]) / (STARTS - 1)), period)
+    starts *= len(fits)
+    for start in begin + step * np.arange(1, STARTS):
+        first = int(np.searchsorted(time, start - 1e-9))
+        more = list(_fits(Ring(alpha[first:], time[first:], period, (0.0,)).cut(LONGEST)))
+        fits += more
+        starts += [start] * len(more)
+    heard_in = [
+        [mode for mode in modes if mode.amplitude_at(start) > AUDIBLE * rms and mode.zeta < 0.99 * DAMPING[1]]
+        for start, (modes, rms) in zip(starts, fits, strict=True)
+    ]
+    modes = _ordered([_mean(group, sum(map(bool, heard_in)), begin) for group in _groups(heard_in)], begin)
+    if not modes:
+        return not_measurable("fits from several moments after the stop do not agree on any mode")
+    rms = float(np.median([rms for _, rms in fits]))
+    r_squared = 1.0 - fits[0][1] ** 2 / float(np.mean(whole.cut(LONGEST).alpha ** 2))
+    return RingDown(
+        **vars(modes[0]), rms=rms, r_squared=r_squared, window=min(whole.length, LONGEST), modes=len(modes), ok=True,
+        found=tuple(modes),
+    )  # fmt: skip
+
+
+def _fits(ring: Ring) -> Iterator[_Fit]:
+    """Fit as many modes as pay, and one more."""
+    fits = []
+    for f_d, zeta in _poles(ring):
+        inside = (f_d > 3.05) & (f_d < 0.98 * ring.highest) & (np.abs(zeta) < 0.9 * DAMPING[1])
+        if inside.any():
+            start = np.column_stack([f_d[inside], np.clip(zeta[inside], 2.0 * DAMPING[0], 0.6)])
+            fits.append(ring.refine(start.ravel()))
+    chosen = 0
+    for index in range(1, len(fits)):
+        parameters = fits[index][1]
+        added = (parameters.size - fits[chosen][1].size) // 2
+        gain = ring.alpha.size * math.log((fits[chosen][0] + 1e-300) / (fits[index][0] + 1e-300))
+        noise = float(np.mean(ring.colour(ring.unexplained(parameters), parameters[::2])))
+        if added > 0 and gain > added * SIGNIFICANT * noise:
+            chosen = index
+    for _, parameters in fits[chosen : chosen + 2]:
+        modes, left = ring.modes_at(parameters)
+        yield modes, float(np.sqrt(np.mean(left**2)))
+
+
+def _poles(ring: Ring) -> Iterator[tuple[Floats, Floats]]:
+    """Estimate f_d and ζ by ESPRIT (Roy and Kailath, IEEE Trans. ASSP 37, 1989), for each number of modes."""
+    time, period = ring.time, ring.period
+    grid = np.arange(time[0], time[-1] + 0.5 * period, period)
+    joined = max(int(0.4 / (ring.highest * period)), 1)
+    count = len(grid) // joined
+    even = np.column_stack([np.interp(grid, time, axis) for axis in ring.alpha.T])[: count * joined]
+    even = (even - even.mean(axis=0)).reshape(count, joined, -1).mean(axis=1)
+    windows = [np.lib.stride_tricks.sliding_window_view(axis, count - count // 2 + 1) for axis in even.T]
+    signals = np.linalg.svd(np.concatenate(windows), full_matrices=False)[2].T
+    for order in ORDERS:
+        space = signals[:, : 2 * order + 1]
+        turns = np.linalg.eigvals(np.linalg.lstsq(space[:-1], space[1:])[0])
+        poles = np.log(turns[turns.imag > 1e-9]) / (joined * period)
+        yield poles.imag / (2.0 * np.pi), -poles.real / np.abs(poles)
+
+
+def _audible(mode: Mode, rms: float, begin: float) -> float:
+    """Time from the first fit's beginning until a mode has decayed to what the fit leaves [s]."""
+    loud = mode.amplitude_at(begin) / max(rms, 1e-12)
+    fall = math.log(mode.amplitude / mode.amplitude_at(1.0))
+    return math.log(loud) / fall if loud > AUDIBLE else 0.0
+
+
+def _groups(heard: Sequence[Sequence[Mode]]) -> Iterator[list[Mode]]:
+    """Modes of different fits with about the same f_d, for those that enough fits have found."""
+    pool = [list(modes) for modes in heard if modes]
+    least = max(FOUND_IN * len(pool), 3.0)
+    while candidates := [mode for modes in pool for mode in modes]:
+        groups = []
+        for candidate in candidates:
+            nearest = [min(modes, key=lambda m: abs(m.f_d - candidate.f_d)) for modes in pool if modes]
+            groups.append([m for m in nearest if abs(m.f_d / candidate.f_d - 1.0) <= NEAR])
+        group = max(groups, key=lambda one: (len(one), -float(np.std([m.f_d for m in one]) / one[0].f_d)))
+        if len(group) < least:
+            return
+        yield group
+        pool = [[mode for mode in modes if mode not in group] for modes in pool]
+
+
+def _mean(group: Sequence[Mode], fits: int, begin: float) -> Mode:
+    """Mean of a mode over its fits; its amplitude is the lower quartile, with nothing where a fit has not found it."""
+    f_d, f_d_error = _weighted([mode.f_d for mode in group], [mode.f_d_error for mode in group])
+    zeta, zeta_error = _weighted([mode.zeta for mode in group], [mode.zeta_error for mode in group])
+    amplitudes = [mode.amplitude_at(begin) for mode in group] + [0.0] * (fits - len(group))
+    amplitude = float(np.quantile(amplitudes, 0.25)) * math.exp(decay_rate(f_d, zeta) * begin)
+    return Mode(f_d, zeta, amplitude, f_d_error, zeta_error)
+
+
+def _weighted(values: Sequence[float], errors: Sequence[float]) -> tuple[float, float]:
+    """Mean weighted by variances, and its standard error."""
+    value, error = np.array(values), np.maximum(errors, 1e-9)
+    mean = float(np.average(value, weights=error**-2.0))
+    best = float(np.min(error))
+    beyond = np.abs(value - mean) - CERTAIN * np.sqrt(np.maximum(error**2 - best**2, 0.0))
+    return mean, best + max(float(np.max(beyond)), 0.0) / CERTAIN
+
+
+def _ordered(modes: Sequence[Mode], begin: float) -> list[Mode]:
+    """Return the modes that are loud and certain enough, the strongest first, but one that is suspect last."""
+    certain = [m for m in modes if m.f_d_error < 0.04 * m.f_d and m.zeta_error < max(0.5 * m.zeta, 0.01)]
+    loudest = max((mode.amplitude for mode in certain), default=0.0)
+    loud = [mode for mode in certain if mode.amplitude >= FAINT * loudest]
+    return sorted(loud, key=lambda mode: (lighter_beside(mode, loud) is not None, -mode.amplitude_at(begin)))[
+        :MOST
+    ]
+
+
+def lighter_beside(mode: Mode, modes: Sequence[Mode]) -> Mode | None:
+    """Return the mode near one with a damping ratio of 0.1 or more that has less than half of it, if there is one."""
+    near = (one for one in modes if max(one.f_d / mode.f_d, mode.f_d / one.f_d) < BESIDE)
+    return next((one for one in near if one.zeta < 0.5 * mode.zeta), None) if mode.zeta >= HEAVY else None

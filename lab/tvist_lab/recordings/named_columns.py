@@ -1,0 +1,113 @@
+"""Columns of a CSV whose names are not RTDE's, and numbers in other units than SI."""
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from tvist_lab.recordings.log_columns import PERIODS, TIME, LogError, found_columns
+from tvist_lab.recordings.recording import Floats
+from tvist_protocol.errors import quoted
+
+SHORT = {
+    "time": TIME,
+    "q": "actual_q",
+    "qd": "actual_qd",
+    "accelerometer": "actual_tool_accelerometer",
+    "pose": "actual_TCP_pose",
+}
+"""Short names of the columns that matter, and RTDE's."""
+AXES = {"x": 0, "y": 1, "z": 2}
+"""Letters that may stand where a vector's column has its number."""
+SI = {
+    "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "rad": 1.0, "deg": np.pi / 180.0, "m/s2": 1.0, "g": 9.80665,
+    "mg": 9.80665e-3, "rad/s": 1.0, "deg/s": np.pi / 180.0,
+}  # fmt: skip
+"""Units and their sizes in SI."""
+WIDEST = 7.0
+"""Largest angle that the middle one of an arm's joints reaches [rad]; more is in degrees."""
+GRAVITY_IN_G = (0.8, 1.2)
+"""Range of the length of an accelerometer's vector in units of gravity, at the median."""
+
+
+def named(path: Path, columns: str, header: Sequence[str]) -> tuple[list[str], dict[str, str]]:
+    """RTDE's names of a header's columns, and the units that were given.
+
+    Args:
+        path: The file, for messages.
+        columns: Such as `time=t:ms,q=joint_{}:deg,accelerometer=a{}:g`: a short name or one of RTDE's, the header's
+            name with `{}` for the number or the letter x, y, z of an entry, and after a colon the unit if it is not
+            SI.
+        header: Names of the file's columns.
+
+    Raises:
+        LogError: The text cannot be understood, or names a column that is not there.
+    """
+    names, units = [""] * len(header), dict[str, str]()
+    for item in columns.split(","):
+        key, _, value = (part.strip() for part in item.partition("="))
+        pattern, _, unit = value.partition(":")
+        rtde = SHORT.get(key, key)
+        if not key.isidentifier() or not pattern or (unit and unit not in SI):
+            raise LogError(
+                f"{path}: columns has {quoted(item)}: write NAME=COLUMN or NAME=COLUMN:UNIT, as in q=joint_{{}}:deg, "
+                f"with a unit of {', '.join(SI)}"
+            )
+        before, braces, after = pattern.partition("{}")
+        entry = re.compile(re.escape(before) + (r"(\d{1,6}|[xyz])" if braces else "") + re.escape(after))
+        hits = [(at, found) for at, name in enumerate(header) if (found := entry.fullmatch(name))]
+        if not hits:
+            raise LogError(f"{path} has no column {quoted(pattern)} for {key}; {found_columns(header)}")
+        hits.sort(key=lambda hit: int(AXES.get(hit[1][1], hit[1][1])) if braces else 0)
+        for index, (at, _) in enumerate(hits):
+            names[at] = f"{rtde}_{index}" if braces else rtde
+        if unit:
+            units[rtde] = unit
+    return names, units
+
+
+def in_si(names: Sequence[str], values: Floats, given: Mapping[str, str]) -> tuple[Floats, tuple[str, ...]]:
+    """Numbers in SI, and notes about the units that were found in the numbers and not given.
+
+    A time whose step can only be in ms, µs or ns, joint angles beyond 7 in most joints (degrees), and an accelerometer
+    that shows about 1 at rest (g) are converted.
+    """
+    places: dict[str, list[int]] = {}
+    for at, name in enumerate(names):
+        places.setdefault(re.sub(r"_\d+$", "", name), []).append(at)
+    units, notes = dict(given), list[str]()
+    for name, what, unit_of in (
+        (TIME, "grows by {:.4g} from row to row", _unit_of_time),
+        ("actual_q", "reaches {:.4g}", _unit_of_angles),
+        ("target_q", "reaches {:.4g}", _unit_of_angles),
+        ("actual_tool_accelerometer", "has a length of {:.2g} at the median", _unit_of_gravity),
+    ):
+        if name in places and name not in given:
+            seen, units[name] = unit_of(values[:, places[name]])
+            if SI[units[name]] != 1.0:
+                notes.append(f"{name} {what.format(seen)}: it is taken as {units[name]}")
+                for rate in (f"{name}d", f"{name}dd") if units[name] == "deg" else ():
+                    units.setdefault(rate, "deg/s")
+    if all(SI[one] == 1.0 for one in units.values()):
+        return values, ()
+    scale = np.ones(len(names))
+    for name, one in units.items():
+        scale[places.get(name, [])] = SI[one]
+    return values * scale, tuple(notes)
+
+
+def _unit_of_time(time: Floats) -> tuple[float, str]:
+    step = float(np.nanmedian(np.diff(time[:, 0]))) if np.isfinite(time[:, 0]).sum() > 1 else 0.0
+    fitting = (unit for unit in ("s", "ms", "us", "ns") if PERIODS[0] <= step * SI[unit] <= PERIODS[1])
+    return step, next(fitting, "s")
+
+
+def _unit_of_angles(q: Floats) -> tuple[float, str]:
+    largest = np.max(np.abs(np.nan_to_num(q)), axis=0)
+    return float(np.max(largest)), "deg" if np.median(largest) > WIDEST else "rad"
+
+
+def _unit_of_gravity(force: Floats) -> tuple[float, str]:
+    length = float(np.median(np.linalg.norm(np.nan_to_num(force), axis=1)))
+    return length, "g" if GRAVITY_IN_G[0] < length < GRAVITY_IN_G[1] else "m/s2"

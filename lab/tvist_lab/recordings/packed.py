@@ -1,0 +1,37 @@
+"""Content of a log that may be compressed by gzip."""
+
+import zlib
+from pathlib import Path
+
+from tvist_lab.recordings.log_columns import LogError
+
+GZIP = b"\x1f\x8b"
+"""First bytes of a file that gzip wrote."""
+DENSEST = 100
+"""Largest size of the content over that of its file; logs reach 30, a file made to fill the memory 1000."""
+LEAST = 1 << 20
+"""Size of the content that any file may have [bytes]."""
+
+
+def content(path: Path) -> bytes:
+    """Return what a file holds, decompressed; of a file that was cut off, the part that is there.
+
+    Raises:
+        LogError: The file is damaged, or would grow beyond a hundred times its size.
+        OSError: The file cannot be read.
+    """
+    data = path.read_bytes()
+    if not data.startswith(GZIP):
+        return data
+    room, parts = LEAST + DENSEST * len(data), list[bytes]()
+    while data.startswith(GZIP):
+        unpacker = zlib.decompressobj(wbits=31)
+        try:
+            parts.append(unpacker.decompress(data, room))
+        except zlib.error as error:
+            raise LogError(f"{path} is compressed by gzip and damaged: {error}") from None
+        if unpacker.unconsumed_tail:
+            raise LogError(f"{path} grows beyond {DENSEST} times its size: decompress it with gunzip")
+        room -= len(parts[-1])
+        data = unpacker.unused_data if room > 0 else b""
+    return b"".join(parts)

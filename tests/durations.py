@@ -1,0 +1,60 @@
+"""How long tests took, kept in durations.json; by it, what is longest begins first when tests run side by side.
+
+`pytest --keep-durations` writes the seconds of every test function that it ran, set-up and end included, its cases
+taken together; what it did not run keeps its figure, and what is no longer there is dropped.
+"""
+
+import json
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+KEPT = Path(__file__).with_name("durations.json")
+LEAST = 0.1
+"""Shorter test functions are kept as one sum a file [s]."""
+OTHERS = "the others"
+CLOCK = "clock"
+"""The group of tests that need time to pass: one process has them all, so there is only one of them at a time."""
+
+
+def kept():
+    """Seconds by file and test function, of the last runs that were kept."""
+    return json.loads(KEPT.read_text()) if KEPT.exists() else {}
+
+
+def arrange(items):
+    """Let one process have each file's tests, one have all that need the clock, and the longest group begin first."""
+    seconds = kept()
+    took = defaultdict(float)
+    for item in items:
+        file = item.nodeid.partition("::")[0]
+        group = CLOCK if item.get_closest_marker("realtime") else file
+        item.add_marker(pytest.mark.xdist_group(group))
+        took[group] = max(took[group], sum(seconds.get(file, {OTHERS: 10.0}).values()))
+    took[CLOCK] = float("inf")
+    items.sort(key=lambda item: -took[item.get_closest_marker("xdist_group").args[0]])
+
+
+class Durations:
+    """Adds up how long the tests of a run take, and writes it at the end."""
+
+    def __init__(self):
+        self.seconds = defaultdict(lambda: defaultdict(float))
+
+    def pytest_runtest_logreport(self, report):
+        file, _, test = report.nodeid.partition("::")
+        self.seconds[file][test.partition("[")[0].partition("@")[0]] += report.duration
+
+    def pytest_sessionfinish(self):
+        whole = {file: tests for file, tests in kept().items() if (ROOT / file).exists()} | {
+            file: _rounded(tests) for file, tests in self.seconds.items()
+        }
+        lines = (f" {json.dumps(file)}: {json.dumps(whole[file])}" for file in sorted(whole))
+        KEPT.write_text("{\n" + ",\n".join(lines) + "\n}\n")
+
+
+def _rounded(tests):
+    long = {test: round(took, 1) for test, took in sorted(tests.items()) if took >= LEAST}
+    return long | {OTHERS: round(sum(took for took in tests.values() if took < LEAST), 1)}

@@ -1,0 +1,560 @@
+"""Damaged files of every kind that is read: each is read, or refused in one sentence, in bounded time and memory.
+
+A child process reads them under limits of its processor time and memory, so that a file that hangs a reader, or takes
+memory without end, ends the child and not the tests. The file at fault remains in the child's folder.
+"""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+SECONDS = 10
+"""Longest processor time for one file, some hundred times what a good one takes [s]."""
+MEMORY = 1 << 30
+"""Largest memory that reading may add to what the good files took [bytes]."""
+TREE = Path(__file__).parents[2]
+
+NUMBERS = (
+    b"1e308", b"-1e308", b"1e999", b"nan", b"-inf", b"null", b"-1", b"0", b"2.5", b"9" * 20, b"-" + b"9" * 400,
+    b"9" * 5000, b"1e-320", b"99999999", b"[]", b'"x"', b"1,5", b"true", b"0x7f", b"\xff", b"",
+)  # fmt: skip
+WHOLE = (
+    0,
+    1,
+    0x7F,
+    0xFF,
+    0xFFFF,
+    10**6,
+    10**9,
+    2**31 - 1,
+    2**31,
+    2**32 - 1,
+    10**13,
+    2**40,
+    2**63 - 1,
+    2**64 - 1,
+)
+BEGINNINGS = (b"[", b"{", b"<a>", b'"', b"\0", b"\xff\xfe", b"#", b"\n", b",", b"\x1b]0;x\x07", b"(", b"a.")
+
+
+def mutated(data: bytes, random: np.random.Generator) -> bytes:
+    """Change a file in one to three ways."""
+    for _ in range(int(random.integers(1, 4))):
+        data = MUTATIONS[int(random.integers(len(MUTATIONS)))](bytearray(data), random)
+    return data
+
+
+def _some(data: bytearray, random: np.random.Generator, longest: int = 3000) -> tuple[int, int]:
+    """A place, often near the beginning or the end where headers are, and one after it."""
+    near = min(len(data), 600)
+    place = int(random.integers(near + 1))
+    match int(random.integers(3)):
+        case 0:
+            place = int(random.integers(len(data) + 1))
+        case 1:
+            place = len(data) - place
+    return place, min(len(data), place + int(random.integers(1, longest)))
+
+
+def flipped(data: bytearray, random: np.random.Generator) -> bytes:
+    for _ in range(int(random.integers(1, 9))):
+        place, _past = _some(data, random)
+        if place < len(data):
+            data[place] ^= 1 << int(random.integers(8))
+    return bytes(data)
+
+
+def cut(data: bytearray, random: np.random.Generator) -> bytes:
+    place, _ = _some(data, random)
+    return bytes(data[:place] if random.random() < 0.8 else data[place:])
+
+
+def removed(data: bytearray, random: np.random.Generator) -> bytes:
+    place, past = _some(data, random)
+    return bytes(data[:place] + data[past:])
+
+
+def doubled(data: bytearray, random: np.random.Generator) -> bytes:
+    place, past = _some(data, random)
+    return bytes(data[:past] + data[place:past] * int(random.integers(1, 30)) + data[past:])
+
+
+def overwritten(data: bytearray, random: np.random.Generator) -> bytes:
+    place, past = _some(data, random, 40)
+    fill = (b"\0", b"\xff", b"9", b" ", random.bytes(1))[int(random.integers(5))]
+    return bytes(data[:place] + fill * (past - place) + data[past:])
+
+
+def inserted(data: bytearray, random: np.random.Generator) -> bytes:
+    place, past = _some(data, random)
+    block = BEGINNINGS[int(random.integers(len(BEGINNINGS)))] * int(random.choice([1, 2, 50, 5000]))
+    return bytes(
+        data[:place] + (random.bytes(past - place) if random.random() < 0.3 else block) + data[place:]
+    )
+
+
+def renumbered(data: bytearray, random: np.random.Generator) -> bytes:
+    """Replace numbers that stand as text."""
+    for _ in range(int(random.integers(1, 4))):
+        place, _past = _some(data, random)
+        while place < len(data) and not 48 <= data[place] <= 57:
+            place += 1
+        past = place
+        while past < len(data) and (48 <= data[past] <= 57 or data[past] in b".e-+"):
+            past += 1
+        data[place:past] = NUMBERS[int(random.integers(len(NUMBERS)))]
+    return bytes(data)
+
+
+def resized(data: bytearray, random: np.random.Generator) -> bytes:
+    """Overwrite a field that could be a length or a count."""
+    place, _ = _some(data, random)
+    width = int(random.choice([1, 2, 4, 8]))
+    value = WHOLE[int(random.integers(len(WHOLE)))] % 256**width
+    data[place : place + width] = value.to_bytes(width, "little" if random.random() < 0.7 else "big")
+    return bytes(data)
+
+
+def shuffled(data: bytearray, random: np.random.Generator) -> bytes:
+    """Exchange, repeat or drop lines."""
+    lines = bytes(data).splitlines(keepends=True)
+    for _ in range(int(random.integers(1, 6))):
+        if len(lines) > 1:
+            first, other = (int(place) for place in random.integers(len(lines), size=2))
+            if random.random() < 0.5:
+                lines[first], lines[other] = lines[other], lines[first]
+            else:
+                lines[first] = lines[other] * int(random.integers(3))
+    return b"".join(lines)
+
+
+MUTATIONS = (flipped, cut, removed, doubled, overwritten, inserted, renumbered, resized, shuffled)
+
+
+def _log():
+    from tests.lab.synthetic_logs import SyntheticLog
+
+    return SyntheticLog(motions=1, rest=0.3, rate=60.0)
+
+
+def _csv(folder):
+    import gzip
+
+    packed = folder / "c.csv.gz"
+    found = [_log().csv(folder / "a.csv"), _log().csv(folder / "b.csv", " "), packed]
+    packed.write_bytes(gzip.compress(found[0].read_bytes()))
+    return found
+
+
+def _dump(folder):
+    return [_log().dump(folder / "dump", size=size) for size in (1116,)]
+
+
+def _rosbag(folder):
+    from mcap.writer import CompressionType, Writer
+
+    from tvist_lab.recordings.mcap_records import records
+
+    whole = _log().rosbag(folder / "bag") / "bag.mcap"
+    plain = folder / "plain.mcap"
+    with whole.open("rb") as source, plain.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.NONE, enable_crcs=False)
+        writer.start()
+        for record in records(source):
+            match type(record).__name__:
+                case "Schema":
+                    writer.register_schema(record.name, record.encoding, record.data)
+                case "Channel":
+                    writer.register_channel(record.topic, record.message_encoding, record.schema_id)
+                case "Message":
+                    writer.add_message(record.channel_id, record.log_time, record.data, record.publish_time)
+        writer.finish()
+    return [whole, plain]
+
+
+def _mcap(folder):
+    from mcap.writer import CompressionType, Writer
+    from tests.lab.test_mcap_file import INFO, START, TRUTH, msgspec, record, states
+
+    from tvist_protocol import Event
+    from tvist_protocol.recorded import to_json, topics
+    from tvist_server.recording.writer import heading
+
+    messages = [
+        *states(30), *(msgspec.structs.replace(TRUTH, tick=tick) for tick in range(1, 9)),
+        Event(tick=9, kind="motion_started", id=1),
+    ]  # fmt: skip
+    found = [record(folder / "zstd.mcap", messages)]
+    for compression in (CompressionType.LZ4, CompressionType.NONE):
+        path = folder / f"{compression.name}.mcap"
+        with path.open("wb") as stream:
+            writer = Writer(stream, compression=compression, enable_crcs=False)
+            writer.start()
+            writer.add_metadata("tvist", heading(INFO, START))
+            channels = {
+                kind: writer.register_channel(topic, "json", 0) for kind, topic in topics(INFO.name).items()
+            }
+            for message in messages:
+                at = message.tick * 2_000_000
+                writer.add_message(channels[type(message)], at, to_json(message), at)
+            writer.finish()
+        found.append(path)
+    return found
+
+
+def _exported(folder, kind):
+    from tests.lab.test_export import recording
+
+    from tvist_lab.recordings.export import export
+
+    export(recording(), path := folder / f"run.{kind}", kind)
+    return path
+
+
+def _parquet(folder):
+    import polars as pl
+
+    plain = folder / "plain.parquet"
+    names, values = _log().table()
+    pl.DataFrame(values, schema=names).write_parquet(plain, compression="uncompressed", row_group_size=40)
+    return [_exported(folder, "parquet"), plain]
+
+
+def _npz(folder):
+    path = folder / "plain.npz"
+    np.savez(path, **_log().columns)
+    return [_exported(folder, "npz"), path]
+
+
+def _mat(folder):
+    from scipy.io import savemat
+
+    for version in ("4", "5"):
+        savemat(folder / f"plain{version}.mat", _log().columns, format=version, oned_as="column")
+    return [_exported(folder, "mat"), folder / "plain4.mat", folder / "plain5.mat"]
+
+
+def _toml(folder):
+    path = folder / "robot.toml"
+    path.write_bytes((resources.files("tvist_plant") / "robots" / "ur5e.toml").read_bytes())
+    return [path]
+
+
+def _urdf(folder):
+    path = folder / "robot.urdf"
+    path.write_bytes((TREE / "tests" / "plant" / "urdf" / "seven.urdf").read_bytes())
+    return [path]
+
+
+def _calibration(folder):
+    found = []
+    for name in ("ur5e_5kg.json", "ur5e_modal.json"):
+        found.append(folder / name)
+        found[-1].write_bytes((resources.files("tvist_controller") / "calibrations" / name).read_bytes())
+    return found
+
+
+def _written(name, *contents):
+    def write(folder):
+        found = []
+        for number, content in enumerate(contents):
+            found.append(folder / f"{number}{name}")
+            found[-1].write_text(content, encoding="utf-8")
+        return found
+
+    return write
+
+
+def _program(folder):
+    import gzip
+
+    from tests.server.test_program_folder import SCRIPT_NODE, TEXT, polyscope
+
+    wait = "<Wait type='Sleep'><waitTime>0.5</waitTime></Wait>"
+    found = [folder / f"{name}.urp" for name in ("text", "xml", "packed")]
+    contents = (
+        TEXT.encode(),
+        polyscope(SCRIPT_NODE, wait).encode(),
+        gzip.compress(polyscope(SCRIPT_NODE).encode()),
+    )
+    for path, content in zip(found, contents, strict=True):
+        path.write_bytes(content)
+    return found
+
+
+def _read_recording(path):
+    from tvist_lab.recordings import RecordingError, read
+
+    return read, RecordingError
+
+
+def _read_robot(path):
+    from tvist_plant.description import load
+    from tvist_plant.user_file import UserFileError
+
+    return load, UserFileError
+
+
+def _read_calibration(path):
+    from tvist_controller.calibrations import load
+    from tvist_plant.user_file import UserFileError
+    from tvist_protocol.calibration import CalibrationError
+
+    return load, (CalibrationError, UserFileError)
+
+
+def _read_moves(path):
+    from tvist_lab.evaluation.moves import MovesError, read_moves
+    from tvist_plant.description import load
+    from tvist_plant.user_file import UserFileError
+
+    arm = load("ur5e")
+    return lambda path: read_moves(path, arm, lambda: 1.0), (MovesError, UserFileError)
+
+
+def _read_config(path):
+    from tvist_plant.user_file import UserFileError
+    from tvist_server.config import ConfigError, from_mapping, read_toml
+
+    return lambda path: from_mapping(read_toml(str(path)), f"configuration {path}"), (
+        ConfigError,
+        UserFileError,
+    )
+
+
+def _read_state(path):
+    from tvist_plant.user_file import UserFileError
+    from tvist_server.initial import InitialStateError, read_state
+
+    return lambda path: read_state(str(path)), (InitialStateError, UserFileError)
+
+
+def _read_sweep(path):
+    from tvist_lab.sweep.spec import read_spec
+    from tvist_plant.user_file import UserFileError
+
+    return read_spec, UserFileError
+
+
+def _read_program(path):
+    from tvist_plant.user_file import UserFileError
+    from tvist_server.program_folder import ProgramFolder
+
+    return lambda path: ProgramFolder(path.parent).read(path.name), UserFileError
+
+
+STATE = "q = [0.1, -1.2, 1.5, -1.8, -1.5, 0.0]\nseed = 7\nmode = 'IDLE'\n[payload]\nmass = 2.0\ncom = [0.0, 0.0, 0.1]\n"
+STATE += "inertia = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]\n"
+MOVES = (
+    '[{"start": [0, -1.2, 1.5, -1.8, -1.5, 0], "target": [0.3, -1.0, 1.5, -1.8, -1.5, 0.2], "payload": 2.5}]'
+)
+SWEEP = """shapers = ["zv", "auto"]
+moves = 8
+payloads = [0.0, 2.5, "uniform"]
+robots = ["ur5e", {robot = "ur3e", calibration = "ur3e-modal"}]
+seed = 3
+errors = [{payload = 10.0}, {frequency = -20.0}]
+"""
+CONFIG = 'robot = "ur5e"\nname = "arm"\nlisten = ["tcp/127.0.0.1:7447"]\nkeep = "5 min"\nrecord = "a.mcap"\n'
+
+READERS = {
+    "csv": (_csv, _read_recording),
+    "dump": (_dump, _read_recording),
+    "rosbag": (_rosbag, _read_recording),
+    "mcap": (_mcap, _read_recording),
+    "parquet": (_parquet, _read_recording),
+    "npz": (_npz, _read_recording),
+    "mat": (_mat, _read_recording),
+    "toml": (_toml, _read_robot),
+    "urdf": (_urdf, _read_robot),
+    "calibration": (_calibration, _read_calibration),
+    "moves": (_written("moves.json", MOVES), _read_moves),
+    "config": (_written("config.toml", CONFIG), _read_config),
+    "state": (_written("state.toml", STATE), _read_state),
+    "sweep": (_written("sweep.toml", SWEEP), _read_sweep),
+    "program": (_program, _read_program),
+}
+"""For each kind of file, what writes good ones, and what gives its reader and the errors by which it refuses."""
+
+
+def _text(name, text):
+    def write(folder):
+        (folder / name).write_text(text)
+        return [folder / name]
+
+    return write
+
+
+def _header(shape):
+    """An npz of one array that has this shape and no content."""
+
+    def write(folder):
+        import zipfile
+
+        from numpy.lib import format as npy
+
+        with zipfile.ZipFile(folder / "a.npz", "w") as file, file.open("timestamp.npy", "w") as part:
+            npy.write_array_header_1_0(part, {"descr": "<f8", "fortran_order": False, "shape": shape})
+        return [folder / "a.npz"]
+
+    return write
+
+
+def _rows(*more):
+    names = ["timestamp", *(f"actual_q_{joint}" for joint in range(6)), *more]
+    rows = [",".join([f"{0.002 * row}"] + ["0"] * (len(names) - 1)) for row in range(9)]
+    return "\n".join([",".join(names), *rows, ""])
+
+
+def _links(count, form):
+    """A URDF of many links that are fixed to each other: in a chain, or all to one."""
+    joint = (
+        '<joint name="j{0}" type="fixed"><parent link="l{1}"/><child link="l{0}"/></joint><link name="l{0}"/>'
+    )
+    tree = "".join(joint.format(link, link - 1 if form == "chain" else 0) for link in range(1, count))
+    return f'<robot name="r"><link name="l0"/>{tree}</robot>'
+
+
+LAUGHS = "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 30))
+HOSTILE = {
+    "a column of an index beyond all": ("csv", _text("a.csv", _rows("actual_q_" + "9" * 20))),
+    "a column of a large index": ("csv", _text("a.csv", _rows("x_999999", *(f"y{n}_99999999" for n in range(999))))),
+    "20,000 columns": ("csv", _text("a.csv", _rows(*(f"x_{column}" for column in range(20_000))))),
+    "20,000 vectors that lack entries": ("csv", _text("a.csv", _rows(*(f"x{name}_19999" for name in range(20_000))))),
+    "arrays of no rows and a billion columns": ("npz", _header((0, 10**9))),
+    "more numbers than there is memory": ("npz", _header((10**13,))),
+    "more numbers than there are": ("npz", _header((2**62, 2**62))),
+    "100,000 nested elements": ("urdf", _text("a.urdf", "<robot>" + "<link>" * 10**5)),
+    "a chain of 20,000 links": ("urdf", _text("a.urdf", _links(20_000, "chain"))),
+    "20,000 links on one": ("urdf", _text("a.urdf", _links(20_000, "star"))),
+    "entities of entities": ("urdf", _text("a.urdf", f"<!DOCTYPE a [<!ENTITY l0 'l'>{LAUGHS}]><robot>&l29;</robot>")),
+    "a sweep of 300,000 payloads": (
+        "sweep",
+        _text("a.toml", f"shapers=['zv']\nmoves=1\npayloads=[{','.join(f'{n}e-5' for n in range(300_000))}]"),
+    ),
+    "a number of 5,000 digits": ("moves", _text("a.json", f"[{{'start': [{'1' * 5000}]}}]".replace("'", '"'))),
+}  # fmt: skip
+"""Files made to hang a reader or to take its memory, each with its kind."""
+
+APART = {"parquet": 10, "mat": 10}
+"""How many times fewer files are tried of kinds that are read in a process of their own, a second each."""
+
+
+def _limit_time() -> None:
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+    resource.setrlimit(resource.RLIMIT_CPU, (int(used.ru_utime + used.ru_stime) + SECONDS, hard))
+
+
+def main(kind: str, count: int, seed: int, folder: Path) -> None:
+    """Read mutated files; whatever ends this function is a fault, and the last file is the one that has it."""
+    hostile = HOSTILE.get(kind)
+    write, reader = READERS[kind if hostile is None else hostile[0]]
+    (folder / "good").mkdir()
+    good = write(folder / "good")
+    read, refusal = reader(good[0])
+    for path in good:
+        read(path)
+    taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (taken + MEMORY, resource.RLIM_INFINITY))
+    was_read = 0
+    for number in range(count):
+        random = np.random.default_rng((seed, number))
+        path = good[number % len(good)]
+        bad = folder / f"bad-{path.name}"
+        if hostile is None:
+            bad.write_bytes(mutated(path.read_bytes(), random))
+        else:
+            (bad,) = hostile[1](folder)
+        _limit_time()
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        try:
+            read(bad)
+            was_read += 1
+        except refusal as error:
+            said = str(error)
+            if "\n" in said or str(bad) not in said or len(said) > 1000:
+                raise AssertionError(f"no sentence: {said}") from error
+        assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before < SECONDS
+    print(f"{was_read} of {count} were read")  # noqa: T201  the test reads it
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_a_file_made_to_hang_its_reader_does_not(kind, tmp_path, measured):
+    _try(kind, 1, tmp_path, measured)
+
+
+@pytest.mark.parametrize("kind", READERS)
+@pytest.mark.parametrize("count", [200, pytest.param(10_000, marks=pytest.mark.nightly)])
+def test_a_damaged_file_is_read_or_refused_in_a_sentence(kind, count, tmp_path, measured):
+    _try(kind, count // APART.get(kind, 1), tmp_path, measured)
+
+
+def _try(kind, count, tmp_path, measured):
+    child = subprocess.run(
+        [sys.executable, "-m", "tests.lab.test_mutated_files", kind, str(count), "0", tmp_path],
+        cwd=TREE, env=os.environ | {"POLARS_MAX_THREADS": "1", "PYTHONPATH": str(TREE)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    name = signal.Signals(-child.returncode).name if child.returncode < 0 else f"exit {child.returncode}"
+    files = ", ".join(path.name for path in tmp_path.glob("bad-*"))
+    assert child.returncode == 0, f"{name}, one of {files} in {tmp_path}:\n{child.stderr[-3000:]}"
+    measured(kind, child.stdout.strip())
+
+
+HARMFUL = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\u202e[red]"
+
+
+def test_no_text_of_a_file_gives_a_terminal_commands(capsys, monkeypatch):
+    from tvist_cli.failure import Failure
+    from tvist_cli.main import main
+    from tvist_cli.output import out, print_json, say, table, words
+
+    out.print(HARMFUL)
+    say(HARMFUL)
+    table(HARMFUL, (HARMFUL, "b"), [(HARMFUL, HARMFUL)])
+    words({HARMFUL: HARMFUL})
+    print_json({"text": HARMFUL})
+
+    def refuse():
+        raise Failure(HARMFUL)
+
+    monkeypatch.setattr("tvist_cli.main.application", lambda *_: lambda *_args, **_kwargs: refuse())
+    monkeypatch.setattr(sys, "argv", ["tvist", "info"])
+    with pytest.raises(SystemExit):
+        main()
+    said = "".join(capsys.readouterr())
+    assert not set(said) & set("\x1b\x07\x9b\r\u202e")
+    assert said.count("[red]") >= 5
+
+
+@pytest.mark.parametrize("name", [HARMFUL, "n" * 101])
+@pytest.mark.parametrize("key", ["name", "model", "joints"])
+def test_a_robot_with_a_name_that_cannot_be_shown_is_refused(key, name, tmp_path):
+    import json
+    import re
+
+    from tvist_plant.description import load
+    from tvist_plant.user_file import UserFileError
+
+    (shipped,) = _toml(tmp_path)
+    begin = re.compile(rf'^{key}\s*= *(\[\s*)?".*?"', re.MULTILINE)
+    new = f"{key} = {'[' * (key == 'joints')}{json.dumps(name)}"
+    text, count = begin.subn(lambda _: new, shipped.read_text(), count=1)
+    assert count
+    bad = tmp_path / "bad.toml"
+    bad.write_text(text)
+    with pytest.raises(UserFileError, match=f"robot.{key} has the name .*at most 100 printable") as refused:
+        load(bad)
+    assert str(refused.value).isprintable()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]))

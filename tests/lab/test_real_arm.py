@@ -1,0 +1,52 @@
+"""A real UR5 that rings: nine seconds of a published recording, see `data/NOTICE`."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tvist_lab.metrics import Measured
+from tvist_lab.recordings import read
+
+RECORDED = Path(__file__).parent / "data" / "ur5_that_rings.csv.gz"
+STOPS = {11.406: 11.88, 12.656: 12.83, 15.647: 8.84}
+"""End of the target's motion [s], and f_d there [Hz]: by matrix pencils of three orders on three axes, mean of the
+repetitions."""
+
+
+def without(folder, *names):
+    """The log without columns whose names begin so."""
+    log = folder / "log.csv"
+    recorded = read(RECORDED)
+    kept = [name for name in recorded.columns if not name.startswith(names)]
+    columns = {name: np.atleast_2d(recorded[name].T) for name in kept if name != "tick"}
+    header = [
+        f"{name}_{i}" if len(rows) > 1 else name for name, rows in columns.items() for i in range(len(rows))
+    ]
+    rows = np.vstack(list(columns.values())).T
+    np.savetxt(log, rows, "%.7g", ",", header=",".join(header), comments="")
+    return log
+
+
+@pytest.mark.parametrize(
+    "missing", [(), ("target_qd",), ("target_",)], ids=["whole", "no speeds", "no target"]
+)
+def test_a_real_arms_frequencies_are_right_or_refused_whatever_the_log_lacks(tmp_path, missing):
+    results = Measured.of(read(without(tmp_path, *missing) if missing else RECORDED)).results
+    assert len(results) == len(STOPS)
+    for result, (stop, f_d) in zip(results, STOPS.items(), strict=True):
+        assert result.stop_s == pytest.approx(stop, abs=0.03)
+        if result.f_d_hz is None:
+            assert missing
+            assert "f_d_hz" in result.notes
+            continue
+        low, high = result.f_d_interval_hz
+        assert result.f_d_hz == pytest.approx(f_d, rel=0.05)
+        assert low * 0.98 <= f_d <= high * 1.02  # the repetitions differ by 1 to 2 %
+        assert result.zeta == pytest.approx(0.047, abs=0.015)
+
+
+def test_its_modes_are_listed_the_strongest_first():
+    for result in Measured.of(read(RECORDED)).results:
+        assert 1 <= len(result.modes) <= 3
+        assert result.modes[0]["f_d_hz"] == result.f_d_hz

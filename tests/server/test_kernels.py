@@ -1,0 +1,117 @@
+"""Compiling ahead: which kernels, how far it is, and that it leaves nothing behind."""
+
+import subprocess
+import sys
+
+import pytest
+
+from tvist_server import kernels
+
+LISTED = "; print(*sorted(kernel.name for kernel in KERNELS))"
+ALONE = "from tvist_server.kernels import KERNELS" + LISTED
+AFTER_ALL = (
+    "import tvist_lab.demo, tvist_lab.evaluation.evaluate, tvist_view.live, tvist_server.workers;" + ALONE
+)
+SLEEP = "import time; print('{}', flush=True); time.sleep(1000)"
+
+
+class Kernel:
+    """One that is on disk after so many looks."""
+
+    def __init__(self, looks):
+        self.looks = looks
+
+    def holds(self):
+        self.looks -= 1
+        return self.looks < 0
+
+
+@pytest.fixture
+def begun(monkeypatch):
+    """What the processes run that compile, by part; those that were started."""
+    programs, started = {}, []
+
+    def begin(part):
+        command = [sys.executable, "-c", programs[part]]
+        started.append(
+            subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        )
+        return started[-1]
+
+    monkeypatch.setattr(kernels, "PARTS", programs)
+    monkeypatch.setattr(kernels, "_begin", begin)
+    monkeypatch.setattr(kernels, "LOOK", 0.0)
+    return programs, started
+
+
+def test_the_share_grows_from_look_to_look(begun, monkeypatch):
+    begun[0].update(a="input()", b="input()")
+    monkeypatch.setattr(kernels, "KERNELS", tuple(map(Kernel, (0, 1, 3))))
+    told = []
+
+    def tell(*share):
+        told.append(share)
+        if len(told) == 5:  # nothing is left to do
+            for process in begun[1]:
+                process.stdin.write(b"\n")
+                process.stdin.flush()
+
+    kernels.compile_ahead(2, tell)
+    assert told[:5] == [(1, 3), (2, 3), (2, 3), (3, 3), (3, 3)]
+
+
+def test_no_more_processes_than_wanted_compile_at_once(begun):
+    begun[0].update(dict.fromkeys("abc", "pass"))
+    running = []
+    kernels.compile_ahead(1, lambda *_: running.append(sum(one.poll() is None for one in begun[1])))
+    assert len(begun[1]) == 3
+    assert max(running) <= 1
+
+
+def test_a_failure_is_told_in_one_sentence(begun):
+    begun[0].update(a="pass", b="raise SystemExit(3)", c="print('noise'); raise SystemExit('no room')")
+    with pytest.raises(kernels.KernelsError, match=r"^no room$"):
+        kernels.compile_ahead(1)
+
+
+def test_a_signal_ends_the_processes_that_compile(begun):
+    begun[0].update(a=SLEEP, b=SLEEP)
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        kernels.compile_ahead(2, interrupt)
+    assert [process.returncode for process in begun[1]] == [-9, -9]
+
+
+def test_the_kernels_of_a_robot_are_the_same_whatever_else_is_imported():
+    alone, after_all = (
+        subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, check=True
+        ).stdout.split()
+        for program in (ALONE, AFTER_ALL)
+    )
+    assert len(alone) > 50
+    assert alone == after_all
+
+
+@pytest.mark.nightly
+def test_a_robot_with_all_its_motions_and_shapers_compiles_nothing_that_is_not_compiled_ahead(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    subprocess.run([sys.executable, "-m", "tvist_cli", "kernels"], check=True)
+    program = (
+        "from tvist_server.kernels import KERNELS\n"
+        "print(*[kernel.name for kernel in KERNELS if not kernel.holds()])"
+    )
+    missing = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert missing.stdout == "\n"
+    ahead = sorted(tmp_path.rglob("*.kernel"))
+    from tests.conftest import __file__ as shared
+
+    subprocess.run(
+        [sys.executable, "-c", f"import runpy; runpy.run_path({shared!r})['compile_kernels']()"], check=True
+    )
+    assert sorted(tmp_path.rglob("*.kernel")) == ahead

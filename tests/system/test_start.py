@@ -1,0 +1,113 @@
+"""A robot that is starting answers, says how far it is, and is found only when it is ready."""
+
+import os
+
+import msgpack
+import pytest
+from tests.conformance.served import Served
+from tests.conformance.session import plain_session
+from tests.system.test_sweep import wait_until
+
+from tvist_client.check import check
+from tvist_client.errors import NotConnectedError
+from tvist_client.robot import Robot
+from tvist_protocol.codec import encode
+from tvist_protocol.commands import TakeControl
+from tvist_protocol.errors import RefusedError
+
+SLOW = """
+import os, sys
+from tvist_cli.commands import serve
+from tvist_cli.main import main
+def compile_slowly(tell):
+    with open(os.environ["PROGRESS"]) as progress:
+        for line in progress:
+            tell(*map(int, line.split()))
+serve.compile_if_new = compile_slowly
+sys.argv[0] = "tvist"
+main()
+"""
+"""`tvist serve` with a step of compiling that is as far as a pipe says, and over when it ends."""
+ONE = ("--clock", "lockstep")
+SEVERAL = (*ONE, "--robots", "ur5e*3")
+
+
+class SlowlyServed(Served):
+    program = ("-c", SLOW, "serve")
+
+
+def asked(endpoint, key):
+    """What plain Zenoh clients hear on a key."""
+    payload = encode(TakeControl(client="eager")) if key.endswith("command") else None
+    with plain_session(endpoint) as session:
+        return [msgpack.unpackb(reply.ok.payload.to_bytes()) for reply in session.get(key, payload=payload)]
+
+
+@pytest.mark.parametrize(
+    ("options", "names", "place"),
+    [
+        pytest.param((*ONE, "--namespace", "hall-3"), ["ur5e"], "hall-3", marks=pytest.mark.quick),
+        pytest.param(
+            (*SEVERAL, "--workers", "2"), ["ur5e-1", "ur5e-2", "ur5e-3"], "", marks=pytest.mark.quick
+        ),
+        (SEVERAL, ["ur5e-1", "ur5e-2", "ur5e-3"], ""),
+        ((*SEVERAL, "--workers", "2", "--namespace", "hall-3"), ["ur5e-1", "ur5e-2", "ur5e-3"], "hall-3"),
+    ],
+)
+async def test_all_queries_are_answered_with_the_share_until_the_robots_are_ready(
+    options, names, place, tmp_path, monkeypatch
+):
+    pipe = tmp_path / "progress"
+    os.mkfifo(pipe)
+    monkeypatch.setenv("PROGRESS", str(pipe))
+    served = SlowlyServed(*options, name=None if "--robots" in options else "ur5e")
+    within = f"{place}/tvist" if place else "tvist"
+    keys = [f"{within}/{name}/{leaf}" for name in names for leaf in ("command", "info")]
+
+    def says(words):
+        return all(words in answer["why"] for key in keys for answer in asked(served.endpoint, key))
+
+    try:
+        with pipe.open("w", buffering=1) as progress:  # the server reads: its network is open
+            for done in (3, 5):
+                progress.write(f"{done} 7\n")
+                wait_until(lambda done=done: says(f"the robot is starting: {done} of 7 kernels are compiled"))
+            for key in keys:
+                assert [answer["code"] for answer in asked(served.endpoint, key)] == ["starting"]
+            with pytest.raises(RefusedError, match="starting: the robot is starting: 5 of 7"):
+                await Robot.connect(served.endpoint, names[0], namespace=place)
+            with pytest.raises(NotConnectedError, match="there are no robots"):
+                await Robot.connect(served.endpoint, "other", namespace=place)
+            assert "listens" not in served.said
+        served.wait_until_ready()
+        for name in names:
+            async with await Robot.connect(served.endpoint, name, namespace=place) as robot:
+                assert (await robot.info()).name == name
+        for key in keys:
+            assert [answer["type"] for answer in asked(served.endpoint, key)] == [
+                "accepted" if key.endswith("command") else "info"
+            ]
+        assert served.end() == 0
+        served.assert_quiet()
+    finally:
+        served.kill()
+
+
+@pytest.mark.nightly
+def test_a_first_start_says_a_growing_share_and_nothing_is_compiled_after_it(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    served = Served(*ONE)
+    heard = []
+    try:
+        report = check(served.endpoint, wait=float("inf"), tell=heard.append)
+        assert report.ok, report
+        shares = [int(said.split(": ")[1].split(" of ")[0]) for said in heard if "kernels" in said]
+        assert shares == sorted(shares)
+        assert shares[0] < 10 < shares[-1]
+        assert "compiling what a robot computes for this processor; this happens once" in served.said
+        assert " kernels are compiled\n" in served.said
+        served.end()
+    finally:
+        served.kill()
+    with Served(*ONE) as again:
+        assert "compil" not in again.said

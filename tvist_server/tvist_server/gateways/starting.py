@@ -1,0 +1,34 @@
+"""What clients hear of a robot that is not ready yet."""
+
+from collections.abc import Callable
+
+from tvist_protocol.codec import encode
+from tvist_protocol.replies import Refused
+from tvist_server.gateways.base import Answer, Queried
+
+Tell = Callable[[int, int], None]
+"""Takes the number of kernels that are compiled, and of all."""
+Prepare = Callable[[Tell], None]
+"""Does what takes long before robots can be made."""
+
+
+class Starting(Queried):
+    """Refuses every query to robots that are starting, and says how far that is."""
+
+    def __init__(self) -> None:
+        self._how_far = ""
+
+    def note(self, done: int, total: int) -> None:
+        """Note how many kernels are compiled, of how many."""
+        self._how_far = f"{done} of {total} kernels are compiled; "
+
+    def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  whatever it is
+        """Refuse a command."""
+        answer(self._refused())
+
+    def info(self, answer: Callable[[bytes], None]) -> None:
+        """Refuse to describe the robot."""
+        answer(encode(self._refused()))
+
+    def _refused(self) -> Refused:
+        return Refused(code="starting", where="", why=f"the robot is starting: {self._how_far}try again")

@@ -1,0 +1,55 @@
+"""A temporary folder that is removed even after its process was killed, at the latest by the next one."""
+
+import contextlib
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+_PREFIX = "tvist-own-"
+
+
+class OwnFolder:
+    """A folder that only this user can enter, until `close`.
+
+    It is locked while this process lives, or one that was forked from it. The folders of this user that nobody holds
+    any more were left by processes that were killed; they are removed first.
+
+    Raises:
+        OSError: There is no folder for temporary files.
+    """
+
+    def __init__(self) -> None:
+        import fcntl  # which Windows does not have
+
+        temporary = Path(tempfile.gettempdir())
+        for left in temporary.glob(f"{_PREFIX}*"):
+            _remove_unless_held(left)
+        made = Path(tempfile.mkdtemp(prefix=".tvist-"))
+        self._lock = os.open(made, os.O_RDONLY)
+        fcntl.flock(self._lock, fcntl.LOCK_EX)
+        self.path = made.rename(temporary / f"{_PREFIX}{made.name.removeprefix('.tvist-')}")
+
+    def remove(self) -> None:
+        """Remove the folder, whoever uses it."""
+        shutil.rmtree(self.path, ignore_errors=True)
+
+    def close(self) -> None:
+        """Remove the folder and its lock; a second call does nothing."""
+        self.remove()
+        if self._lock >= 0:
+            os.close(self._lock)
+            self._lock = -1
+
+
+def _remove_unless_held(folder: Path) -> None:
+    import fcntl
+
+    with contextlib.suppress(OSError):  # another user's, or held
+        lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        try:
+            if os.fstat(lock).st_uid == os.geteuid():
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(folder, ignore_errors=True)
+        finally:
+            os.close(lock)
