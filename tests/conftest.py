@@ -25,7 +25,7 @@ def pytest_configure(config):
         config.pluginmanager.register(Durations())
 
 
-@pytest.hookimpl(tryfirst=True)
+@pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(config, items):
     """Mark what needs no mark of its own, see README.md, and order what runs side by side."""
     for item in items:
@@ -33,8 +33,13 @@ def pytest_collection_modifyitems(config, items):
             item.add_marker(pytest.mark.slow)
         if "realtime" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.realtime)
-    if hasattr(config, "workerinput"):
-        arrange(items)
+    if not hasattr(config, "workerinput"):
+        return (yield)
+    arrange(items)
+    done = yield
+    if not all("@" in item.nodeid for item in items):
+        raise pytest.UsageError("pytest-xdist does not group tests: its version does not fit that of pytest")
+    return done
 
 
 def pytest_sessionstart(session):

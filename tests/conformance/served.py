@@ -1,4 +1,4 @@
-"""`tvist serve`, as a user starts it: a process, a free port, and what it says on stderr."""
+"""`tvist serve`: a process, a free port, and what it says on stderr."""
 
 import os
 import signal
@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 
+from tests import forked
 from tests.places import free_endpoint
 
 PATIENCE = 300.0
@@ -17,7 +18,7 @@ NOISE = ("Traceback", "leaked", "nanobind", "Exception ignored", "Fatal Python e
 def refused_to_start(*options, endpoint=None):
     """What `tvist serve` says when it does not begin, and its exit code."""
     with_port = ("--listen", endpoint or free_endpoint())
-    ended = subprocess.run(
+    ended = forked.run(
         [sys.executable, "-m", "tvist_cli", "serve", *with_port, *map(str, options)],
         capture_output=True,
         text=True,
@@ -50,7 +51,8 @@ class Served:
         where = "--listen" if router is None else "--connect"
         named = () if name is None else ("--name", name)
         self._news = threading.Condition()
-        self.process = subprocess.Popen(
+        start = subprocess.Popen if around else forked.Popen
+        self.process = start(
             [*around, sys.executable, *self.program, where, self.endpoint, *named, *options],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,

@@ -9,7 +9,6 @@ import os
 import re
 import shlex
 import signal
-import subprocess
 import sys
 import textwrap
 import tomllib
@@ -17,6 +16,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
+from tests import forked
 from tests.conformance.served import Served
 from tests.places import own_address
 
@@ -59,7 +59,7 @@ def without_code(text):
 
 
 def run(*arguments, cwd=ROOT):
-    return subprocess.run(
+    return forked.run(
         [sys.executable, *map(str, arguments)],
         capture_output=True,
         text=True,

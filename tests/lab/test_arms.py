@@ -1,11 +1,11 @@
 """The arms that come with the package: each is described, calibrated, and stilled by auto."""
 
 import json
-import subprocess
 import sys
 
 import numpy as np
 import pytest
+from tests import forked
 
 from tvist_controller.calibrations import available
 from tvist_controller.calibrations import load as load_calibration
@@ -43,7 +43,7 @@ def test_three_arms_are_stilled_by_auto_out_of_the_box(tmp_path):
     """By the command that the reference page names, with fewer moves."""
     page = tmp_path / "robots.md"
     command = ("robots", "ur3e", "ur10e", "ur20", "--measure", "--random", "10", "--json", "--markdown", page)
-    ended = subprocess.run(
+    ended = forked.run(
         [sys.executable, "-m", "tvist_cli", *map(str, command)],
         capture_output=True,
         text=True,

@@ -7,13 +7,13 @@ memory without end, ends the child and not the tests. The file at fault remains 
 import os
 import resource
 import signal
-import subprocess
 import sys
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests import forked
 
 SECONDS = 10
 """Longest processor time for one file, some hundred times what a good one takes [s]."""
@@ -498,7 +498,7 @@ def test_a_damaged_file_is_read_or_refused_in_a_sentence(kind, count, tmp_path, 
 
 
 def _try(kind, count, tmp_path, measured):
-    child = subprocess.run(
+    child = forked.run(
         [sys.executable, "-m", "tests.lab.test_mutated_files", kind, str(count), "0", tmp_path],
         cwd=TREE, env=os.environ | {"POLARS_MAX_THREADS": "1", "PYTHONPATH": str(TREE)},
         capture_output=True, text=True, check=False,

@@ -22,9 +22,14 @@ def raising():
 
 def test_a_signal_waits_until_the_body_is_through(raising):
     did = []
-    with pytest.raises(KeyboardInterrupt), signals_held():
-        signal.raise_signal(signal.SIGTERM)
-        did.append("all of it")
+
+    def interrupted():
+        with signals_held():
+            signal.raise_signal(signal.SIGTERM)
+            did.append("all of it")
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
     assert did == ["all of it"]
     assert signal.getsignal(signal.SIGTERM) is raising
 

@@ -11,6 +11,7 @@ import threading
 import msgspec
 import pytest
 from mcap.reader import make_reader
+from tests import forked
 
 from tvist_protocol import Event, Info, Setpoint, State, Truth
 from tvist_protocol.generate import FOLDER
@@ -364,7 +365,7 @@ recorder.close()
 
 def recording_process(path, size, limit=0):
     arguments = [str(path), msgspec.json.encode(INFO).decode(), msgspec.json.encode(STATE).decode()]
-    return subprocess.Popen(
+    return forked.Popen(
         [sys.executable, "-c", CHILD, *arguments, str(size), str(limit)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,

@@ -10,6 +10,7 @@ import threading
 import msgpack
 import pytest
 import zenoh
+from tests import forked
 from tests.places import free_endpoint
 
 from tvist_protocol.codec import MAX_BYTES
@@ -297,7 +298,7 @@ with zenoh.open(config) as session:
 
 
 def test_a_reader_that_stops_loses_states_but_no_event_and_never_holds_up_the_publisher(gateway, endpoint):
-    reader = subprocess.Popen(
+    reader = forked.Popen(
         [sys.executable, "-c", READER, endpoint], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     with reader:
@@ -332,7 +333,7 @@ print("end of main")
 
 
 def test_a_process_that_forgets_to_close_ends_all_the_same(endpoint):
-    ended = subprocess.run(
+    ended = forked.run(
         [sys.executable, "-c", FORGETFUL, endpoint], capture_output=True, text=True, timeout=100, check=True
     )
     assert (ended.stdout, ended.stderr) == ("end of main\n", "")

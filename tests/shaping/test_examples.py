@@ -2,11 +2,11 @@
 
 import ast
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from tests import forked
 
 FOLDER = Path(__file__).parents[2] / "shaping" / "examples"
 EXAMPLES = sorted(FOLDER.glob("*.py"))
@@ -24,7 +24,7 @@ def test_an_example_imports_numpy_and_the_library_alone(example):
 
 
 def test_the_one_joint_example_shows_that_zv_needs_the_right_frequency():
-    ended = subprocess.run(
+    ended = forked.run(
         [sys.executable, FOLDER / "one_joint.py"], capture_output=True, text=True, check=True, timeout=300
     )
     left = {

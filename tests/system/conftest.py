@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from tests import forked
 from tests.conformance.conftest import live, lockstep, realtime  # noqa: F401  fixtures
 from tests.conformance.served import PATIENCE
 from tests.conformance.wire import Wire
@@ -36,7 +37,7 @@ def start():
     processes = []
 
     def start(*arguments):
-        process = subprocess.Popen([sys.executable, *map(str, arguments)], stdout=subprocess.PIPE)
+        process = forked.Popen([sys.executable, *map(str, arguments)], stdout=subprocess.PIPE)
         processes.append(process)
         assert process.stdout.readline() == b"under way\n"
         return process

@@ -10,6 +10,7 @@ from importlib import resources
 from pathlib import Path
 
 import pytest
+from tests import forked
 from tests.conformance.served import NOISE, PATIENCE, Served, free_endpoint
 from tests.conformance.wire import STOPPED, Wire
 
@@ -52,7 +53,7 @@ class Ended:
 
 
 def python(*arguments, timeout=PATIENCE, cwd=None):
-    ended = subprocess.run(
+    ended = forked.run(
         [sys.executable, *map(str, arguments)],
         capture_output=True,
         text=True,
@@ -71,7 +72,7 @@ def tvist(*arguments, **options):
 def recorded(realtime, tmp_path_factory):
     """A recording that `tvist record` made of a motion, and what it said."""
     path = tmp_path_factory.mktemp("recorded") / "seen.mcap"
-    process = subprocess.Popen(
+    process = forked.Popen(
         [sys.executable, "-m", "tvist_cli", "record", path, "--endpoint", realtime.endpoint, "--json"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -234,7 +235,7 @@ class TestRecordAndAnalyze:
         self, realtime, tmp_path
     ):
         path = tmp_path / "short.mcap"
-        process = subprocess.Popen(
+        process = forked.Popen(
             [
                 sys.executable,
                 "-m",
@@ -320,7 +321,7 @@ class TestMoveAndWatch:
             tvist("move", HERE, "--endpoint", realtime.endpoint).assert_done()
             wire.listen("state")
             far = "3.0,-3.1,0.1,-1.5,0.1,0.1"
-            process = subprocess.Popen(
+            process = forked.Popen(
                 [sys.executable, "-m", "tvist_cli", "move", far, "--endpoint", realtime.endpoint, "--json"],
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
@@ -384,7 +385,7 @@ class TestMoveAndWatch:
         assert {state["type"] for state in states} == {"state"}
 
     def test_watch_ends_well_at_control_c(self, realtime):
-        process = subprocess.Popen(
+        process = forked.Popen(
             [sys.executable, "-m", "tvist_cli", "watch", realtime.endpoint, "--json"],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

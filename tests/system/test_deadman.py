@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests import forked
 from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Q1, STOPPED, TICK
 
@@ -71,7 +72,7 @@ def stream_and_end(endpoint, bystander, how, options, setpoints):
     assert bystander.command("simulation.reset", token=token, q=Q1, mode="RUNNING")["type"] == "done"
     assert bystander.command("release_control", token=token) == {"type": "done"}
     began = bystander.until_later(5)["tick"]
-    client = subprocess.Popen(
+    client = forked.Popen(
         [sys.executable, CLIENT, endpoint, "stream", "lease_s=1", *options, *STREAM],
         stdout=subprocess.PIPE,
     )

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from itertools import pairwise
 
 import pytest
+from tests import forked
 from tests.conformance.served import PATIENCE, free_endpoint
 from tests.conformance.wire import Q1, STOPPED, TICK, Wire
 
@@ -146,7 +147,7 @@ threading.Event().wait()
 @contextmanager
 def router(robot, endpoint):
     """A Zenoh router of its own between clients and a robot; it is killed at the end."""
-    process = subprocess.Popen([sys.executable, "-c", ROUTER, robot, endpoint], stdout=subprocess.PIPE)
+    process = forked.Popen([sys.executable, "-c", ROUTER, robot, endpoint], stdout=subprocess.PIPE)
     try:
         assert process.stdout.readline() == b"routes\n"
         yield process

@@ -3,12 +3,12 @@
 import ast
 import json
 import signal
-import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from tests import forked
 from tests.conformance.served import PATIENCE, Served, free_endpoint
 from tests.conformance.wire import Q1, STOPPED, TICK, Wire
 
@@ -211,7 +211,7 @@ class TestAnArmThatFails:
             served.wait_until_said("look with tvist analyze")
         (dump,) = tmp_path.glob("*.mcap")
         assert f"tvist-ur5e-1-{served.process.pid}-{event['tick']}" in dump.name
-        analysed = subprocess.run(
+        analysed = forked.run(
             [sys.executable, "-m", "tvist_cli", "analyze", str(dump), "--json"],
             capture_output=True,
             timeout=PATIENCE,

@@ -4,12 +4,12 @@ import asyncio
 import json
 import shutil
 import signal
-import subprocess
 import sys
 from collections import Counter
 
 import pytest
 import zenoh
+from tests import forked
 from tests.conformance.served import PATIENCE, Served, free_endpoint
 from tests.conformance.wire import Q1, Wire
 from zenoh.handlers import Callback
@@ -48,7 +48,7 @@ ALL = [Place("", "ur5e-1"), Place("", "ur5e-2"), Place("hall-3/line-1", "ur5e-1"
 
 
 def tvist(*arguments):
-    ended = subprocess.run(
+    ended = forked.run(
         [sys.executable, "-m", "tvist_cli", *arguments],
         capture_output=True, text=True, timeout=PATIENCE, check=False,
     )  # fmt: skip

@@ -3,11 +3,11 @@
 import asyncio
 import json
 import math
-import subprocess
 import sys
 
 import msgspec
 import pytest
+from tests import forked
 from tests.conformance.served import PATIENCE, Served
 
 from tvist_client.robot import Robot
@@ -24,7 +24,7 @@ STRIDE = 4
 
 def tvist(*arguments):
     """Run `tvist`; its exit code, the JSON object it printed, and its stderr."""
-    ended = subprocess.run(
+    ended = forked.run(
         [sys.executable, "-m", "tvist_cli", *map(str, arguments), "--json"],
         capture_output=True,
         text=True,

@@ -2,10 +2,10 @@
 
 import re
 import socket
-import subprocess
 import sys
 
 import pytest
+from tests import forked
 from tests.conformance.served import PATIENCE, Served
 from tests.places import own_address
 
@@ -61,7 +61,7 @@ def test_without_the_option_nothing_listens():
     ],
 )
 def test_what_is_wrong_is_said_in_a_sentence(options, code, named):
-    ended = subprocess.run(
+    ended = forked.run(
         [sys.executable, "-m", "tvist_cli", "serve", "--listen", "tcp/127.0.0.1:0", *options],
         capture_output=True,
         text=True,

@@ -4,12 +4,12 @@ import itertools
 import signal
 import socket
 import struct
-import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
+from tests import forked
 from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Wire
 from tests.places import own_address
@@ -34,7 +34,7 @@ def test_whatever_becomes_of_the_client_the_arm_stops_inside_its_limits_and_a_re
             wire.listen("event", "state")
             for manner in MANNERS:
                 seen = len(wire.received["event"])
-                driver = subprocess.Popen([sys.executable, DRIVER, HOST, manner])
+                driver = forked.Popen([sys.executable, DRIVER, HOST, manner])
                 wire.wait("event", lambda event: event["kind"] == "program_stopped", since=seen)
                 driver.send_signal(signal.SIGKILL)
                 driver.wait(PATIENCE)

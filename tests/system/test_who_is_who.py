@@ -7,6 +7,7 @@ from pathlib import Path
 import msgpack
 import pytest
 import zenoh
+from tests import forked
 from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Q1, Wire
 
@@ -35,7 +36,7 @@ AT_ONCE = 25
 def holder(realtime, live):
     """A process that has control and moves the arm: itself, its session and its token."""
     live.listen("state", "event", "telemetry")
-    process = subprocess.Popen(
+    process = forked.Popen(
         [sys.executable, "-c", HOLDER, str(ROOT), realtime.endpoint],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests import forked
 from tools.release.changelog import notes
 from tools.release.prepare import check, prepare
 from tools.release.versions import ReleaseError, common_version, distributions
@@ -139,7 +140,7 @@ def test_a_tag_that_does_not_fit_is_refused(checkout, tag, why):
 
 def test_the_command_says_what_to_do_next_and_fails_with_a_sentence(checkout):
     def run(*words):
-        return subprocess.run(
+        return forked.run(
             [sys.executable, "-m", "tools.release", "--root", checkout, *words],
             capture_output=True, text=True, check=False, cwd=ROOT,
         )  # fmt: skip
@@ -154,5 +155,5 @@ def test_the_command_says_what_to_do_next_and_fails_with_a_sentence(checkout):
 
 def test_checksums_are_those_that_sha256sum_checks(tmp_path):
     (tmp_path / "a.whl").write_bytes(b"a")
-    subprocess.run([sys.executable, "-m", "tools.release", "checksums", tmp_path], check=True, cwd=ROOT)
+    forked.run([sys.executable, "-m", "tools.release", "checksums", tmp_path], check=True, cwd=ROOT)
     subprocess.run(["sha256sum", "--check", "--strict", "SHA256SUMS"], check=True, cwd=tmp_path)

@@ -1,11 +1,11 @@
 """What a checker tells, and what has limits."""
 
 import doctest
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from tests import forked
 
 from tvist_urscript import ScriptError, check, compile_script, signature
 
@@ -108,7 +108,7 @@ def test_the_name_of_a_program_is_its_first_word():
 
 
 def run(path):
-    return subprocess.run(
+    return forked.run(
         [sys.executable, "-m", "tvist_urscript", str(path)], capture_output=True, text=True, check=False
     )
 

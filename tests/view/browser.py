@@ -9,6 +9,7 @@ import threading
 from contextlib import contextmanager
 
 import pytest
+from tests import forked
 from tests.conformance.served import PATIENCE
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -48,7 +49,7 @@ class Page:
     def __init__(self, *arguments, command="view"):
         self.lines = []
         self._news = threading.Condition()
-        self.process = subprocess.Popen(
+        self.process = forked.Popen(
             [sys.executable, "-m", "tvist_cli", command, *map(str, arguments), "--port", "0"],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
