@@ -17,6 +17,7 @@ import select
 import signal
 import socket
 import sys
+import tempfile
 import threading
 import types
 import warnings
@@ -99,6 +100,7 @@ def become(words, environment, folder, session):
     os.environ.clear()
     os.environ.update(environment)
     os.chdir(folder)
+    tempfile.tempdir = None  # as TMPDIR says now
     if session:
         os.setsid()
     sys.stdin, sys.stdout, sys.stderr = open(0, closefd=False), stream(1), stream(2)  # noqa: SIM115
