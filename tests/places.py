@@ -3,11 +3,12 @@
 import itertools
 import os
 import socket
+from functools import cache
 
 FIRST_PORT, PORTS, PROCESSES = 10_000, 200, 99
 """Below the ports that systems give to outgoing connections, and below UR's own, which begin at 29999."""
 
-_count = itertools.count()
+_count, _held = itertools.count(), []
 
 
 def own_address(last):
@@ -22,12 +23,28 @@ def free_port():
     Raises:
         OSError: Somebody listens on all that this process may take.
     """
-    first = FIRST_PORT + os.getpid() % PROCESSES * PORTS
-    for _ in range(PORTS):
-        port = first + next(_count) % PORTS
+    first = _first_port()
+    for _ in range(PORTS - 1):
+        port = first + 1 + next(_count) % (PORTS - 1)
         if _is_free(port):
             return port
     raise OSError(f"ports {first} to {first + PORTS - 1} of 127.0.0.1 are all in use")
+
+
+@cache
+def _first_port():
+    """The first of this process's ports, which it holds until its end so that no other process takes them."""
+    for number in range(PROCESSES):
+        first = FIRST_PORT + (os.getpid() + number) % PROCESSES * PORTS
+        held = socket.socket()
+        try:
+            held.bind(("127.0.0.1", first))
+        except OSError:
+            held.close()
+            continue
+        _held.append(held)
+        return first
+    raise OSError(f"{PROCESSES} processes of tests hold all ports from {FIRST_PORT} on")
 
 
 def free_endpoint():

@@ -1,14 +1,18 @@
 """One robot in a process of its own, which the test's process commands over a socket.
 
-From the test: `state` to publish the present state, `close` to end in order, with a complete recording. To the test:
-one line of JSON with the robot's endpoint, or with the reason why there is none. The end of the socket is like `close`.
+From the test: `state` to publish the present state, `close` to complete the recording and end, `leave` to end. To the
+test: one line of JSON with the robot's endpoint, or with the reason why there is none; and after `close` or `leave` one
+with the number of clients of UR's interfaces, without which it goes on: ur_rtde aborts its process when a robot goes
+that it is connected to. At the end of the socket, which is that of the test's process, the robot ends in any case.
 """
 
 import asyncio
+import contextlib
 import json
 import logging
 import os
 import secrets
+import select
 import signal
 import socket
 import sys
@@ -18,11 +22,16 @@ from typing import Any
 from tvist_server.config import from_mapping
 from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError
+from tvist_server.robot import ServedRobot
 from tvist_server.server import Server
 from tvist_server.ur_ports import UrPorts
 from tvist_testing.preparation import Preparation
 from tvist_testing.wanted import WantedRobot
 
+LOOK = 0.05
+"""Time between two looks at whether the last client has gone [s]."""
+COMPLETING = 20.0
+"""Longest wait for the end of the recording [s]."""
 ATTEMPTS = 50
 """Number of ports or addresses to try, since another process may take one just before the robot listens there."""
 
@@ -96,13 +105,35 @@ def _free_port(address: str) -> int:
 
 def _obey(connection: socket.socket, server: Server, ending: Ending) -> None:
     robot = server.robots[0]
-    with connection.makefile("rb") as orders:
+    with contextlib.suppress(OSError), connection.makefile("rb") as orders:
         for order in orders:
             if order == b"state\n":
                 robot.driven.post(robot.repeat)
-            else:
-                break
+                continue
+            if order == b"close\n" and server.ur_clients:
+                _complete_recording(robot)
+            _tell(connection, {"clients": server.ur_clients})
+            _see_off(connection, server)
+            break
     ending.request()
+
+
+def _complete_recording(robot: ServedRobot) -> None:
+    """End the recording between two ticks, while the robot goes on."""
+    done = threading.Event()
+
+    def complete() -> None:
+        robot.close_recording()
+        done.set()
+
+    robot.driven.post(complete)
+    done.wait(COMPLETING)
+
+
+def _see_off(connection: socket.socket, server: Server) -> None:
+    """Wait until the last client of UR's interfaces has gone, or the test's process has ended."""
+    while server.ur_clients and not select.select([connection], [], [], LOOK)[0]:
+        pass
 
 
 def _tell(connection: socket.socket, message: dict[str, Any]) -> None:

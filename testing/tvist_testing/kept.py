@@ -42,7 +42,7 @@ class RobotOfTest:
 
     def discard(self) -> None:
         """End the robot at once, and remove its files."""
-        self.served.kill()
+        self.served.discard()
         for file in (self.recording, self.log):
             file.unlink(missing_ok=True)
 

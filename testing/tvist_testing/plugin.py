@@ -4,6 +4,8 @@ It is loaded wherever this package is installed, so it imports nothing but pytes
 follows with the first robot.
 """
 
+import sys
+import traceback
 from collections.abc import Callable, Generator, Iterator
 from typing import TYPE_CHECKING
 
@@ -116,7 +118,9 @@ def tvist_ur(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> Itera
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Say in the report of a failed test where its recordings are; at the test's end keep them, or remove them."""
     report = yield
     robots = item.stash.get(_ROBOTS, [])
@@ -130,6 +134,8 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
         keep_all = item.config.getoption("tvist_keep_all")
         if keep_all and not told:
             _note(item, report, robots)
+        if call.excinfo is None:
+            _release_locals()
         for robot in robots:
             if told or keep_all:
                 robot.keep()
@@ -138,6 +144,18 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
         del item.stash[_ROBOTS]
         item.stash[_TOLD] = False  # a test may run again
     return report
+
+
+def _release_locals() -> None:
+    """Let the last failure's local variables go, which has been reported, so that clients among them end now.
+
+    While a client of UR's interfaces is connected, its robot goes on; see `forked_robot`.
+    """
+    error, seen = getattr(sys, "last_value", None), set[int]()
+    while error is not None and id(error) not in seen:
+        seen.add(id(error))
+        traceback.clear_frames(error.__traceback__)
+        error = error.__cause__ or error.__context__
 
 
 def _tell(item: pytest.Item, report: pytest.TestReport, robots: "list[RobotOfTest]") -> None:

@@ -36,7 +36,7 @@ class ServedRobot:
         host: IP address of UR's interfaces; empty if they are not open.
         ports: Port of each of UR's interfaces.
         pid: Number of its process.
-        closed: Whether it has ended.
+        closed: Whether it has ended, or ends as soon as its last client has gone.
     """
 
     def __init__(self, connection: socket.socket, told: dict[str, Any]) -> None:
@@ -45,6 +45,7 @@ class ServedRobot:
         self.ports: dict[str, int] = told.get("ports", {})
         self.pid = int(told["pid"])
         self.closed = False
+        self._left = False
         self._connection = connection
 
     def publish_state(self) -> None:
@@ -53,14 +54,33 @@ class ServedRobot:
 
     def close(self) -> None:
         """End the robot in order, so that its recording is complete, or else at once; a second call does nothing."""
+        self._leave(b"close\n")
+
+    def discard(self) -> None:
+        """End the robot; nothing is left to be read. A second call does nothing."""
+        if self.host:
+            self._leave(b"leave\n")
+        else:
+            self.kill()
+
+    def _leave(self, order: bytes) -> None:
+        """End the robot; but while a client of UR's interfaces is connected, it goes on until that has gone."""
         if self.closed:
             return
         with contextlib.suppress(OSError):
             os.kill(self.pid, signal.SIGCONT)  # a test may have stopped it
             self._connection.settimeout(ENDING)
-            self._connection.sendall(b"close\n")
+            self._connection.sendall(order)
+            if _line(self._connection).get("clients"):
+                self.closed = self._left = True
+                return
             self._wait()
         self.kill()
+
+    def forget(self) -> None:
+        """Leave a robot with clients to itself: it ends when this process has ended, and its clients with it."""
+        if self._left:
+            self._connection.detach()
 
     def kill(self) -> None:
         """End the robot at once, even if a test has stopped its process; nothing is left to be read."""
@@ -107,14 +127,17 @@ class Robots:
             ours.close()
             raise CannotServeError(str(told.get("error", f"the robot ended at its start: see {wanted.log}")))
         served = ServedRobot(ours, told)
-        self._served = [one for one in self._served if not one.closed] + [served]
+        self._served.append(served)
         return served
 
     def close(self) -> None:
         """End the process, and robots that still run; a second call does nothing."""
         for served in self._served:
-            if not served.closed:
+            if served.closed:
+                served.forget()
+            else:
                 served.kill()
+        self._served.clear()
         if self._requests is not None:
             self._requests.close()
             self._requests = None

@@ -62,6 +62,7 @@ async def test_another_robots_endpoint_is_said_to_be_that(realtime, endpoint):
 
 async def test_a_token_whose_name_is_none_is_no_robot(endpoint):
     config = zenoh.Config.from_json5(f'{{mode: "router", listen: {{endpoints: ["{endpoint}"]}}}}')
+    config.insert_json5("scouting/multicast/enabled", "false")
     with zenoh.open(config) as other:
         tokens = [
             other.liveliness().declare_token(key)

@@ -16,6 +16,7 @@ def plain_session(endpoint, settings=()):
     for path, value in {
         "mode": "client",
         "connect/endpoints": [endpoint],
+        "listen/endpoints": [],  # a router would take Zenoh's usual port, which belongs to no test
         "scouting/multicast/enabled": False,
         **dict(settings),
     }.items():

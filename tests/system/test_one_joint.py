@@ -4,6 +4,7 @@ import json
 
 import pytest
 from tests.conformance.served import Served
+from tests.conformance.wire import Wire
 from tests.system.test_command_line import tvist
 
 from tvist_plant.description import load
@@ -12,36 +13,34 @@ from tvist_protocol.calibration import calibration_from_json
 
 
 @pytest.fixture(scope="module")
-def realtime(tmp_path_factory):
-    """The arm in real time, and the file that it is recorded into."""
-    path = tmp_path_factory.mktemp("one_joint") / "served.mcap"
-    with Served("--robot", "one-joint", "--truth", "--record", str(path)) as served:
-        yield served, path
+def served():
+    """The arm in lockstep, so that no busy machine overloads it."""
+    with Served("--robot", "one-joint", "--clock", "lockstep") as served:
+        yield served
 
 
 class TestServed:
-    def test_it_takes_the_names_of_its_own_poses(self, realtime):
-        served, _ = realtime
-        for pose in ("Q3", "q1"):
-            assert "moved to" in tvist("move", pose, "--endpoint", served.endpoint).assert_done().out
-
-    def test_angles_of_another_arm_are_refused(self, realtime):
-        served, _ = realtime
+    def test_angles_of_another_arm_are_refused(self, served):
         ended = tvist("move", "0,-3,0,-1.5,0,0", "--endpoint", served.endpoint)
         ended.assert_failed(1, "q has 6 angles; the arm has 2")
 
-    def test_it_is_checked_and_watched(self, realtime):
-        served, _ = realtime
+    def test_it_is_checked_and_watched(self, served):
         assert "2 joints" in tvist("check", served.endpoint).assert_done().out
         said = tvist("watch", served.endpoint, "--seconds", 1, "--json").assert_done().out
         states = [json.loads(line) for line in said.splitlines()]
         assert all(len(state["actual_q"]) == 2 for state in states)
 
-    def test_it_is_recorded_analyzed_and_replayed(self, realtime, tmp_path):
-        served, path = realtime
-        tvist("record", tmp_path / "seen.mcap", "--endpoint", served.endpoint, "--seconds", 1).assert_done()
-        assert tvist("analyze", tmp_path / "seen.mcap", "--json").assert_done().json["motions"] == []
-        served.end()
+    def test_it_takes_the_names_of_its_own_poses_and_is_recorded_analyzed_and_replayed(self, tmp_path):
+        path, seen = tmp_path / "served.mcap", tmp_path / "seen.mcap"
+        options = ("--robot", "one-joint", "--truth", "--clock", "lockstep", "--record", str(path))
+        with Served(*options) as served:
+            at = ("--endpoint", served.endpoint)
+            tvist("record", seen, *at, "--seconds", 1).assert_done()
+            assert tvist("analyze", seen, "--json").assert_done().json["motions"] == []
+            for pose in ("Q3", "q1"):
+                assert "moved to" in tvist("move", pose, *at).assert_done().out
+            with Wire(served.endpoint) as wire, wire.control() as token:
+                wire.step(token, 400)  # what rings after the motion
         found = tvist("analyze", path, "--figures", tmp_path, "--json").assert_done().json["motions"]
         assert len(found) == 2
         assert (tmp_path / "motion_2.png").exists()

@@ -15,9 +15,9 @@ from tvist_client import Robot
 from tvist_client.blocking import Robot as BlockingRobot
 from tvist_client.errors import DeniedError, NotConnectedError
 from tvist_client.fleet import Fleet, Place
-from tvist_client.transports.certificates import why_refused
+from tvist_client.transports.certificates import PROBE_S, why_refused
 from tvist_client.transports.session import open_session
-from tvist_server.gateways.network import GatewayError, Network
+from tvist_server.gateways.network import CONFIG, GatewayError, Network
 from tvist_view.pilot import Pilot
 
 from .keyring import forge, free_tls_endpoint, leave_out, made, shown, tvist
@@ -343,6 +343,7 @@ class TestNoSession:
                 NotConnectedError, match=f"the robot there has no certificates: give {plain} without"
             ):
                 open_session(endpoint, ring / "anna")
+            assert 1000 * PROBE_S > 1.5 * CONFIG["transport/unicast/accept_timeout"]  # no race between both
         finally:
             network.close()
 

@@ -154,9 +154,11 @@ class TestUr:
     def test_ur_rtde_moves_it(self, tvist_ur):
         control = pytest.importorskip("rtde_control").RTDEControlInterface(tvist_ur.host)
         target = [-1.2, -1.6, -2.1, -0.9, 1.6, 0.0]
-        assert control.moveJ(target, 1.05, 1.4)
-        control.stopScript()
-        control.disconnect()
+        try:
+            assert control.moveJ(target, 1.05, 1.4)
+            control.stopScript()
+        finally:
+            control.disconnect()
         assert_settles_within(tvist_ur, 0.5)
         assert tvist_ur.info().payload.mass == 3.0
         assert tvist_ur.state().actual_q == pytest.approx(target, abs=2e-3)

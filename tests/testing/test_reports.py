@@ -197,6 +197,36 @@ def test_two_workers_side_by_side_never_meet(pytester):
     assert all("tvist_seed" in properties(case) for case in cases)
 
 
+@pytest.mark.realtime
+def test_clients_of_ur_rtde_that_are_left_open_do_not_abort_the_tests(pytester):
+    """In a failed test, by a fixture, and for good: the robot goes on until they have gone."""
+    pytest.importorskip("rtde_io")
+    pytester.makepyfile("""
+        import pytest, rtde_io
+        opened = []
+        @pytest.fixture
+        def client(tvist_ur):
+            return rtde_io.RTDEIOInterface(tvist_ur.host)
+        def test_fails(tvist_ur):
+            client = rtde_io.RTDEIOInterface(tvist_ur.host)
+            assert not client
+        def test_passes(client):
+            assert client.setStandardDigitalOut(1, True)
+        def test_keeps_it(tvist_ur):
+            opened.append(rtde_io.RTDEIOInterface(tvist_ur.host))
+            assert not opened
+        def test_goes_on(tvist_ur):
+            tvist_ur.advance(100)
+            assert opened[0].setStandardDigitalOut(1, True)
+    """)
+    ran = pytester.runpytest_subprocess("-p", "no:cacheprovider")
+    ran.assert_outcomes(passed=2, failed=2)
+    assert ran.ret == 1
+    kept = list(Path("tvist-recordings").rglob("*.mcap"))
+    assert len(kept) == 2
+    assert all(mcap_file.read(path).complete for path in kept)
+
+
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="needs Linux")
 def test_robots_end_with_the_process_of_the_tests(pytester):
     """However it ends: here at once, without any clean-up."""

@@ -1,18 +1,20 @@
 """Preparing a release: all versions and the changelog change together, or nothing does."""
 
+import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from tests import forked
 from tools.release.changelog import notes
 from tools.release.prepare import check, prepare
 from tools.release.versions import ReleaseError, common_version, distributions
 
 ROOT = Path(__file__).parents[2]
 DATE = "2031-02-03"
+FOUND = {**os.environ, "PYTHONPATH": str(ROOT)}
+"""Environment in which Python finds the package `tools` from anywhere."""
 
 
 def git(root, *words):
@@ -140,9 +142,9 @@ def test_a_tag_that_does_not_fit_is_refused(checkout, tag, why):
 
 def test_the_command_says_what_to_do_next_and_fails_with_a_sentence(checkout):
     def run(*words):
-        return forked.run(
+        return subprocess.run(
             [sys.executable, "-m", "tools.release", "--root", checkout, *words],
-            capture_output=True, text=True, check=False, cwd=ROOT,
+            capture_output=True, text=True, check=False, env=FOUND,
         )  # fmt: skip
 
     done = run("prepare", "9.1.0")
@@ -155,5 +157,5 @@ def test_the_command_says_what_to_do_next_and_fails_with_a_sentence(checkout):
 
 def test_checksums_are_those_that_sha256sum_checks(tmp_path):
     (tmp_path / "a.whl").write_bytes(b"a")
-    forked.run([sys.executable, "-m", "tools.release", "checksums", tmp_path], check=True, cwd=ROOT)
+    subprocess.run([sys.executable, "-m", "tools.release", "checksums", tmp_path], check=True, env=FOUND)
     subprocess.run(["sha256sum", "--check", "--strict", "SHA256SUMS"], check=True, cwd=tmp_path)

@@ -10,6 +10,8 @@ from tvist_lab.collect import collect
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_plant.description import load
+from tvist_view.moments import Moments
+from tvist_view.scene import Moment
 from tvist_view.signals import History, rests_since
 
 TWISTS = load("ur5e").kinematics.alpha
@@ -43,6 +45,31 @@ def history(collected, samples=5000, *, truth=True):
 def test_alpha_is_the_laboratorys(collected, truth):
     expected = amplitude(tool_acceleration(collected.recording(), truth=truth))
     np.testing.assert_allclose(history(collected, truth=truth).signals().alpha, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_what_is_drawn_and_plotted_is_of_one_tick_in_whatever_order_state_and_truth_come(collected, seed):
+    random = np.random.default_rng(seed)
+    times = np.maximum.accumulate(np.arange(30) + random.integers(-4, 5, 30)) + 0.5
+    lost = set(random.integers(0, 30, seed).tolist())
+    states = [(float(place), state) for place, state in enumerate(collected.states[:30])]
+    truths = [(times[i], truth) for i, truth in enumerate(collected.truths[:30]) if i not in lost]
+    moments, kept = Moments(), History(TWISTS, 100)
+    assert moments.newest() is None
+    for _, message in sorted(states + truths, key=lambda pair: pair[0]):
+        moments.add(message)
+        drawn = moments.newest()
+        assert drawn is None or drawn.truth is None or drawn.truth.tick == drawn.state.tick
+    for _, state in states:
+        kept.add(state)
+    for _, truth in truths:
+        kept.add_truth(truth)
+    assert drawn.state.tick == max(truth.tick for _, truth in truths)
+    expected = amplitude(tool_acceleration(collected.recording(), truth=True))[:30]
+    expected[list(lost)] = np.nan
+    np.testing.assert_allclose(kept.signals().alpha, expected, atol=1e-9)
+    moments.add(collected.states[0])  # it has started anew
+    assert moments.newest() == Moment(collected.states[0], None)
 
 
 def test_a_full_ring_keeps_the_newest_in_order(collected):

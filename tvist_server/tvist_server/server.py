@@ -256,6 +256,11 @@ class Server:
         return None if self.metrics is None else self.metrics.page
 
     @property
+    def ur_clients(self) -> int:
+        """Number of connections to UR's interfaces that are open now."""
+        return sum(interfaces.clients for interfaces in self._interfaces)
+
+    @property
     def failure(self) -> str | None:
         """Why a robot has stopped ticking; None if all of them tick."""
         return next((robot.failure for robot in self.robots if robot.failure is not None), None)

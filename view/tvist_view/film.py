@@ -57,11 +57,11 @@ class Film:
         self._stops = [_stops(track) for track in tracks]
         self._middle, self._reach = self._seen()
         after = [
-            float(track.signals.between(at + SETTLED_S, at + REST_S).alpha.max(initial=0.1))
+            track.signals.between(at + SETTLED_S, at + REST_S).largest_alpha()
             for track, stops in zip(tracks, self._stops, strict=True)
             for at in stops
         ]
-        largest = max(float(track.signals.alpha.max()) for track in tracks)
+        largest = max(track.signals.largest_alpha() for track in tracks)
         self._highest = 1.3 * max(*after, 0.1) if after else max(largest, 0.1)
 
     def picture(self, time: float) -> Image.Image:

@@ -19,11 +19,12 @@ from tvist_protocol.stream import Event, State, Truth
 from tvist_view.appearance import Appearance
 from tvist_view.chain import Chain, GeometryError
 from tvist_view.cockpit import Cockpit
+from tvist_view.moments import Moments
 from tvist_view.pictures import PLOT_EVERY, pictures
 from tvist_view.pilot import Pilot
 from tvist_view.plain import plain
 from tvist_view.plots import Plots
-from tvist_view.scene import DrawnRobot, Moment
+from tvist_view.scene import DrawnRobot
 from tvist_view.signals import History
 from tvist_view.stage import is_watched, look_at
 
@@ -134,7 +135,8 @@ class LivePage:
         self._pilot = Pilot(robot, f"view-{os.getpid()}", self._say)
         self._history = History(info.geometry.alpha, 2000)
         self._state: State | None = None
-        self._truths: dict[int, Truth] = {}
+        self._moments = Moments()
+        self._has_truth = False
         self._cockpits: dict[int, Cockpit] = {}
         self._over = False
         self._posted: set[asyncio.Task[Any]] = set()
@@ -183,13 +185,13 @@ class LivePage:
 
     async def _frames(self) -> None:
         async for count in pictures():
-            if self._state is not None and is_watched(self._server):  # nothing is drawn for nobody
-                truth = self._truth_of(self._state)
+            moment = self._moments.newest()
+            if moment is not None and is_watched(self._server):  # nothing is drawn for nobody
                 with self._server.atomic():
-                    self._drawn.show(Moment(self._state, truth), self._appearance)
+                    self._drawn.show(moment, self._appearance)
                 if count % PLOT_EVERY == 0:
-                    self._plots.show((self._history.signals(),), self._state.timestamp)
-                    self._tell(self._state)
+                    self._plots.show((self._history.signals(),), moment.state.timestamp)
+                    self._tell(moment.state)
 
     async def _ask(self) -> None:
         """Ask once a second who has control, and which shaper is in use."""
@@ -219,25 +221,17 @@ class LivePage:
         if self._status.content != words:
             self._status.content = words
 
-    def _truth_of(self, state: State) -> Truth | None:
-        """The truth of the state's tick; where it has not come yet, the newest."""
-        if not self._truths:
-            return None
-        return self._truths.get(state.tick) or self._truths[max(self._truths)]
-
     def _on_state(self, state: State) -> None:
         self._state = state
+        self._moments.add(state)
         self._history.add(state)
 
     def _on_truth(self, truth: Truth) -> None:
-        if self._truths and truth.tick < max(self._truths):  # a robot that has started anew
-            self._truths.clear()
-        elif not self._truths:
+        if not self._has_truth:
+            self._has_truth = True
             self._appearance.truth_has_come(self._factor)
-        self._truths[truth.tick] = truth
+        self._moments.add(truth)
         self._history.add_truth(truth)
-        if len(self._truths) > 8:  # a state's truth comes with it, or a message before or after
-            del self._truths[min(self._truths)]
 
     def _on_event(self, event: Event) -> None:
         if event.kind in {"protective_stop", "safety_stop", "warning", "lease_lost"} and event.why:

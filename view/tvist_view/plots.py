@@ -77,12 +77,12 @@ class Plots:
             if not len(signals.time):
                 continue
             name = f'<b style="color:{colour}">{label}</b>: ' if label else ""
-            peak = f"{name}largest {np.nan_to_num(signals.alpha).max():.2f} m/s²"
+            peak = f"{name}largest {signals.largest_alpha():.2f} m/s²"
             words = f"{name}mean delay of the shaper {1e3 * signals.delay[-1]:.0f} ms"
             rests = rests_since(signals)
             if rests is not None:
-                rest = signals.between(rests[1] + BRAKES_S, signals.time[-1]).alpha
-                peak += f", {rest.max(initial=0.0):.2f} m/s² after the stop"
+                rest = signals.between(rests[1] + BRAKES_S, signals.time[-1])
+                peak += f", {rest.largest_alpha():.2f} m/s² after the stop"
                 words += f"; came to rest {1e3 * (rests[1] - rests[0]):.0f} ms after its reference"
             peaks.append(peak)
             delays.append(words)

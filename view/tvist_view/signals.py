@@ -21,7 +21,10 @@ class Signals:
     time: Floats
     """Simulation time, shape (T,) [s]."""
     alpha: Floats
-    """|α|, acceleration of the tool without gravity, shape (T,) [m/s²]."""
+    """|α|, acceleration of the tool without gravity, shape (T,) [m/s²].
+
+    True and free of noise where the robot tells the truth, and then NaN at a tick whose truth is missing; else measured.
+    """
     acceleration: Floats
     """Largest |q̈| over the joints of the shaped reference, shape (T,) [rad/s²]."""
     unshaped: Floats
@@ -32,6 +35,10 @@ class Signals:
     """Damping ratio of the lowest mode, as estimated, shape (T,) [-]."""
     delay: Floats
     """Mean delay of the shaper, shape (T,) [s]."""
+
+    def largest_alpha(self) -> float:
+        """Largest |α| that is known, 0 without any [m/s²]."""
+        return float(np.nan_to_num(self.alpha).max(initial=0.0))
 
     def between(self, start: float, end: float) -> "Signals":
         """The samples of a span of time, both ends included."""
@@ -94,7 +101,8 @@ class History:
         if len(truths):
             place = np.clip(np.searchsorted(truths[:, 0], time), 0, len(truths) - 1)
             same = np.abs(truths[place, 0] - time) < 1e-9
-            alpha[same] = _length(truths[:, 1:4] - GRAVITY * _up(truths[:, 4:7]))[place][same]
+            true = _length(truths[:, 1:4] - GRAVITY * _up(truths[:, 4:7]))
+            alpha = np.where(same, true[place], np.nan)  # the sensor's noise would look like vibration
         return Signals(
             time=time,
             alpha=alpha,

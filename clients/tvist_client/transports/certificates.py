@@ -20,8 +20,10 @@ OPEN_MS = 15_000
 """Longest time to open a session [ms]. A server accepts no client for 100 ms after each failed handshake, so a
 hundred connections that are given up at once make the next client wait for 10 s.
 """
-PROBE_S = 2.0
-"""Longest time to find out why there is no connection [s]."""
+PROBE_S = 4.0
+"""Longest time to find out why there is no connection [s]: twice what a robot without certificates waits for the rest of
+what it takes for a message.
+"""
 
 Folder = str | os.PathLike[str]
 

@@ -125,7 +125,7 @@ def peak_later_than(recording: Recording, motion: MotionRows, moment: float) -> 
         NotMeasurableError: Nothing was recorded after that moment.
     """
     rows = _later_than(recording, motion, moment)
-    return float(np.max(amplitude(tool_acceleration(recording, truth=True)[rows])))
+    return float(np.max(amplitude(tool_acceleration(recording, truth=True, rows=rows))))
 
 
 def peak_acceleration(recording: Recording, motion: MotionRows) -> float:

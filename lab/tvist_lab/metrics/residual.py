@@ -119,7 +119,7 @@ def residual_by_modes(
     """
     window = _window(recording, motion, WINDOW)
     time = recording.time[window] - recording.time[motion.shaped_stop]
-    alpha = tool_acceleration(recording, truth=truth)[window]
+    alpha = tool_acceleration(recording, truth=truth, rows=window)
     late = time >= SETTLE - 1e-9
     omega = 2.0 * np.pi * np.asarray(f_d, dtype=np.float64)
     damping = np.asarray(zeta, dtype=np.float64)

@@ -35,16 +35,16 @@ def tool_acceleration(recording: Recording, *, truth: bool = False, rows: slice 
 
     Raises:
         RecordingError: The column is missing.
-        NotMeasurableError: The channel has gaps.
+        NotMeasurableError: The channel has gaps in these rows.
     """
     name = TRUTH if truth else SENSOR
-    force = recording[name]
+    force = recording[name][rows]
     if not np.isfinite(force).all():
         raise NotMeasurableError(f"{name} is missing at some ticks")
     pose = recording[TRUE_POSE if truth and TRUE_POSE in recording else "actual_TCP_pose"]
     orientation = Rotation.from_rotvec(pose[rows, 3:6])
     up = orientation.inv().apply([0.0, 0.0, GRAVITY])
-    return np.asarray(force[rows] - up, dtype=np.float64)
+    return np.asarray(force - up, dtype=np.float64)
 
 
 def best_tool_acceleration(recording: Recording, rows: slice = ALL) -> Floats:

@@ -119,6 +119,11 @@ class UrInterfaces(Gateway):
         """Actual port of each interface."""
         return {interface: bound.getsockname()[1] for interface, bound in self._sockets.items()}
 
+    @property
+    def clients(self) -> int:
+        """Number of connections that are open now."""
+        return len(self._connections)
+
     async def _first_tick(self) -> None:
         """Wait for the first tick if time passes by itself; earlier clients would find no controller."""
         for _ in range(0 if self._lockstep else FIRST):
