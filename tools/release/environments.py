@@ -30,7 +30,7 @@ def run(*words: str | Path, cwd: Path, env: dict[str, str] | None = None, second
     except (OSError, subprocess.TimeoutExpired) as error:
         raise FailedError(str(error)) from error
     if ended.returncode:
-        raise FailedError(f"exit code {ended.returncode}: {ended.stderr or ended.stdout}")
+        raise FailedError(f"exit code {ended.returncode}: {ended.stdout}{ended.stderr}")
     return ended.stdout
 
 
@@ -57,12 +57,10 @@ def install(what: str, where: Path, dist: Path, versions: Path) -> None:
     Raises:
         FailedError: It could not be installed, or holds a distribution of ours that is not the one built.
     """
-    if uv := shutil.which("uv"):
-        run(uv, "venv", "--quiet", "--python", sys.executable, where, cwd=dist)
-        pip: list[str | Path] = [uv, "pip", "install", "--python", where / "bin" / "python"]
-    else:
-        run(sys.executable, "-m", "venv", where, cwd=dist)
-        pip = [where / "bin" / "python", "-m", "pip", "install"]
+    run(sys.executable, "-m", "venv", "--without-pip", where, cwd=dist)
+    uv = shutil.which("uv")
+    at: list[str | Path] = ["--python", where / "bin" / "python"]
+    pip = [uv, "pip", "install", *at] if uv else [sys.executable, "-m", "pip", *at, "install"]
     run(*pip, "--quiet", "--find-links", dist, "--constraint", versions, what, cwd=dist)
     for wheel in dist.glob("*.whl"):
         _check_is_built(wheel, where)

@@ -47,7 +47,7 @@ def first_commands(root: Path) -> tuple[list[First], list[str]]:
     found, silent = [], []
     for page in pages(root):
         name = page.relative_to(root).as_posix()
-        if first := _first(name, fences(page.read_text(encoding="utf-8")), table):
+        if first := first_command(name, fences(page.read_text(encoding="utf-8")), table):
             found.append(first)
         else:
             silent.append(name)
@@ -56,7 +56,8 @@ def first_commands(root: Path) -> tuple[list[First], list[str]]:
     return found, silent
 
 
-def _first(page: str, shown: list[tuple[str, str]], table: dict[str, Any]) -> First | None:
+def first_command(page: str, shown: list[tuple[str, str]], table: dict[str, Any]) -> First | None:
+    """Return the first command of a page with fences, as the table changes it; None if it shows none."""
     lines = [line for kind, text in shown if kind in {"", "sh"} for line in text.splitlines() if line]
     ours = [match[1].partition("  #")[0].strip() for line in lines if (match := OURS.match(line))]
     needs = table["pages"].get(page, {})

@@ -139,7 +139,10 @@ def rehearse(root: Path, folder: Path, *, as_json: bool) -> bool:
 
 def told(rows: list[Row], published: list[Publication]) -> str:
     """Return the tables as text: what was done, and what would be published."""
-    lines = [f"{row.result:9} {row.seconds:7.1f} s  {row.what}{row.why and f'  ({row.why})'}" for row in rows]
+    lines = []
+    for row in rows:
+        why = f"  ({row.why.splitlines()[-1]})" if row.why else ""
+        lines.append(f"{row.result:9} {row.seconds:7.1f} s  {row.what}{why}")
     lines += ["", "would be published:"]
     for each in published:
         size = "" if each.kib is None else f", {each.kib} KiB"
