@@ -4,12 +4,13 @@ import contextlib
 import hashlib
 import shutil
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 from tools.release.attempt import attempt
 from tools.release.changelog import notes
-from tools.release.environments import FailedError, constraints, installed, run
+from tools.release.environments import FailedError, check_is_built, constraints, installed, run
 from tools.release.first_commands import First, fences, first_command, first_commands
 from tools.release.prepare import check, prepare
 from tools.release.publication import publications
@@ -189,6 +190,20 @@ def test_constraints_are_the_versions_of_a_lock_without_its_hashes():
     assert constraints(lock) == "a-b==1.2\nc==3 ; python_version < '3.12'\n"
 
 
+@pytest.mark.parametrize(("digest", "same"), [("x", True), ("y", False)])
+def test_a_distribution_from_elsewhere_is_no_built_one(tmp_path, digest, same):
+    record = "tvist-9.dist-info/RECORD"
+    with zipfile.ZipFile(tmp_path / "tvist-9-py3.whl", "w") as wheel:
+        wheel.writestr(record, f"tvist.py,sha256=x,1\n{record},,\n")
+    there = tmp_path / "lib" / "python3" / "site-packages" / record
+    there.parent.mkdir(parents=True)
+    there.write_text(
+        f"../../bin/tvist,sha256=z,1\ntvist.py,sha256={digest},1\n{record},,\n", encoding="utf-8"
+    )
+    with contextlib.nullcontext() if same else pytest.raises(FailedError, match="is not the one of tvist-9"):
+        check_is_built(tmp_path / "tvist-9-py3.whl", tmp_path)
+
+
 SERVER = """#!{python}
 import signal, sys
 signal.signal(signal.SIGTERM, lambda *_: sys.exit({code}))
@@ -212,8 +227,7 @@ def test_a_command_that_listens_is_ended_with_exit_code_0(tmp_path, says, code, 
     )
     program.chmod(0o755)
     first = First("page.md", "tvist serve", listens=True)
-    told = pytest.raises(FailedError, match=why) if why else contextlib.nullcontext()
-    with told:
+    with pytest.raises(FailedError, match=why) if why else contextlib.nullcontext():
         attempt(first, ROOT, tmp_path, lambda _: tmp_path, {})
 
 

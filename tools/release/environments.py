@@ -63,10 +63,15 @@ def install(what: str, where: Path, dist: Path, versions: Path) -> None:
     pip = [uv, "pip", "install", *at] if uv else [sys.executable, "-m", "pip", *at, "install"]
     run(*pip, "--quiet", "--find-links", dist, "--constraint", versions, what, cwd=dist)
     for wheel in dist.glob("*.whl"):
-        _check_is_built(wheel, where)
+        check_is_built(wheel, where)
 
 
-def _check_is_built(wheel: Path, where: Path) -> None:
+def check_is_built(wheel: Path, where: Path) -> None:
+    """Check that an environment holds the files of a wheel, if it holds its distribution at all.
+
+    Raises:
+        FailedError: It holds another one, as from a package index.
+    """
     record = "-".join(wheel.name.split("-")[:2]) + ".dist-info/RECORD"
     for found in where.glob(f"lib/python*/site-packages/{wheel.name.split('-')[0]}-*.dist-info/RECORD"):
         lines = zipfile.ZipFile(wheel).read(record).decode().splitlines()
