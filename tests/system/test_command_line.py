@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from tests import forked
-from tests.conformance.served import NOISE, PATIENCE, Served, free_endpoint
+from tests.conformance.served import NOISE, PATIENCE, Served, finished, free_endpoint
 from tests.conformance.wire import STOPPED, Wire
 
 from tvist_client.blocking import Robot
@@ -20,7 +20,8 @@ from tvist_plant.fingerprint import fingerprint
 
 pytestmark = pytest.mark.realtime
 
-HERE = "0.1,-3.1,0.1,-1.5,0.1,0.1"
+HERE = Path(__file__).parent
+NEAR = "0.1,-3.1,0.1,-1.5,0.1,0.1"
 BENT = "0,-1.57,1.57,-1.57,-1.57,0"
 
 
@@ -52,16 +53,9 @@ class Ended:
         return self
 
 
-def python(*arguments, timeout=PATIENCE, cwd=None):
-    ended = forked.run(
-        [sys.executable, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=timeout,
-        check=False,
-        cwd=cwd,
-    )
-    return Ended(ended.returncode, ended.stdout, ended.stderr)
+def python(*arguments, **options):
+    done = finished(*arguments, **options)
+    return Ended(done.returncode, done.stdout, done.stderr)
 
 
 def tvist(*arguments, **options):
@@ -80,7 +74,7 @@ def recorded(realtime, tmp_path_factory):
     )
     try:
         assert "recording ur5e into" in process.stderr.readline()
-        assert tvist("move", HERE, "--endpoint", realtime.endpoint).code == 0
+        assert tvist("move", NEAR, "--endpoint", realtime.endpoint).code == 0
         with Wire(realtime.endpoint) as wire:
             wire.until(wire.state()["tick"] + 400)  # what rings after the motion
         process.send_signal(signal.SIGINT)
@@ -305,7 +299,7 @@ class TestMoveAndWatch:
             tvist("move", "0,-3.0,0,-1.5,0,0", "--endpoint", realtime.endpoint, "--json").assert_done().json
         )
         assert said["seconds"] == pytest.approx((said["done_tick"] - said["started_tick"]) * 0.002)
-        assert "moved to" in tvist("move", HERE, "--endpoint", realtime.endpoint).assert_done().out
+        assert "moved to" in tvist("move", NEAR, "--endpoint", realtime.endpoint).assert_done().out
 
     def test_angles_may_begin_with_a_minus_be_in_degrees_and_poses_in_any_case(self, realtime):
         for target in (("-0.1,-3.1,0.1,-1.5,0.1,0.1",), ("-6,-178,6,-86,6,6", "--degrees"), ("q1",)):
@@ -313,12 +307,12 @@ class TestMoveAndWatch:
 
     def test_the_only_robot_is_found_whatever_its_name(self):
         with Served(name="other") as served:
-            ended = tvist("move", HERE, "--shaper", "ZV", "--endpoint", served.endpoint)
+            ended = tvist("move", NEAR, "--shaper", "ZV", "--endpoint", served.endpoint)
             assert "moved to" in ended.assert_done().out
 
     def test_control_c_stops_the_motion_and_says_so(self, realtime):
         with Wire(realtime.endpoint) as wire:
-            tvist("move", HERE, "--endpoint", realtime.endpoint).assert_done()
+            tvist("move", NEAR, "--endpoint", realtime.endpoint).assert_done()
             wire.listen("state")
             far = "3.0,-3.1,0.1,-1.5,0.1,0.1"
             process = forked.Popen(
@@ -377,7 +371,7 @@ class TestMoveAndWatch:
 
     def test_a_robot_that_another_controls_is_a_sentence_with_its_name(self, realtime):
         with Wire(realtime.endpoint) as wire, wire.control("somebody"):
-            tvist("move", HERE, "--endpoint", realtime.endpoint).assert_failed(1, "somebody")
+            tvist("move", NEAR, "--endpoint", realtime.endpoint).assert_failed(1, "somebody")
 
     def test_watch_prints_an_object_a_line(self, realtime):
         ended = tvist("watch", realtime.endpoint, "--seconds", 1, "--json").assert_done()
@@ -432,6 +426,19 @@ def test_nobody_there_is_exit_code_1_and_a_sentence(arguments, tmp_path):
     endpoint = free_endpoint()
     assert tvist(*arguments, endpoint, cwd=tmp_path).assert_failed(1, "no server answers", endpoint).out == ""
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("what", "kept"), json.loads((HERE / "kept_keys.json").read_text("utf-8")).items())
+def test_the_keys_of_json_stay(what, kept):
+    """Those of a published version: docs/reference/what-stays.md."""
+    command, *list_of_it = what.split()
+    journal = HERE.parent / "journals" / "live_moves.mcap"
+    wave = HERE.parents[1] / "clients" / "examples" / "wave.script"
+    about = {"shapers": (), "compare": (journal, journal), "run": (wave, "--lockstep")}
+    said = tvist(command, *about.get(command, (journal,)), "--json").assert_done().json
+    for key in list_of_it:
+        said = said[key][0]
+    assert set(kept) <= said.keys()
 
 
 def test_help_and_version_are_no_errors():

@@ -10,7 +10,7 @@ import threading
 import msgpack
 import pytest
 import zenoh
-from tests.conformance.served import PATIENCE, Served, free_endpoint, refused_to_start
+from tests.conformance.served import PATIENCE, Served, finished, free_endpoint, refused_to_start
 from tests.conformance.wire import Wire
 
 from tvist_lab.recordings.mcap_file import read
@@ -342,13 +342,7 @@ Controller.complete_tick = failing
 sys.argv = ["tvist", "serve", *sys.argv[1:]]
 main()
 """
-    ended = subprocess.run(
-        [sys.executable, "-c", program, "--listen", free_endpoint(), "--record", str(path)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+    ended = finished("-c", program, "--listen", free_endpoint(), "--record", str(path), run=subprocess.run)
     assert ended.returncode == 1
     assert "ArithmeticError: on purpose" in ended.stderr
     assert ended.stderr.splitlines()[-1].startswith("tvist: ")

@@ -3,13 +3,11 @@
 import ast
 import json
 import signal
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from tests import forked
-from tests.conformance.served import PATIENCE, Served, free_endpoint
+from tests.conformance.served import Served, finished, free_endpoint
 from tests.conformance.wire import Q1, STOPPED, TICK, Wire
 
 from tvist_client import NotConnectedError, RefusedError
@@ -211,11 +209,6 @@ class TestAnArmThatFails:
             served.wait_until_said("look with tvist analyze")
         (dump,) = tmp_path.glob("*.mcap")
         assert f"tvist-ur5e-1-{served.process.pid}-{event['tick']}" in dump.name
-        analysed = forked.run(
-            [sys.executable, "-m", "tvist_cli", "analyze", str(dump), "--json"],
-            capture_output=True,
-            timeout=PATIENCE,
-            check=False,
-        )
+        analysed = finished("-m", "tvist_cli", "analyze", dump, "--json")
         assert analysed.returncode == 0, analysed.stderr
         assert json.loads(analysed.stdout)

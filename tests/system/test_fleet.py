@@ -9,8 +9,7 @@ from collections import Counter
 
 import pytest
 import zenoh
-from tests import forked
-from tests.conformance.served import PATIENCE, Served, free_endpoint
+from tests.conformance.served import PATIENCE, Served, finished, free_endpoint
 from tests.conformance.wire import Q1, Wire
 from zenoh.handlers import Callback
 
@@ -48,11 +47,8 @@ ALL = [Place("", "ur5e-1"), Place("", "ur5e-2"), Place("hall-3/line-1", "ur5e-1"
 
 
 def tvist(*arguments):
-    ended = forked.run(
-        [sys.executable, "-m", "tvist_cli", *arguments],
-        capture_output=True, text=True, timeout=PATIENCE, check=False,
-    )  # fmt: skip
-    return ended.returncode, ended.stdout, ended.stderr
+    done = finished("-m", "tvist_cli", *arguments)
+    return done.returncode, done.stdout, done.stderr
 
 
 def test_all_are_found_and_each_is_known_by_its_namespace(router, robots):

@@ -3,12 +3,10 @@
 import asyncio
 import json
 import math
-import sys
 
 import msgspec
 import pytest
-from tests import forked
-from tests.conformance.served import PATIENCE, Served
+from tests.conformance.served import Served, finished
 
 from tvist_client.robot import Robot
 from tvist_lab.collect import collect
@@ -24,14 +22,8 @@ STRIDE = 4
 
 def tvist(*arguments):
     """Run `tvist`; its exit code, the JSON object it printed, and its stderr."""
-    ended = forked.run(
-        [sys.executable, "-m", "tvist_cli", *map(str, arguments), "--json"],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    return ended.returncode, json.loads(ended.stdout), ended.stderr
+    done = finished("-m", "tvist_cli", *arguments, "--json")
+    return done.returncode, json.loads(done.stdout), done.stderr
 
 
 async def use(endpoint, told):

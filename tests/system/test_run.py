@@ -7,8 +7,7 @@ import sys
 
 import pytest
 from msgspec.structs import replace
-from tests import forked
-from tests.conformance.served import NOISE, PATIENCE, free_endpoint
+from tests.conformance.served import NOISE, PATIENCE, finished, free_endpoint
 from tests.conformance.wire import Wire
 from tests.places import own_address
 
@@ -227,13 +226,7 @@ class TestInRealTime:
             while "listens on" not in process.stderr.readline():
                 assert process.poll() is None
             # In a process of its own, which ur-rtde aborts when the robot has gone.
-            client = forked.run(
-                [sys.executable, "-c", WRITES, address],
-                capture_output=True,
-                text=True,
-                timeout=PATIENCE,
-                check=False,
-            )
+            client = finished("-c", WRITES, address)
             assert client.stdout == "True\nTrue\n", client.stderr
             out, err = process.communicate(timeout=PATIENCE)
         finally:

@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from tests.conformance.served import NOISE, PATIENCE, Served, free_endpoint
+from tests.conformance.served import NOISE, PATIENCE, Served, finished, free_endpoint
 from tests.conformance.wire import Wire
 
 from tvist_lab.recordings.mcap_file import read
@@ -45,13 +45,7 @@ main()
 )
 def test_a_signal_before_it_serves_is_a_clean_end_that_leaves_nothing_behind(where, number, tmp_path):
     arguments = ("serve", "--listen", free_endpoint(), "--record", tmp_path / "x.mcap")
-    ended = subprocess.run(
-        [sys.executable, "-c", SIGNALLED, str(int(number)), where, *arguments],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+    ended = finished("-c", SIGNALLED, str(int(number)), where, *arguments, run=subprocess.run)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
     assert list(tmp_path.iterdir()) == []
 
@@ -61,13 +55,7 @@ def test_a_signal_between_its_making_and_its_serving_is_not_lost(number, tmp_pat
     """Then there is a recording, which is closed like any other."""
     path = tmp_path / "x.mcap"
     arguments = ("serve", "--listen", free_endpoint(), "--record", path)
-    ended = subprocess.run(
-        [sys.executable, "-c", SIGNALLED, str(int(number)), "asyncio.run", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+    ended = finished("-c", SIGNALLED, str(int(number)), "asyncio.run", *arguments, run=subprocess.run)
     assert ended.returncode == 0, ended.stderr
     assert f"recorded into {path}" in ended.stderr
     assert not [word for word in NOISE if word in ended.stderr]

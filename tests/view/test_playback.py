@@ -1,14 +1,12 @@
 """Recorded and compared runs: on the page, as a film and as a page of its own."""
 
 import asyncio
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
-from tests import forked
-from tests.conformance.served import PATIENCE, free_endpoint
+from tests.conformance.served import finished, free_endpoint
 
 from tvist_lab.compared import run_beside
 from tvist_plant.description import load
@@ -23,13 +21,7 @@ OLD = Path(__file__).parents[1] / "journals" / "live_lost_lease.mcap"
 
 
 def run(*arguments):
-    return forked.run(
-        [sys.executable, "-m", "tvist_cli", "view", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+    return finished("-m", "tvist_cli", "view", *arguments)
 
 
 @pytest.fixture(scope="module")

@@ -4,16 +4,18 @@ import argparse
 import datetime as dt
 import hashlib
 import sys
+import tempfile
 from pathlib import Path
 
 from tools.release.changelog import notes
 from tools.release.prepare import check, prepare
+from tools.release.rehearse import rehearse
 from tools.release.versions import ReleaseError, common_version
 
 ROOT = Path(__file__).parents[2]
-NEXT = """version {version} is in all distributions and, with a date, in CHANGELOG.md. Next:
+NEXT = """version {version} is in all distributions and, with a date, in CHANGELOG.md and CITATION.cff. Next:
 
-  .ci/run && make docs && make dist
+  .ci/run && make rehearse
   git commit --all --message "Version {version}"
   git tag --annotate v{version} --message "Version {version}"
   git push --follow-tags
@@ -32,6 +34,8 @@ def main() -> int:
     verbs.add_parser("notes", help="Print what the changelog says about the version.")
     summing = verbs.add_parser("checksums", help="Write SHA256SUMS beside the built files.")
     summing.add_argument("folder", type=Path, help="Folder with the files.")
+    rehearsing = verbs.add_parser("rehearse", help="Make and try all that a release makes; publish nothing.")
+    rehearsing.add_argument("--json", action="store_true", help="Print one JSON object.")
     given = parser.parse_args()
     try:
         match given.verb:
@@ -45,6 +49,9 @@ def main() -> int:
                 print(notes(given.root, common_version(given.root)), end="")
             case "checksums":
                 print(checksums(given.folder), end="")
+            case "rehearse":
+                with tempfile.TemporaryDirectory(prefix="tvist-release-") as folder:
+                    return 0 if rehearse(given.root, Path(folder), as_json=given.json) else 1
     except ReleaseError as error:
         print(f"tools.release: {error}", file=sys.stderr)
         return 1

@@ -1,14 +1,14 @@
-"""Prepares a release: versions and changelog, in a clean tree; the commit and the tag are left to a person."""
+"""Prepares a release: versions, changelog, citation, in a clean tree; the commit and the tag are left to a person."""
 
 import subprocess
 from pathlib import Path
 
-from tools.release import changelog
+from tools.release import changelog, citation
 from tools.release.versions import ReleaseError, common_version, ordered, write_version
 
 
 def prepare(root: Path, version: str, date: str) -> None:
-    """Write a version into all distributions, and with a date into the changelog.
+    """Write a version into all distributions, and with a date into the changelog and the citation.
 
     Nothing is written if something is wrong.
 
@@ -25,17 +25,20 @@ def prepare(root: Path, version: str, date: str) -> None:
     present = common_version(root)
     if ordered(version) < ordered(present) or f"v{version}" in git(root, "tag", "--list").split():
         raise ReleaseError(f"version is {version}; it must be higher than {present}, and not be tagged yet")
-    file = root / changelog.NAME
-    text = changelog.dated(file.read_text(encoding="utf-8"), version, date)
+    texts = {
+        file: change(file.read_text(encoding="utf-8"), version, date)
+        for file, change in ((root / changelog.NAME, changelog.dated), (root / citation.NAME, citation.cited))
+    }
     write_version(root, version)
-    file.write_text(text, encoding="utf-8")
+    for file, text in texts.items():
+        file.write_text(text, encoding="utf-8")
 
 
 def check(root: Path, tag: str | None = None) -> str:
     """Return the version of a checkout after checking that it is in all places, and is that of a tag.
 
     Raises:
-        ReleaseError: The places differ, or the changelog has no dated section about the tagged version.
+        ReleaseError: The places differ, or changelog and citation do not have a tagged version with one date.
     """
     version = common_version(root)
     ordered(version)
@@ -43,6 +46,7 @@ def check(root: Path, tag: str | None = None) -> str:
         if tag != f"v{version}":
             raise ReleaseError(f"tag is {tag}, the distributions have version {version}: expected v{version}")
         changelog.notes(root, version)
+    citation.check(root, version, released=tag is not None)
     return version
 
 

@@ -1,0 +1,80 @@
+"""Clean environments, one for each line of the page on installing; our own packages are those just built."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+LINE = re.compile(r"`pip install '?(?P<what>tvist[\w-]*(?:\[\w+\])?)'?`")
+PINNED = re.compile(r"^([\w.-]+==[^ ]+(?: ;[^\\\n]*)?)", re.MULTILINE)
+
+
+class FailedError(Exception):
+    """A step of the rehearsal failed; the message is what it said."""
+
+
+def run(*words: str | Path, cwd: Path, env: dict[str, str] | None = None, seconds: float = 1800) -> str:
+    """Run a program to its end, and return what it printed on stdout.
+
+    Raises:
+        FailedError: Its exit code is not 0, or it took too long.
+    """
+    try:
+        ended = subprocess.run(
+            [str(word) for word in words],
+            cwd=cwd, env=env, timeout=seconds, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise FailedError(str(error)) from error
+    if ended.returncode:
+        raise FailedError(f"exit code {ended.returncode}: {ended.stdout}{ended.stderr}")
+    return ended.stdout
+
+
+def installed(page: str) -> list[str]:
+    """Return what the lines of the page on installing name, such as `tvist[server]`."""
+    return list(dict.fromkeys(LINE.findall(page)))
+
+
+def constraints(lock: str) -> str:
+    """Return the versions of a lock as constraints, without its hashes: what is just built has none there."""
+    return "".join(f"{pin.strip()}\n" for pin in PINNED.findall(lock))
+
+
+def clean() -> dict[str, str]:
+    """Return this process' environment without what leads to a checkout, or to kernels of an earlier run."""
+    ours = {"PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "NUMBA_CACHE_DIR"}
+    found = {name: value for name, value in os.environ.items() if name not in ours}
+    return {**found, "PYTHONUNBUFFERED": "1"}
+
+
+def install(what: str, where: Path, dist: Path, versions: Path) -> None:
+    """Make an environment with what a line names, by uv where there is one.
+
+    Raises:
+        FailedError: It could not be installed, or holds a distribution of ours that is not the one built.
+    """
+    run(sys.executable, "-m", "venv", "--without-pip", where, cwd=dist)
+    uv = shutil.which("uv")
+    at: list[str | Path] = ["--python", where / "bin" / "python"]
+    pip = [uv, "pip", "install", *at] if uv else [sys.executable, "-m", "pip", *at, "install"]
+    run(*pip, "--quiet", "--find-links", dist, "--constraint", versions, what, cwd=dist)
+    for wheel in dist.glob("*.whl"):
+        check_is_built(wheel, where)
+
+
+def check_is_built(wheel: Path, where: Path) -> None:
+    """Check that an environment holds the files of a wheel, if it holds its distribution at all.
+
+    Raises:
+        FailedError: It holds another one, as from a package index.
+    """
+    record = "-".join(wheel.name.split("-")[:2]) + ".dist-info/RECORD"
+    for found in where.glob(f"lib/python*/site-packages/{wheel.name.split('-')[0]}-*.dist-info/RECORD"):
+        lines = zipfile.ZipFile(wheel).read(record).decode().splitlines()
+        files = [line for line in lines if not line.startswith(record)]
+        if not set(files) <= set(found.read_text(encoding="utf-8").splitlines()):
+            raise FailedError(f"{found.parent.name} is not the one of {wheel.name}")
