@@ -149,13 +149,13 @@ class TestServing:
             options = ("--config", path)
         failed(tvist("serve", *options), 2, endpoint, "--security DIR", "--insecure")
 
-    @pytest.mark.realtime
     @pytest.mark.parametrize("file", [False, True])
     def test_with_that_word_it_listens_and_says_what_that_means(self, tmp_path, file):
         endpoint = free_endpoint().replace("127.0.0.1", "0.0.0.0")  # noqa: S104  that is the point
         path = tmp_path / "robot.toml"
         path.write_text("insecure = true\n")
-        with Served(*(("--config", str(path)) if file else ("--insecure",)), endpoint=endpoint) as served:
+        options = ("--clock", "lockstep", *(("--config", str(path)) if file else ("--insecure",)))
+        with Served(*options, endpoint=endpoint) as served:
             assert f"anyone who can reach {endpoint} can move this robot" in served.said
             with socket.create_connection(("127.0.0.1", int(endpoint.rpartition(":")[2]))):
                 pass
@@ -211,13 +211,12 @@ class TestServing:
         failed(ended, 1, f"cannot listen on {endpoint}: the port is in use")
 
 
-@pytest.mark.realtime
 class TestProgram:
     @pytest.fixture(scope="class")
     @classmethod
     def robot(cls, tmp_path_factory):
         ring = made(tmp_path_factory.mktemp("keys") / "ring", "--operator", "anna", "--viewer", "wall")
-        with Served("--security", str(ring), endpoint=free_tls_endpoint()) as served:
+        with Served("--security", str(ring), "--clock", "lockstep", endpoint=free_tls_endpoint()) as served:
             yield served.endpoint, ring
 
     @pytest.mark.parametrize(("name", "said"), [("anna", "no_control"), ("wall", "the role viewer")])
