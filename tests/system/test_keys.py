@@ -211,12 +211,13 @@ class TestServing:
         failed(ended, 1, f"cannot listen on {endpoint}: the port is in use")
 
 
+@pytest.mark.realtime
 class TestProgram:
     @pytest.fixture(scope="class")
     @classmethod
     def robot(cls, tmp_path_factory):
         ring = made(tmp_path_factory.mktemp("keys") / "ring", "--operator", "anna", "--viewer", "wall")
-        with Served("--security", str(ring), "--clock", "lockstep", endpoint=free_tls_endpoint()) as served:
+        with Served("--security", str(ring), "--speed", "0.2", endpoint=free_tls_endpoint()) as served:
             yield served.endpoint, ring
 
     @pytest.mark.parametrize(("name", "said"), [("anna", "no_control"), ("wall", "the role viewer")])
