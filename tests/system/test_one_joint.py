@@ -15,7 +15,7 @@ from tvist_protocol.calibration import calibration_from_json
 @pytest.fixture(scope="module")
 def served():
     """The arm in real time, but slower, so that no busy machine overloads it."""
-    with Served("--robot", "one-joint", "--speed", "0.2") as served:
+    with Served("--robot", "one-joint", "--speed", "0.1") as served:
         yield served
 
 
