@@ -23,7 +23,7 @@ class Signals:
     alpha: Floats
     """|α|, acceleration of the tool without gravity, shape (T,) [m/s²].
 
-    True and free of noise where the robot tells the truth, and then NaN at a tick whose truth is missing; else measured.
+    Free of noise if the robot tells the truth, and then NaN at a tick whose truth is missing; else measured.
     """
     acceleration: Floats
     """Largest |q̈| over the joints of the shaped reference, shape (T,) [rad/s²]."""

@@ -21,8 +21,8 @@ OPEN_MS = 15_000
 hundred connections that are given up at once make the next client wait for 10 s.
 """
 PROBE_S = 4.0
-"""Longest time to find out why there is no connection [s]: twice what a robot without certificates waits for the rest of
-what it takes for a message.
+"""Longest time to find out why there is no connection [s]: twice what a robot without certificates waits for the end
+of what it takes for a message.
 """
 
 Folder = str | os.PathLike[str]
