@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PATIENCE = 600.0
-READ_AT_START = ("PYTHONSAFEPATH", "NUMBA_", "LD_", "OPENBLAS_", "XDG_")
+READ_AT_START = ("PYTHONSAFEPATH", "NUMBA_", "LD_", "XDG_")
 """How variables begin that Python or its libraries read when they start."""
 
 
@@ -26,6 +26,7 @@ class Nursery:
 
     def __init__(self):
         self._process = None
+        self._environment = dict(os.environ)
         self._lock = threading.Lock()
 
     def fork(self, request, streams):
@@ -46,16 +47,15 @@ class Nursery:
                 stdin=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
                 # A process with threads cannot fork safely.
-                env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+                env={**self._environment, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
                 cwd=ROOT,
             )
-        self._environment = dict(os.environ)
         atexit.register(self._close)
 
-    def fits(self, environment):
-        """Whether a program with this environment would begin as the process did."""
-        differ = environment.items() ^ getattr(self, "_environment", os.environ).items()
-        return not [name for name, _ in differ if name.startswith(READ_AT_START)]
+    def unlike(self, environment):
+        """Variables because of which a program with this environment would not begin as the process did."""
+        differ = environment.items() ^ self._environment.items()
+        return {name for name, _ in differ if name.startswith(READ_AT_START)}
 
     def _close(self):
         self._requests.close()
@@ -80,7 +80,7 @@ class Popen(subprocess.Popen):
         environment = dict(os.environ if env is None else env)
         forkable = python == sys.executable and not (executable or preexec_fn or pass_fds)
         assert forkable, f"start {args} with subprocess"
-        assert NURSERY.fits(environment), "a variable counts that is read at the start: use subprocess"
+        assert not (new := NURSERY.unlike(environment)), f"read at a program's start: {new}; use subprocess"
         given = (rest[3], rest[6], rest[8])  # the program's ends of its standard streams, -1 if they are ours
         request = {
             "words": words,

@@ -18,9 +18,9 @@ from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import Namespace, RobotName, Seed
+from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.durations import ticks_of
 from tvist_server.fleet import MOST, members
-from tvist_server.gateways.allowed_hosts import AllowedHosts
 from tvist_server.initial import read_state, shaped_by
 from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
 from tvist_server.program_folder import ProgramFolder

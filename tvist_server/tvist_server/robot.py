@@ -15,8 +15,8 @@ from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Telemetry
+from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.clock import Clock, Mailbox
-from tvist_server.gateways.allowed_hosts import AllowedHosts
 from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.gateways.sockets import ProgramSockets
 from tvist_server.lateness import Punctuality

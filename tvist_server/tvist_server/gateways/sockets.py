@@ -21,7 +21,7 @@ from tvist_controller.programs.socket_traffic import (
 from tvist_controller.sink import Topic
 from tvist_controller.socket_ports import SocketPorts
 from tvist_protocol.journal import SocketChange
-from tvist_server.gateways.allowed_hosts import AllowedHosts
+from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.gateways.base import Gateway, Message
 
 log = logging.getLogger(__name__)
