@@ -40,18 +40,19 @@ class Served:
         endpoint: Where it listens.
         router: Where it connects to instead.
         around: Words before the command line, such as `ip netns exec`.
+        cold: Whether it starts from nothing, as its environment or its start matters.
     """
 
     program = ("-m", "tvist_cli", "serve")
     """What Python runs."""
 
-    def __init__(self, *options, name="ur5e", endpoint=None, router=None, around=()):
+    def __init__(self, *options, name="ur5e", endpoint=None, router=None, around=(), cold=False):
         self.name, self.endpoint = name, router or endpoint or free_endpoint()
         self.lines = []
         where = "--listen" if router is None else "--connect"
         named = () if name is None else ("--name", name)
         self._news = threading.Condition()
-        start = subprocess.Popen if around else forked.Popen
+        start = subprocess.Popen if around or cold else forked.Popen
         self.process = start(
             [*around, sys.executable, *self.program, where, self.endpoint, *named, *options],
             stdout=subprocess.DEVNULL,

@@ -24,7 +24,7 @@ FAR = [1.5, -3.0, 0.2, -1.5, 0.1, 0.3]
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
 def test_a_signal_in_mid_motion_ends_it_with_the_recording_complete(number, tmp_path):
     path = tmp_path / "run.mcap"
-    with Served("--record", str(path), "--truth") as served:
+    with Served("--record", str(path), "--truth", cold=True) as served:
         with Wire(served.endpoint) as mover, Wire(served.endpoint) as watcher:
             watcher.listen("state", "truth", "event")
             mover.announce("mover")
@@ -98,7 +98,7 @@ ENDS = 200
 def test_two_hundred_starts_and_ends_with_clients_attached():
     """No hang, no orphan; at moments of a motion that differ."""
     for number in range(ENDS):
-        with Served() as served:
+        with Served(cold=True) as served:
             with Wire(served.endpoint) as mover, Wire(served.endpoint) as watcher:
                 watcher.listen("state", "event")
                 token = mover.command("take_control", client="mover")["token"]
@@ -120,7 +120,7 @@ def _processes():
 @pytest.mark.realtime
 def test_a_killed_server_leaves_a_recording_that_can_be_read_and_replays_equal(tmp_path):
     path = tmp_path / "run.mcap"
-    with Served("--record", str(path)) as served:
+    with Served("--record", str(path), cold=True) as served:
         with Wire(served.endpoint) as wire:
             token = wire.command("take_control", client="mover")["token"]
             wire.command("move_j", token=token, q=FAR)
@@ -138,7 +138,7 @@ def test_a_killed_server_leaves_a_recording_that_can_be_read_and_replays_equal(t
 @pytest.mark.realtime
 def test_a_disk_that_is_full_ends_the_recording_and_not_the_robot(tmp_path):
     path = tmp_path / "run.mcap"
-    with Served("--record", str(path)) as served:
+    with Served("--record", str(path), cold=True) as served:
         with Wire(served.endpoint) as wire:
             tick = wire.state()["tick"]
             resource.prlimit(served.process.pid, resource.RLIMIT_FSIZE, (50_000, 50_000))
@@ -159,7 +159,7 @@ def test_clients_see_the_robot_go_at_once():
         if sample.kind == zenoh.SampleKind.DELETE:
             gone.set()
 
-    with Served() as served, Wire(served.endpoint) as wire:
+    with Served(cold=True) as served, Wire(served.endpoint) as wire:
         wire.session.liveliness().declare_subscriber("tvist/ur5e/alive", on_alive, history=True)
         assert wire.info()["name"] == "ur5e"
         assert not gone.is_set()
@@ -171,7 +171,7 @@ class TestDoesNotBegin:
     @pytest.mark.realtime
     def test_a_port_in_use_is_one_sentence_and_leaves_no_recording_behind(self, tmp_path):
         path = tmp_path / "run.mcap"
-        with Served() as served:
+        with Served(cold=True) as served:
             code, said = refused_to_start("--record", path, endpoint=served.endpoint)
         assert code == 1
         assert "in use" in said

@@ -98,7 +98,10 @@ def test_a_recording_that_is_moved_goes_on_there_and_is_told_to_all(tmp_path):
 
 def test_a_disk_that_does_not_answer_for_a_second_costs_nothing(system, tmp_path):
     path = tmp_path / "run.mcap"
-    with Served("--record", str(path), "--truth") as served, Bystander(served.endpoint) as bystander:
+    with (
+        Served("--record", str(path), "--truth", cold=True) as served,
+        Bystander(served.endpoint) as bystander,
+    ):
         assert system.in_force(served.process.pid)
         system.stop_disk()
         while not system.writes_held:
@@ -120,7 +123,7 @@ def test_a_disk_that_does_not_answer_for_longer_loses_what_is_counted_and_nothin
     path = tmp_path / "run.mcap"
     # Twice as fast, with the truth: the recorder's queue is full after about four seconds.
     with (
-        Served("--record", str(path), "--truth", "--speed", "2") as served,
+        Served("--record", str(path), "--truth", "--speed", "2", cold=True) as served,
         Bystander(served.endpoint) as bystander,
     ):
         system.stop_disk()

@@ -136,7 +136,7 @@ class TestWallClock:
         system = Interposed(tmp_path)
         for name, value in system.environment.items():
             monkeypatch.setenv(name, value)
-        with Served() as served, Bystander(served.endpoint) as bystander:
+        with Served(cold=True) as served, Bystander(served.endpoint) as bystander:
             assert system.in_force(served.process.pid)
             token = bystander.command("take_control", client="mover")["token"]
             motion = bystander.command("move_j", token=token, q=[0.5, *Q1[1:]])["id"]

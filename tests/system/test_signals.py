@@ -63,7 +63,7 @@ def test_a_signal_between_its_making_and_its_serving_is_not_lost(number, tmp_pat
 
 def test_signals_until_it_is_gone_do_no_harm(tmp_path):
     path = tmp_path / "run.mcap"
-    with Served("--record", str(path)) as served:
+    with Served("--record", str(path), cold=True) as served:
         with Wire(served.endpoint) as wire:
             wire.state()
         for number in itertools.cycle(ENDING):
@@ -127,7 +127,7 @@ def test_the_end_of_its_terminal_ends_it_with_the_recording_complete(tmp_path):
 @pytest.mark.parametrize("number", ENDING)
 def test_a_signal_ends_a_client_s_recording_complete(number, tmp_path):
     path = tmp_path / "seen.mcap"
-    with Served() as served:
+    with Served(cold=True) as served:
         process = subprocess.Popen(
             [sys.executable, "-m", "tvist_cli", "record", path, "--endpoint", served.endpoint],
             stderr=subprocess.PIPE,

@@ -60,7 +60,7 @@ async def test_all_queries_are_answered_with_the_share_until_the_robots_are_read
     pipe = tmp_path / "progress"
     os.mkfifo(pipe)
     monkeypatch.setenv("PROGRESS", str(pipe))
-    served = SlowlyServed(*options, name=None if "--robots" in options else "ur5e")
+    served = SlowlyServed(*options, name=None if "--robots" in options else "ur5e", cold=True)
     within = f"{place}/tvist" if place else "tvist"
     keys = [f"{within}/{name}/{leaf}" for name in names for leaf in ("command", "info")]
 
@@ -96,7 +96,7 @@ async def test_all_queries_are_answered_with_the_share_until_the_robots_are_read
 @pytest.mark.nightly
 def test_a_first_start_says_a_growing_share_and_nothing_is_compiled_after_it(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
-    served = Served(*ONE)
+    served = Served(*ONE, cold=True)
     heard = []
     try:
         report = check(served.endpoint, wait=float("inf"), tell=heard.append)
@@ -109,5 +109,5 @@ def test_a_first_start_says_a_growing_share_and_nothing_is_compiled_after_it(tmp
         served.end()
     finally:
         served.kill()
-    with Served(*ONE) as again:
+    with Served(*ONE, cold=True) as again:
         assert "compil" not in again.said
