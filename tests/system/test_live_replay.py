@@ -108,7 +108,9 @@ def test_a_replay_can_be_recorded_and_is_the_same_recording(live, tmp_path):
     assert code == 0, said
     before, after = read(live[0]), read(tmp_path / "again.mcap")
     assert after.states == before.states
-    assert after.events == before.events
+    # How busy the machine was is told by the server, and is no part of a replay.
+    told = tuple(event for event in before.events if "the control loop is" not in (event.why or ""))
+    assert after.events == told
     assert after.truths == before.truths
     assert after.journal == before.journal
 

@@ -73,13 +73,14 @@ async def show_robot(
         for page in shown:
             page.went(client)
 
+    absent = "No robot"
     while True:
-        lead = "No robot"
+        lead = absent
         try:
             async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
                 lead = "The robot cannot be drawn"
                 page = LivePage(server, robot, await robot.info(), factor=factor)
-                lead = "The robot has gone"
+                lead = absent = "The robot has gone"
                 notice.end()
                 shown.append(page)
                 try:
