@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PATIENCE = 600.0
-READ_AT_START = ("PYTHONSAFEPATH", "NUMBA_", "LD_", "XDG_")
+READ_AT_START = ("NUMBA_", "LD_", "XDG_")
 """How variables begin that Python or its libraries read when they start."""
 
 
@@ -47,7 +47,12 @@ class Nursery:
                 stdin=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
                 # A process with threads cannot fork safely.
-                env={**self._environment, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+                env={
+                    **self._environment,
+                    "OPENBLAS_NUM_THREADS": "1",
+                    "OMP_NUM_THREADS": "1",
+                    "PYTHONSAFEPATH": "",  # it is found in its folder; what it forks minds its own
+                },
                 cwd=ROOT,
             )
         atexit.register(self._close)

@@ -108,18 +108,18 @@ def become(words, environment, folder, session):
         warnings.simplefilter(words[1])
         words = words[2:]
     first, *rest = words
+    first_of_all = {"-m": folder, "-c": ""}.get(first, str(Path(first).parent))
     sys.path[:0] = filter(None, environment.get("PYTHONPATH", "").split(os.pathsep))
+    if not environment.get("PYTHONSAFEPATH"):
+        sys.path.insert(0, first_of_all)
     if first == "-m":
-        sys.path.insert(0, folder)
         sys.argv = rest
         runpy.run_module(rest[0], run_name="__main__", alter_sys=True)
     elif first == "-c":
-        sys.path.insert(0, "")
         sys.argv = ["-c", *rest[1:]]
         sys.modules["__main__"] = module = types.ModuleType("__main__")
         exec(compile(rest[0], "<string>", "exec"), module.__dict__)  # noqa: S102  what was asked for
     else:
-        sys.path.insert(0, str(Path(first).parent))
         sys.argv = words
         runpy.run_path(first, run_name="__main__")
 
