@@ -1,11 +1,10 @@
 """The arms that come with the package: each is described, calibrated, and stilled by auto."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
-from tests import forked
+from tests.conformance.served import finished
 
 from tvist_controller.calibrations import available
 from tvist_controller.calibrations import load as load_calibration
@@ -43,13 +42,7 @@ def test_three_arms_are_stilled_by_auto_out_of_the_box(tmp_path):
     """By the command that the reference page names, with fewer moves."""
     page = tmp_path / "robots.md"
     command = ("robots", "ur3e", "ur10e", "ur20", "--measure", "--random", "10", "--json", "--markdown", page)
-    ended = forked.run(
-        [sys.executable, "-m", "tvist_cli", *map(str, command)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    ended = finished("-m", "tvist_cli", *command)
     assert ended.returncode == 0, ended.stderr
     for one in json.loads(ended.stdout)["robots"]:
         (found,) = one["measured"]

@@ -1,11 +1,10 @@
 """What a checker tells, and what has limits."""
 
 import doctest
-import sys
 from pathlib import Path
 
 import pytest
-from tests import forked
+from tests.conformance.served import finished
 
 from tvist_urscript import ScriptError, check, compile_script, signature
 
@@ -108,9 +107,7 @@ def test_the_name_of_a_program_is_its_first_word():
 
 
 def run(path):
-    return forked.run(
-        [sys.executable, "-m", "tvist_urscript", str(path)], capture_output=True, text=True, check=False
-    )
+    return finished("-m", "tvist_urscript", path)
 
 
 def test_a_file_runs_dry(tmp_path):
