@@ -8,33 +8,33 @@ from tvist_cli.shapers_of import calibration_for, loaded
 from tvist_cli.simulated_arm import disturbed
 
 if TYPE_CHECKING:
-    from tvist_lab.evaluation.recipes import Recipe
-    from tvist_lab.sweep.spec import NamedRobot, Spec
-    from tvist_lab.sweep.tasks import SweepTasks, SweptRobot
+    from tvist_lab.study.axes import Axes, SweptRobot
+    from tvist_lab.study.recipes import Recipe
+    from tvist_lab.study.spec import NamedRobot, Spec
     from tvist_plant.description import RobotDescription
 
 
-def tasks_of(path: Path) -> "SweepTasks":
+def axes_of(path: Path) -> "Axes":
     """Read a sweep's file, and load all that it names; paths in it are relative to its folder.
 
     Raises:
         Failure: The file, or what it names, is invalid; the message names the key.
     """
-    from tvist_lab.evaluation.moves import MovesError
-    from tvist_lab.sweep.spec import read_spec
-    from tvist_lab.sweep.tasks import SweepTasks
+    from tvist_lab.study.axes import Axes
+    from tvist_lab.study.moves import MovesError
+    from tvist_lab.study.spec import read_spec
 
     with told(OSError):
         spec = read_spec(path)
     robots = [_robot(path, spec, place, named) for place, named in enumerate(spec.robots)]
     try:
-        return SweepTasks(spec, robots)
+        return Axes(spec, robots)
     except MovesError as error:
         raise Failure(f"sweep {path}: {error}") from error
 
 
 def _robot(path: Path, spec: "Spec", place: int, named: "str | NamedRobot") -> "SweptRobot":
-    from tvist_lab.sweep.tasks import SweptRobot
+    from tvist_lab.study.axes import SweptRobot
     from tvist_plant.description import DescriptionError, load, robots
 
     robot, calibration = (named, None) if isinstance(named, str) else (named.robot, named.calibration)
@@ -61,7 +61,7 @@ def _recipe(
 ) -> "Recipe":
     from tvist_controller.own_shapers import is_file
     from tvist_controller.refusal import RefusalError
-    from tvist_lab.evaluation.recipes import Recipe, RecipeError
+    from tvist_lab.study.recipes import Recipe, RecipeError
     from tvist_shaping.errors import ShapingError
 
     # The workers of a cluster have other working folders.

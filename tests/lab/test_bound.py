@@ -8,7 +8,7 @@ from scipy.signal import cont2discrete
 
 from tvist_controller.api import MotionLimits
 from tvist_lab.bound.least_time import bound, farthest, least_ticks, poles_of
-from tvist_lab.evaluation.line import PAPER
+from tvist_lab.study.line import PAPER
 from tvist_plant.plant import PERIOD as H
 
 NONE = np.zeros((0, 2))

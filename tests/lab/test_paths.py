@@ -8,14 +8,14 @@ from scipy.spatial.transform import Rotation
 
 from tvist_controller import calibrations
 from tvist_controller.setup import paper_payload
-from tvist_lab.evaluation.path_examples import circle, corner
-from tvist_lab.evaluation.path_report import COLUMNS, page, report, rows
-from tvist_lab.evaluation.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, planned, shaped
-from tvist_lab.evaluation.paths import PathJob, compare, draw
-from tvist_lab.evaluation.random_paths import KINDS, REGULAR
-from tvist_lab.evaluation.shaperbench import kinematics
-from tvist_lab.evaluation.tool_path import ToolPath, jacobian
 from tvist_lab.safety.subject import Subject
+from tvist_lab.studies.path_examples import circle, corner
+from tvist_lab.studies.path_report import COLUMNS, page, report, rows
+from tvist_lab.studies.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, planned, shaped
+from tvist_lab.studies.paths import PathJob, compare, draw
+from tvist_lab.studies.random_paths import KINDS, REGULAR
+from tvist_lab.studies.tool_path import ToolPath, jacobian
+from tvist_lab.study.measures import kinematics
 from tvist_plant.description import load
 from tvist_protocol.motions import MovePath
 from tvist_protocol.replies import Accepted

@@ -11,7 +11,7 @@ from tvist_cli.simulated_arm import UNIFORM, disturbed, masses_of, named
 
 if TYPE_CHECKING:
     from tvist_lab.bound.report import Bounded, BoundJob
-    from tvist_lab.evaluation.moves import Move
+    from tvist_lab.study.moves import Move
     from tvist_plant.description import RobotDescription
 
 ROBOT, CALIBRATION = "ur5e", "ur5e_modal"
@@ -46,7 +46,7 @@ def bound(
     from tvist_controller.refusal import RefusalError
     from tvist_lab.bound.markdown import page
     from tvist_lab.bound.report import SHAPERS, BoundJob, report
-    from tvist_lab.evaluation.recipes import Recipe
+    from tvist_lab.study.recipes import Recipe
     from tvist_plant.description import load
 
     if not 0 <= random <= 100_000:
@@ -90,7 +90,7 @@ def _moves(
     description: "RobotDescription", random: int, seed: int, masses: tuple[float, float]
 ) -> "list[tuple[str, Move]]":
     """The paper's moves and random ones, with their names."""
-    from tvist_lab.evaluation.moves import Move, draw_moves
+    from tvist_lab.study.moves import Move, draw_moves
 
     poses = description.poses
     paper = [

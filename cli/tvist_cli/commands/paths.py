@@ -11,8 +11,8 @@ from tvist_cli.output import out, print_json, progress, say, table, typed, words
 from tvist_cli.simulated_arm import UNIFORM, disturbed, masses_of, named
 
 if TYPE_CHECKING:
-    from tvist_lab.evaluation.paths import JudgedPath, PathJob
     from tvist_lab.figures import FigureFiles
+    from tvist_lab.studies.paths import JudgedPath, PathJob
     from tvist_plant.description import RobotDescription
     from tvist_protocol.calibration import Calibration
 
@@ -59,10 +59,10 @@ def paths(
         look: How to write the figures.
         json: Print one JSON object.
     """
-    from tvist_lab.evaluation.path_examples import circle
-    from tvist_lab.evaluation.path_report import page, report
-    from tvist_lab.evaluation.paths import SHAPERS, PathJob
-    from tvist_lab.evaluation.random_paths import KINDS
+    from tvist_lab.studies.path_examples import circle
+    from tvist_lab.studies.path_report import page, report
+    from tvist_lab.studies.paths import SHAPERS, PathJob
+    from tvist_lab.studies.random_paths import KINDS
     from tvist_plant.description import load
 
     look.check(figures)
@@ -114,7 +114,7 @@ def _calibration(name: str) -> "Calibration":
 def _try_out(shapers: tuple[str, ...], known: "Calibration", description: "RobotDescription") -> None:
     """Refuse shapers that do not exist, and a calibration of another arm."""
     from tvist_controller.refusal import RefusalError
-    from tvist_lab.evaluation.recipes import Recipe, RecipeError
+    from tvist_lab.study.recipes import Recipe, RecipeError
     from tvist_shaping.errors import ShapingError
 
     for name in shapers:
@@ -123,8 +123,8 @@ def _try_out(shapers: tuple[str, ...], known: "Calibration", description: "Robot
 
 
 def _judged(jobs: "list[PathJob]") -> "list[JudgedPath]":
-    from tvist_lab.evaluation.paths import PathsError, compare
-    from tvist_lab.evaluation.sound import ShaperFaultError
+    from tvist_lab.studies.paths import PathsError, compare
+    from tvist_lab.study.shaping import ShaperFaultError
 
     judged: list[JudgedPath] = []
     with progress(len(jobs), "paths") as bar, told(PathsError, ShaperFaultError):
@@ -160,8 +160,8 @@ def _command(
 def _draw(
     paths: list[dict[str, Any]], description: "RobotDescription", known: "Calibration", files: "FigureFiles"
 ) -> None:
-    from tvist_lab.evaluation.path_examples import corner
     from tvist_lab.figures import corner_figure, path_shaping_figure
+    from tvist_lab.studies.path_examples import corner
 
     figures = {
         "path_shaping": path_shaping_figure(paths),
@@ -171,7 +171,7 @@ def _draw(
 
 
 def _print(result: dict[str, Any]) -> None:
-    from tvist_lab.evaluation.path_report import COLUMNS, TERMS, circle_in_words, rows, title_of
+    from tvist_lab.studies.path_report import COLUMNS, TERMS, circle_in_words, rows, title_of
 
     for kind, group in result["summary"].items():
         if kind != "all":

@@ -1,14 +1,17 @@
 """`tvist robustness`: how much each shaper reduces vibration if stiffness or payload are wrong."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from tvist_cli.commands.shaperbench import candidates_of, modal_calibration
+from tvist_cli.commands.shaperbench import methods_of, modal_calibration
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import number, print_json, progress, table, typed, write_json
+
+if TYPE_CHECKING:
+    from tvist_lab.study.work import Row
 
 
 def robustness(
@@ -40,9 +43,10 @@ def robustness(
         markdown: File to write a page with the tables to.
         json: Print one JSON object.
     """
-    from tvist_lab.evaluation import robustness as robust
-    from tvist_lab.evaluation.shaperbench import draw
-    from tvist_lab.evaluation.sound import ShaperFaultError
+    from tvist_lab.studies import robustness as robust
+    from tvist_lab.studies.shaperbench import draw
+    from tvist_lab.study.engine import made
+    from tvist_lab.study.shaping import ShaperFaultError
     from tvist_plant.description import load
 
     look.check(figures)
@@ -53,14 +57,14 @@ def robustness(
     description = load("ur5e")
     known = modal_calibration(calibration)
     names = None if against is None else [name.lower() for name in against]
-    standing = candidates_of(None, names, known)[1:]  # all but waiting, with which they are compared
-    if not standing:
+    methods = methods_of(None, names, known)[1:]  # all but waiting, with which they are compared
+    if not methods:
         raise Failure("against names no shaper besides waiting", code=2)
-    jobs = robust.error_jobs(description, standing, draw(description, moves, seed), seed)
-    done = []
+    jobs = robust.jobs(description, methods, draw(description, moves, seed), seed)
+    done: list[Row] = []
     with told(ShaperFaultError), progress(len(jobs), "moves") as bar:
-        for one in robust.make_all(jobs):
-            done.append(one)
+        for rows in made(jobs):
+            done += rows
             bar(1, None)
     options = [] if names is None else ["--against", *names]
     options += [] if calibration is None else ["--calibration", calibration]
@@ -69,14 +73,14 @@ def robustness(
         "moves": moves,
         "seed": seed,
         "calibration": known.name,
-        "shapers": robust.robustness_report(standing, jobs, done),
+        "shapers": robust.report(methods, done),
     }
     _write(result, output, markdown, figures, look)
     if json:
         print_json(result)
         return
-    for kind, errors in robust.ERRORS.items():
-        told_wrong = [f"{100.0 * error:+.0f} %" for error in sorted(errors)]
+    for kind in robust.ERRORS:
+        told_wrong = robust.errors_of(kind)
         table(
             f"reduction in %, median / p5 over {moves} moves, with wrong {kind}",
             ("shaper", "delay ms", *told_wrong),
@@ -103,9 +107,10 @@ def _write(
         if output is not None:
             write_json(output, result)
         if markdown is not None:
-            from tvist_lab.evaluation.robustness_page import robustness_page
+            from tvist_lab.studies.pages import page
+            from tvist_lab.studies.robustness import tables
 
-            markdown.write_text(robustness_page(result, typed()), encoding="utf-8")
+            markdown.write_text(page("robustness", result, typed(), tables=tables()), encoding="utf-8")
         if figures is not None:
             from tvist_lab.figures import robustness_figure
 

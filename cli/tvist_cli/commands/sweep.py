@@ -12,7 +12,7 @@ from tvist_cli.output import number, print_json, progress, say, table
 
 if TYPE_CHECKING:
     from tvist_lab.figures import FigureFiles
-    from tvist_lab.sweep.study import Study
+    from tvist_lab.study.engine import Ran
 
 ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?([^\s:/\[\]]+|\[[\da-fA-F:.]+\]):\d{1,5}")
 """Address of a scheduler."""
@@ -46,9 +46,9 @@ def sweep(
         look: How to write the figure.
         json: Print one JSON object.
     """
-    from tvist_cli.swept import tasks_of
+    from tvist_cli.swept import axes_of
     from tvist_lab.runners.cluster import Cluster
-    from tvist_lab.sweep.study import run
+    from tvist_lab.study.engine import run
 
     if processes is not None and scheduler is not None:
         raise Failure("give either --processes or --scheduler", code=2)
@@ -60,7 +60,7 @@ def sweep(
         raise Failure(f"{spec} has no suffix to leave out: give a folder as --output", code=2)
     folder = spec.with_suffix("") if output is None else output
     look.check(folder)
-    tasks = tasks_of(spec)
+    axes = axes_of(spec)
     began = time.monotonic()
     with told(OSError), ExitStack() as stack:
         kept = f"they are kept in {folder}, and the same command continues"
@@ -69,7 +69,7 @@ def sweep(
             bar = stack.enter_context(progress(missing, "moves", kept))
             return lambda done: bar(done, None)
 
-        study = run(tasks, folder, Cluster(scheduler, processes), begin)
+        study = run(axes.plan(), folder, Cluster(scheduler, processes), begin)
     elapsed = time.monotonic() - began
     result = _result(spec, folder, study, elapsed)
     _draw(result, look.into(folder))
@@ -80,10 +80,10 @@ def sweep(
     _tell(study, folder)
 
 
-def _result(spec: Path, folder: Path, study: "Study", elapsed: float) -> dict[str, Any]:
-    from tvist_lab.sweep.columns import FAILED, TOO_WEAK
-    from tvist_lab.sweep.store import ROWS
-    from tvist_lab.sweep.summary import summary
+def _result(spec: Path, folder: Path, study: "Ran", elapsed: float) -> dict[str, Any]:
+    from tvist_lab.study.store import ROWS
+    from tvist_lab.study.summary import summary
+    from tvist_lab.study.work import FAILED, TOO_WEAK
 
     rows, effort = study.rows, study.effort
     return {
@@ -106,7 +106,7 @@ def _result(spec: Path, folder: Path, study: "Study", elapsed: float) -> dict[st
 
 def _draw(result: dict[str, Any], files: "FigureFiles") -> None:
     from tvist_lab.figures import sweep_figure
-    from tvist_lab.sweep.summary import setting_name
+    from tvist_lab.study.summary import setting_name
 
     entries = result["summary"]
     settings = [setting_name(entry) for entry in entries]
@@ -122,7 +122,7 @@ def _draw(result: dict[str, Any], files: "FigureFiles") -> None:
 
 
 def _print(result: dict[str, Any]) -> None:
-    from tvist_lab.sweep.summary import setting_name
+    from tvist_lab.study.summary import setting_name
 
     run = result["run"]
     table(
@@ -163,14 +163,14 @@ def _cells(entry: dict[str, Any], setting: str) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _tell(study: "Study", folder: Path) -> None:
+def _tell(study: "Ran", folder: Path) -> None:
     """Name the moves that failed.
 
     Raises:
         Failure: There are some.
     """
-    from tvist_lab.sweep.columns import FAILED, TOO_WEAK
-    from tvist_lab.sweep.summary import setting_name
+    from tvist_lab.study.summary import setting_name
+    from tvist_lab.study.work import FAILED, TOO_WEAK
 
     rows = study.rows
     weak = int((rows["status"] == TOO_WEAK).sum())

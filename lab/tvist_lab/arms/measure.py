@@ -8,14 +8,17 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_controller.api import Setup, body, modal_estimator, paper_payload
-from tvist_lab.evaluation.conditions import AS_KNOWN, torque_share
-from tvist_lab.evaluation.evaluate import MoveJob, arm_seed, evaluate, report
-from tvist_lab.evaluation.moves import draw_moves
-from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.robustness import stiffer
 from tvist_lab.identification.modal import identify_modal
 from tvist_lab.identification.modal_plan import ModalPlan, free_configurations, jog_of
 from tvist_lab.in_process import robot_in_process
+from tvist_lab.studies.evaluate import MEASURED, methods, report
+from tvist_lab.study.arms import stiffer
+from tvist_lab.study.case import Case, arm_seed
+from tvist_lab.study.engine import made
+from tvist_lab.study.method import Named
+from tvist_lab.study.moves import draw_moves
+from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.work import Job
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
@@ -77,17 +80,18 @@ def measure(
     known = asyncio.run(_identified(arm, seed)) if calibration is None else calibration
     mass = arm.payload.mass
     drawn = draw_moves(arm, moves, seed, (mass, mass)).moves
-    feasible = [move for move in drawn if torque_share(arm, move, AS_KNOWN.limits) <= 1.0]
+    feasible = [move for move in drawn if Case(arm, move).torque_share <= 1.0]
+    auto = methods(Named(Recipe("auto", known), "auto"), ())
     jobs = [
-        MoveJob(arm, move, Recipe("auto", known), seed=arm_seed(seed, place))
+        Job(Case(arm, move, arm_seed(seed, place), axes={"payload_kg": move.mass}), auto, MEASURED)
         for place, move in enumerate(feasible)
     ]
     judged = []
-    for one in evaluate(jobs):
-        judged.append(one)
+    for rows in made(jobs):
+        judged.append(rows)
         progress(1)
     progress(len(drawn) - len(feasible))
-    summary = report(jobs, judged)
+    summary = report(judged)
     return Measured(
         stiffness=stiffness,
         calibration="identified" if calibration is None else known.name,

@@ -7,9 +7,9 @@ import numpy as np
 
 from tvist_controller.api import DrivenLine, body, respond
 from tvist_lab.benchmark.figure import Figure, figure, in_alternation
-from tvist_lab.evaluation.line import Unchanged, point_to_point
 from tvist_lab.in_process import free_setup
 from tvist_lab.paper.published import pose
+from tvist_lab.study.line import Unchanged, point_to_point
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_shaping import TvistFilter, shaper
 

@@ -8,16 +8,19 @@ import numpy as np
 
 from tvist_controller.api import body, paper_payload
 from tvist_lab.bound.least_time import MODES, bound
-from tvist_lab.evaluation.evaluate import JudgedMove, MoveJob, judge
-from tvist_lab.evaluation.line import PAPER
-from tvist_lab.evaluation.moves import Move
-from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.runners import Processes, in_order
+from tvist_lab.study.case import Case
+from tvist_lab.study.catalogue import names
+from tvist_lab.study.line import PAPER
+from tvist_lab.study.method import Named
+from tvist_lab.study.moves import Move
+from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.work import Job, Row, measure
 from tvist_plant.description import RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.calibration import Calibration
 
-SHAPERS = ("zv", "auto", "auto-target", "planned")
+SHAPERS = names("bound")
 """Shapers that are compared unless others are named."""
 SHARE, MORE = 1.15, 4.0
 """A shaper is near the bound if it takes at most this share of it, and this much more [ms]."""
@@ -57,8 +60,8 @@ class Bounded:
     move: Move
     bound: float
     """The bound [ms]."""
-    judged: dict[str, JudgedMove]
-    """What each shaper made of it."""
+    judged: dict[str, Row]
+    """Row of each shaper."""
 
 
 def compare(jobs: Sequence[BoundJob]) -> Iterator[Bounded]:
@@ -72,10 +75,9 @@ def bounded(job: BoundJob) -> Bounded:
     arm = FlexibleArm(job.description, body(paper_payload(job.description, job.move.mass)))
     modes = arm.modes(target)
     least = bound(start, target, PAPER, modes.f_d[:MODES], modes.zeta[:MODES])
-    made = {
-        name: judge(MoveJob(job.description, job.move, Recipe(name, job.calibration))) for name in job.shapers
-    }
-    return Bounded(job.name, job.move, round(1e3 * least, 6), made)
+    methods = tuple(Named(Recipe(name, job.calibration), name) for name in job.shapers)
+    rows = measure(Job(Case(job.description, job.move), methods))
+    return Bounded(job.name, job.move, round(1e3 * least, 6), {row["shaper"]: row for row in rows})
 
 
 def report(found: Sequence[Bounded]) -> dict[str, Any]:
@@ -97,33 +99,32 @@ def _row(one: Bounded) -> dict[str, Any]:
         "bound_ms": one.bound,
         "shapers": {
             name: {
-                "delay_ms": judged.delay(judged.shaped),
+                "delay_ms": row["delay_ms"],
                 "near": near(one, name),
-                "reduction_percent": judged.reduction(judged.shaped) if judged.counts else None,
+                "reduction_percent": row["reduction_percent"],
             }
-            for name, judged in one.judged.items()
+            for name, row in one.judged.items()
         },
     }
 
 
 def near(one: Bounded, name: str) -> bool:
     """Return whether a shaper takes little more than the bound."""
-    judged = one.judged[name]
-    return judged.delay(judged.shaped) <= SHARE * one.bound + MORE
+    return bool(one.judged[name]["delay_ms"] <= SHARE * one.bound + MORE)
 
 
 def _summary(found: Sequence[Bounded], name: str) -> dict[str, Any]:
-    judged = [one.judged[name] for one in found]
-    delays = np.array([one.delay(one.shaped) for one in judged])
+    rows = [one.judged[name] for one in found]
+    delays = np.array([row["delay_ms"] for row in rows])
     bounds = np.array([one.bound for one in found])
-    reductions = [one.reduction(one.shaped) for one in judged if one.counts]
+    reductions = [row["reduction_percent"] for row in rows if row["reduction_percent"] is not None]
     return {
         "delay_ms": _spread(delays.tolist()),
         "less_bound_ms": _spread((delays - bounds).tolist()),
         "near_percent": 100.0 * float(np.mean([near(one, name) for one in found])),
         "reduction_percent": _spread(reductions),
-        "peak_acceleration_ratio": max(one.shaped.acceleration for one in judged),
-        "peak_velocity_ratio": max(one.shaped.velocity for one in judged),
+        "peak_acceleration_ratio": max(row["peak_acceleration_ratio"] for row in rows),
+        "peak_velocity_ratio": max(row["peak_velocity_ratio"] for row in rows),
     }
 
 
