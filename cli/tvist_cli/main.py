@@ -22,6 +22,7 @@ COMMANDS = {
     "check": "Check that a robot answers and is ready to be moved; exit code 0 if so.",
     "unlock": "Make a stopped robot ready to be moved again; exit code 0 if it is.",
     "move": "Move a served robot to a pose.",
+    "stop": "Stop a served robot, whoever has control; exit code 0 if it is at rest.",
     "watch": "Show live what a served robot is doing.",
     "fleet": "Show the robots that a router reaches and how they are, or stop them all.",
     "router": "Run a router, through which the robots and clients of a fleet reach each other.",

@@ -377,6 +377,27 @@ class TestMoveAndWatch:
         with Wire(realtime.endpoint) as wire, wire.control("somebody"):
             tvist("move", NEAR, "--endpoint", realtime.endpoint).assert_failed(1, "somebody")
 
+    @pytest.mark.quick
+    def test_stop_ends_the_motion_of_another_who_keeps_control(self, realtime):
+        at = ("--endpoint", realtime.endpoint)
+        with Wire(realtime.endpoint) as wire, wire.control("somebody") as token:
+            wire.listen("state")
+            move = {"q": [3.0, -3.0, 0.0, -1.5, 0.0, 0.0], "velocity": 0.2}
+            motion = wire.command("move_j", token=token, **move)["id"]
+            wire.wait("state", lambda state: state["target_qd"][0] > 0.1)
+            said = tvist("stop", "ur5e", *at, "--json").assert_done().json
+            assert (said["stopped"], said["control"]) == ([f"motion {motion}"], "somebody")
+            assert said["runtime_state"] == "STOPPED"
+            assert tvist("stop", *at).assert_done().out == "ur5e: nothing was under way\n"
+
+    def test_stop_leaves_the_steps_of_lockstep_to_who_has_them(self, lockstep):
+        with Wire(lockstep.endpoint) as wire, wire.control() as token:
+            wire.command("move_j", token=token, q=[0.5, -3.0, 0.0, -1.5, 0.0, 0.0])
+            wire.step(token, 100)
+            assert "next step" in tvist("stop", "--endpoint", lockstep.endpoint).assert_done().out
+            state = wire.until(wire.step(token, 500)["tick"])
+            assert (state["runtime_state"], state["target_q"][0] < 0.4) == (STOPPED, True)
+
     def test_watch_prints_an_object_a_line(self, realtime):
         ended = tvist("watch", realtime.endpoint, "--seconds", 1, "--json").assert_done()
         states = [json.loads(line) for line in ended.out.splitlines()]
