@@ -12,7 +12,7 @@ from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import print_json, say
 from tvist_cli.program_output import Tell
 from tvist_cli.robot_options import configuration, content_of, with_robot_options
-from tvist_cli.scripts import named, placed, read_script
+from tvist_cli.scripts import check_scripts, named, placed, read_script
 from tvist_cli.serving import compile_if_new, introduction, leave, say_recorded, say_who_can_reach
 from tvist_server.config import ConfigError, ServeConfig
 
@@ -30,8 +30,8 @@ OPTIONS = {
 
 @with_robot_options(OPTIONS)
 def run(
-    file: Path,
-    *,
+    *file: Annotated[Path, Parameter(required=True)],
+    check: bool = False,
     lockstep: bool = False,
     inputs: Annotated[list[str] | None, Parameter(name="--input")] = None,
     timeout: float | None = None,
@@ -48,8 +48,14 @@ def run(
     The program runs in real time, on a robot that other programs can reach as if tvist serve ran it. Popups do not
     hold it up: they are printed and closed.
 
+    With --check, nothing runs. Errors are what keeps a program from starting: wrong syntax, unknown names, and calls
+    that do not fit their functions. A function of UR's robots that tvist does not simulate is a warning: the program
+    starts, and ends with an error when it calls that function.
+
     Args:
-        file: Program to run; - reads the standard input.
+        file: Program to run, or programs to check; - reads the standard input.
+        check: Look for errors without running anything: each is a line FILE:LINE:COLUMN: text. Exit code 0: there is
+            none. Exit code 1: there is at least one. Exit code 2: a file cannot be read.
         lockstep: Run as fast as this machine computes, without network; the arm moves exactly as in real time. A
             program that waits for a client then waits for ever: see --input and --timeout. It cannot open sockets.
         inputs: Input to set before the start as NAME=VALUE, repeatable. NAME is digital_input_N, input_bit_register_N,
@@ -60,20 +66,32 @@ def run(
         json: Print one JSON object at the end instead of messages.
         given: Fields of `ServeConfig`.
     """
+    if check:
+        if given or lockstep or inputs or config or timeout is not None:
+            raise Failure(
+                "--check runs nothing, so that only --json goes with it: leave the others out", code=2
+            )
+        check_scripts(file, json=json)
+        return
+    program, *others = file
+    if others:
+        raise Failure(f"tvist run runs one program: leave {others[0]} out, or give --check", code=2)
     if timeout is not None and timeout <= 0.0:
         raise Failure(f"timeout is {timeout:g}: must be more than 0", code=2)
-    text = read_script(file)
-    _check(file, text, json=json)
+    text = read_script(program)
+    _check(program, text, json=json)
     checked = _configuration(given, config, lockstep=lockstep)
-    job = _Job(file, text, inputs or (), timeout, Tell(quiet=json))
+    job = _Job(program, text, inputs or (), timeout, Tell(quiet=json))
     watch, errors, server = job.in_lockstep(checked) if lockstep else job.in_real_time(checked)
     job.tell(watch)
     job.tell.clear()
     if json:
         from tvist_lab.programs.report import as_dict
 
-        print_json({"file": named(file), "lockstep": lockstep, "recording": checked.record, **as_dict(watch)})
-    failure = _failure(file, watch, errors)
+        print_json(
+            {"file": named(program), "lockstep": lockstep, "recording": checked.record, **as_dict(watch)}
+        )
+    failure = _failure(program, watch, errors)
     if failure is None and not json:
         from tvist_lab.programs.report import summary
 

@@ -3,7 +3,9 @@
 import asyncio
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import say
@@ -11,6 +13,7 @@ from tvist_cli.robot_options import configuration, with_robot_options
 from tvist_cli.serving import (
     BEGAN,
     compile_if_new,
+    compile_shown,
     introduction,
     leave,
     say_recorded,
@@ -24,13 +27,31 @@ if TYPE_CHECKING:
 
 
 @with_robot_options()
-def serve(*, config: str | None = None, **given: Any) -> None:
+def serve(
+    *,
+    compile_only: Annotated[
+        list[int] | None, Parameter(name="--compile", consume_multiple=(0, 1), allow_repeating=False)
+    ] = None,
+    config: str | None = None,
+    **given: Any,
+) -> None:
     """Run one or more robots on the network until Control+C, SIGTERM, SIGQUIT or the terminal closes.
 
+    The first start after an installation or an update compiles what a robot computes at every tick and in its plans for
+    this processor. Machine code is kept beside the sources, or in the user's cache folder where those cannot be
+    written, or in the folder that NUMBA_CACHE_DIR names.
+
     Args:
+        compile_only: Only compile, so that no start has to, in as many processes as the number says [one on each
+            processor]; serve nothing.
         config: TOML file with any of the other options; options on the command line take precedence.
         given: Fields of `ServeConfig`.
     """
+    if compile_only is not None:
+        if given or config is not None:
+            raise Failure("--compile serves nothing: leave the other options out", code=2)
+        _compile(*compile_only)
+        return
     from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError
     from tvist_server.recording import RecorderError
@@ -66,6 +87,17 @@ def serve(*, config: str | None = None, **given: Any) -> None:
     if errors:
         raise Failure("; ".join(errors))
     leave(server, 0)
+
+
+def _compile(processes: int | None = None) -> None:
+    """Compile ahead, in this number of processes."""
+    from tvist_server.kernels import KernelsError
+
+    if processes is not None and processes < 1:
+        raise Failure(f"compile is {processes}: must be at least 1", code=2)
+    with told(KernelsError):
+        compile_shown(processes)
+    say(f"everything is compiled, after {time.monotonic() - BEGAN:.0f} s")
 
 
 def _several(config: ServeConfig, ending: "Ending") -> None:
