@@ -43,7 +43,7 @@ class WorkspaceMap:
         return np.asarray(100.0 * (self.identified[key] / self.true[key] - 1.0))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the content of `tvist map --json`; null stands for configurations that collide."""
+        """Return the content of `tvist study map --json`; null stands for configurations that collide."""
         rows, columns = self.names
         return {
             "rows": {"joint": rows, "angles_rad": self.angles[0].tolist()},

@@ -143,9 +143,9 @@ class TestComparison:
 
     def test_the_page_names_its_command(self, judged, ur5e, modal):
         told = {
-            "command": "tvist paths --random 2 --seed 5", "plant": "clean", "payload_kg": [0.0, 5.0],
+            "command": "tvist study paths --random 2 --seed 5", "plant": "clean", "payload_kg": [0.0, 5.0],
             "calibration": "ur5e_modal", "circle": circle(ur5e, modal), **report(judged),
         }  # fmt: skip
         text = page(told)
-        assert "tvist paths --random 2 --seed 5" in text
+        assert "tvist study paths --random 2 --seed 5" in text
         assert "| auto | joint by joint |" in text

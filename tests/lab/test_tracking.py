@@ -152,7 +152,7 @@ class TestReport:
             for speed in (1.0, 2.0)
         ]
         result = {
-            "command": "tvist tracking --shapers zv --speeds 1 2", "payload_kg": 0.0, "tolerance_rad": 0.2,
+            "command": "tvist study tracking --shapers zv --speeds 1 2", "payload_kg": 0.0, "tolerance_rad": 0.2,
             "speeds_rad_s": [1.0, 2.0], "lookahead_s": 0.03, "gain": 2000.0, "step_s": PERIOD,
             "refused": {"um_zv": "zeta_max is too large"}, "shapers": report(made, 0.2),
         }  # fmt: skip
@@ -164,7 +164,7 @@ class TestReport:
         assert found["ramp"][1] == ["zv", "0.0", "34.0", "0.120", "**0.240**", "1.67 rad/s"]
         assert {len(row) for row in found["ramp"]} == {len(columns(result, "ramp"))}
         text = page(result)
-        assert "tvist tracking --shapers zv --speeds 1 2" in text
+        assert "tvist study tracking --shapers zv --speeds 1 2" in text
         assert "`um_zv`: zeta_max is too large" in text
 
 

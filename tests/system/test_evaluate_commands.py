@@ -7,9 +7,9 @@ import pytest
 from tests.system.test_command_line import tvist
 
 from tvist_cli.commands.evaluate import evaluate
-from tvist_cli.commands.paths import paths
-from tvist_cli.commands.robustness import robustness
 from tvist_cli.commands.shaperbench import shaperbench
+from tvist_cli.commands.study.paths import paths
+from tvist_cli.commands.study.robustness import robustness
 from tvist_cli.failure import Failure
 
 MOVES = [
@@ -155,8 +155,8 @@ class TestRobustness:
 class TestPaths:
     def test_a_path_has_the_keys_that_are_promised(self, tmp_path):
         told = tvist(
-            "paths", "--random", 1, "--kind", "arc", "--shapers", "zv", "auto", "--seed", 3, "--payload", 5, "--clean",
-            "--markdown", tmp_path / "page.md", "--json",
+            "study", "paths", "--random", 1, "--kind", "arc", "--shapers", "zv", "auto", "--seed", 3,
+            "--payload", 5, "--clean", "--markdown", tmp_path / "page.md", "--json",
         ).assert_done().json  # fmt: skip
         (path,) = told["paths"]
         assert (path["kind"], path["payload_kg"], told["plant"]) == ("arc", 5.0, "clean")
@@ -170,13 +170,13 @@ class TestPaths:
         assert set(told["summary"]) == {"all", "arc"}
         assert {"refused", "stopping", "circle", "seed", "calibration"} <= set(told)
         page = (tmp_path / "page.md").read_text(encoding="utf-8")
-        typed = "tvist paths --random 1 --kind arc --shapers zv auto --seed 3 --payload 5 --clean --markdown"
+        typed = "tvist study paths --random 1 --kind arc --shapers zv auto --seed 3 --payload 5 --clean --markdown"
         assert page.startswith(f"```sh\n{typed} ")
 
     @pytest.mark.slow
     def test_words_and_figures_are_for_people(self, tmp_path):
         said = tvist(
-            "paths", "--random", 3, "--shapers", "auto", "--figures", tmp_path / "figures"
+            "study", "paths", "--random", 3, "--shapers", "auto", "--figures", tmp_path / "figures"
         ).assert_done()  # fmt: skip
         for words in ("paths with blends", "joint by joint", "in motion", "circle"):
             assert words in said.out
@@ -244,7 +244,7 @@ class TestTracking:
     def test_each_shaper_has_errors_at_each_speed_and_the_page_the_same(self, tmp_path):
         made = tmp_path / "page.md"
         told = tvist(
-            "tracking", "--shapers", "auto", "--speeds", 1, 0.5, "--markdown", made, "--json"
+            "study", "tracking", "--shapers", "auto", "--speeds", 1, 0.5, "--markdown", made, "--json"
         ).assert_done().json  # fmt: skip
         assert told["speeds_rad_s"] == [0.5, 1.0]
         assert [(one["name"], one["shaped"]) for one in told["shapers"]] == [("none", False), ("auto", True)]

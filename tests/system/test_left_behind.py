@@ -19,7 +19,7 @@ from tvist_server.ending import ending_signals
 STUDIES = {
     "search": ["search", "--stops", "100000"],
     "evaluate": ["evaluate", "--random", "400"],
-    "sweep": ["sweep", "spec.toml", "--output", "out"],
+    "sweep": ["study", "spec.toml", "--output", "out"],
 }
 """Each takes much longer than it is waited for."""
 SPEC = 'shapers = ["none"]\nmoves = 4000\npayloads = [1]\nrobots = ["one-joint"]\n'

@@ -7,6 +7,8 @@ from matplotlib.figure import Figure
 
 from tvist_lab.report.page import Page, PageTable, Section, picture
 from tvist_lab.studies.bench_tables import IN_REPORT, ranked
+from tvist_lab.study.measures import MEASURES
+from tvist_lab.study.study import Study
 from tvist_lab.study.tables import Shown, cells, titles
 from tvist_lab.words import counted
 
@@ -134,6 +136,29 @@ def _verdict_on_ranking(ranked: Sequence[Mapping[str, Any]], arms: int) -> list[
     if quiet is first:
         return [lead, "It also leaves the least vibration."]
     return [lead, f"{quiet['name']} leaves the least vibration: {quiet['residual_m_s2']['median']:.3f} m/s²."]
+
+
+def study_page(study: Study, result: Mapping[str, Any], figure: Figure, command: str) -> Page:
+    """Build the report of a study of one's own.
+
+    Args:
+        study: The study.
+        result: What `tvist study FILE --json` prints.
+        figure: Its figure.
+        command: The command that makes the report, for its provenance.
+    """
+    columns = study.shown(result["summary"])
+    words = {
+        name: f"{MEASURES[name].meaning}{f' [{MEASURES[name].unit}]' if MEASURES[name].unit else ''}"
+        for name in study.show
+    }
+    sections = [
+        Section("Results", tables=[PageTable(titles(columns), cells(result["summary"], columns))]),
+        _drawn({"Medians, and bands from the 5th to the 95th percentile.": figure}),
+        Section("What the words mean", facts=words),
+        Section("Provenance", facts={"Command": command, "Rows": str(result["rows"])}),
+    ]
+    return Page(study.title, [study.notes or f"{counted(result['rows'], 'row')} were measured."], sections)
 
 
 def _drawn(figures: Mapping[str, Figure]) -> Section:

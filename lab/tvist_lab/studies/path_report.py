@@ -1,4 +1,4 @@
-"""Results of `tvist paths`, as JSON has them, and as tables of a page."""
+"""Results of `tvist study paths`, as JSON has them, and as tables of a page."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -32,7 +32,7 @@ KIND_NAMES = {"line": "lines", "arc": "arcs", "blends": "paths with blends"}
 
 
 def report(judged: Sequence[JudgedPath]) -> dict[str, Any]:
-    """Return the part of `tvist paths --json` about the paths."""
+    """Return the part of `tvist study paths --json` about the paths."""
     groups = {"all": list(judged)}
     for one in judged:
         groups.setdefault(one.move.kind, []).append(one)

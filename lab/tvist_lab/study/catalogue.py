@@ -153,6 +153,23 @@ _MAKERS: dict[Kind, Callable[[Row, Recipe, RobotDescription, tuple[float, float]
 }
 
 
+def some(
+    wanted: Sequence[str], description: RobotDescription, calibration: Calibration
+) -> tuple[Method, ...]:
+    """Return methods of the catalogue by their names.
+
+    Args:
+        wanted: Names.
+        description: The robot.
+        calibration: Source of the estimates.
+
+    Raises:
+        KeyError: There is no method of a name.
+    """
+    recipe, known = Recipe("zv", calibration), {row.name: row for row in rows()}
+    return tuple(made(known[name], recipe, description) for name in wanted)
+
+
 def baselines(recipe: Recipe, description: RobotDescription, masses: tuple[float, float]) -> list[Method]:
     """Return what `evaluate` compares a shaper with; fixed ones are designed for the workspace and these payloads.
 
@@ -183,10 +200,9 @@ def bench(
     Raises:
         KeyError: There is no method of that name.
     """
-    recipe, known = Recipe("zv", calibration), {row.name: row for row in rows("bench")}
-    chosen = list(known) if against is None else [name for name in against if name != UNSHAPED]
-    waiting = Named(Recipe(UNSHAPED, calibration), UNSHAPED, Waiting.label)
-    every: list[Method] = [waiting, *(made(known[name], recipe, description) for name in chosen)]
+    recipe, waiting = Recipe("zv", calibration), Named(Recipe(UNSHAPED, calibration), UNSHAPED, Waiting.label)
+    chosen = [name for name in (names("bench") if against is None else against) if name != UNSHAPED]
+    every: list[Method] = [waiting, *some(chosen, description, calibration)]
     if isinstance(mine, OwnShaper):
         every.append(Named(Recipe(mine.name, calibration, own=(mine,)), mine.name, mine.place))
     elif mine is not None:

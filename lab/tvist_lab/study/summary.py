@@ -5,7 +5,17 @@ from typing import Any
 import polars as pl
 
 from tvist_lab.study.columns import AXES
+from tvist_lab.study.tables import Shown
 from tvist_lab.study.work import FAILED, MEASURED, TOO_WEAK
+
+SHOWN = (
+    Shown("setting", "setting"), Shown("shaper", "shaper"), Shown("moves", "measured"),
+    Shown("delay ms", "delay_ms.median", 0), Shown("less %", "reduction_percent.median", 1),
+    Shown("p5", "reduction_percent.p5", 1), Shown("than waiting", "less_than_waiting_percent.median", 1),
+    Shown("still ms", "still_after_unshaped_stop_ms.median", 0), Shown("p90", "still_after_unshaped_stop_ms.p90", 0),
+    Shown("q̈/limit", "peak_acceleration_ratio.max", 3),
+)  # fmt: skip
+"""Table of a summary, whose entries have got the name of their setting."""
 
 
 def summary(rows: pl.DataFrame) -> list[dict[str, Any]]:

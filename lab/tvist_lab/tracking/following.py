@@ -88,7 +88,7 @@ def follow(setup: Setup, wanted: Floats, plant: Plant | None = None) -> Followed
         assert isinstance(reply, Done), reply
 
     inputs = [f"input_double_register_{number}={q!r}" for number, q in enumerate(wanted[0].tolist())]
-    token = start(controller.receive, PROGRAM, inputs, "tvist tracking")
+    token = start(controller.receive, PROGRAM, inputs, "tvist study tracking")
     for _ in range(BEFORE):
         _tick(controller)
     actual = np.empty_like(wanted)

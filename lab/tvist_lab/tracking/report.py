@@ -1,4 +1,4 @@
-"""Results of `tvist tracking`, as JSON has them, and as tables of a page."""
+"""Results of `tvist study tracking`, as JSON has them, and as tables of a page."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""`tvist tracking`: measure how closely the arm follows positions sent to servoj, with every shaper."""
+"""`tvist study tracking`: measure how closely the arm follows positions sent to servoj, with every shaper."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -130,7 +130,7 @@ def _command(
 ) -> str:
     """The command that gives the same figures."""
     return " ".join(
-        ["tvist", "tracking"]
+        ["tvist", "study", "tracking"]
         + ([] if shapers is None else ["--shapers", *shapers])
         + ([] if speeds is None else ["--speeds", *(f"{speed:g}" for speed in speeds)])
         + ([] if payload == 0.0 else ["--payload", f"{payload:g}"])

@@ -1,4 +1,4 @@
-"""`tvist robustness`: how much each shaper reduces vibration if stiffness or payload are wrong."""
+"""`tvist study robustness`: how much each shaper reduces vibration if stiffness or payload are wrong."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -69,7 +69,9 @@ def robustness(
     options = [] if names is None else ["--against", *names]
     options += [] if calibration is None else ["--calibration", calibration]
     result: dict[str, Any] = {
-        "command": " ".join(["tvist", "robustness", *options, "--moves", str(moves), "--seed", str(seed)]),
+        "command": " ".join(
+            ["tvist", "study", "robustness", *options, "--moves", str(moves), "--seed", str(seed)]
+        ),
         "moves": moves,
         "seed": seed,
         "calibration": known.name,

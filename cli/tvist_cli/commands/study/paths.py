@@ -1,4 +1,4 @@
-"""`tvist paths`: shape random paths of the tool along the path and joint by joint, and compare."""
+"""`tvist study paths`: shape random paths of the tool along the path and joint by joint, and compare."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -147,7 +147,7 @@ def _command(
 ) -> str:
     """The command that gives the same figures."""
     return " ".join(
-        ["tvist", "paths", "--random", str(random), "--seed", str(seed)]
+        ["tvist", "study", "paths", "--random", str(random), "--seed", str(seed)]
         + ([] if kind is None else ["--kind", kind])
         + ([] if shapers is None else ["--shapers", *shapers])
         + ([] if payload == UNIFORM else ["--payload", payload])

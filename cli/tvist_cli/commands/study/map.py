@@ -1,4 +1,4 @@
-"""`tvist map`: maps of the first mode and of a shaper's delay over the workspace."""
+"""`tvist study map`: maps of the first mode and of a shaper's delay over the workspace."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
