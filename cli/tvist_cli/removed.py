@@ -1,11 +1,12 @@
 """Commands that had another name: what to use instead."""
 
 _LOG = ("record", "info", "analyze", "compare", "report", "export", "replay")
-_STUDIES = ("robustness", "paths", "tracking", "map", "sweep")
+_STUDIES = ("robustness", "paths", "tracking", "map")
 
 INSTEAD = {
     **{name: f"tvist log {name}" for name in _LOG},
     **{name: f"tvist study {name}" for name in _STUDIES},
+    "sweep": "tvist study FILE",
     "check-script": "tvist run --check",
     "kernels": "tvist serve --compile",
     "sensitivity": "tvist shapers --sensitivity",
