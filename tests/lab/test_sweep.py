@@ -11,7 +11,8 @@ import pytest
 from polars.testing import assert_frame_equal
 
 from tvist_controller import calibrations
-from tvist_lab.runners import Failed, TaskError
+from tvist_lab.figures import study_figure
+from tvist_lab.runners import Failed, Processes, TaskError
 from tvist_lab.runners.cluster import Cluster
 from tvist_lab.study.arms import scattered
 from tvist_lab.study.axes import Axes, SweptRobot
@@ -24,6 +25,7 @@ from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.spec import Spec, SpecError, read_spec
 from tvist_lab.study.store import Store, StoreError
+from tvist_lab.study.study import StudyError, read_study
 from tvist_lab.study.summary import setting_name, summary
 from tvist_lab.study.work import Job, failed, measure, measure_each
 from tvist_plant.description import load
@@ -313,6 +315,43 @@ def test_the_page_has_an_example_and_names_every_key(tmp_path):
     assert read_spec(tmp_path / "springs.toml").rows == 3 * 3 * 4 * 20
     keys = re.findall(r"^\| `(\w+)` \|", text.partition("## Run it")[0], re.MULTILINE)
     assert sorted(keys) == sorted(Spec.__struct_fields__)
+
+
+def of_the_page():
+    """The study that the page shows."""
+    shown = re.findall(r"```python\n(.*?)```", HOW_TO.read_text(encoding="utf-8"), re.DOTALL)
+    return next(text for text in shown if "STUDY" in text)
+
+
+def test_the_study_of_the_page_is_made_kept_and_summarized(tmp_path):
+    text = of_the_page()
+    (tmp_path / "speeds.py").write_text(text.replace("20, seed", "1, seed"), encoding="utf-8")
+    study = read_study(tmp_path / "speeds.py")
+    ran = run_plan(study.plan(), tmp_path / "x", Processes(few=9), quietly)
+    assert run_plan(study.plan(), tmp_path / "x", Quick(), quietly).resumed == 3
+    entries = study.summary(ran.rows)
+    assert [(one["speed"], one["shaper"]) for one in entries] == [
+        (speed, name) for speed in (0.5, 1.0, 1.5) for name in ("zv", "auto")
+    ]
+    for one in entries:
+        assert one["shaped_peak_m_s2"]["median"] < one["unshaped_peak_m_s2"]["median"]
+    assert len(study_figure(entries, study.by, study.show).axes) == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("STUDY =", "study ="), "contains no STUDY"),
+        (('by=("speed",)', 'by=("pace",)'), "'pace': the axes are speed, move"),
+        (('"shaped_peak_m_s2")', '"peak")'), "'peak' is no measure"),
+        (('"zv", "auto"', '"zvv"'), "KeyError: 'zvv'"),
+    ],
+)
+def test_what_is_wrong_with_a_study_is_a_sentence(tmp_path, change, words):
+    text = of_the_page()
+    (tmp_path / "speeds.py").write_text(text.replace(*change), encoding="utf-8")
+    with pytest.raises(StudyError, match=words):
+        read_study(tmp_path / "speeds.py")
 
 
 class Locked(Axes):
