@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from proof.search.subject import Subject
 from scipy.spatial.transform import Rotation
 
 from tvist_controller import calibrations
@@ -15,7 +16,6 @@ from tvist_lab.evaluation.paths import PathJob, compare, draw
 from tvist_lab.evaluation.random_paths import KINDS, REGULAR
 from tvist_lab.evaluation.shaperbench import kinematics
 from tvist_lab.evaluation.tool_path import ToolPath, jacobian
-from tvist_lab.safety.subject import Subject
 from tvist_plant.description import load
 from tvist_protocol.motions import MovePath
 from tvist_protocol.replies import Accepted

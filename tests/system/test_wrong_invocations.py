@@ -102,8 +102,6 @@ MISUSE = [
     (("shapers", "--zeta", "2"), ["zeta is 2", "less than 1"]),
     (("paper", "--runs", "0"), ["runs is 0", "at least 1"]),
     (("paper", "--runs", "1.5"), ["--runs is '1.5'", "a whole number"]),
-    (("search", "--stops", "-1"), ["stops is -1", "0 to 1000000"]),
-    (("search", "--stops", "0", "--streams", "0", "--changes", "0", "--sequences", "0"), ["nothing to search"]),
     (("bench", "--seconds", "-1"), ["seconds is -1", "at least 0"]),
     (("bench", "--soak", "0"), ["soak is 0"]),
     (("bench", "--only", "lines"), ["--only is 'lines'", "line, motion"]),

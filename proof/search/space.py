@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from proof.search.subject import Subject
 from tvist_controller.api import ToolKinematics, placement_vector, turned
 from tvist_lab.recordings import Floats
-from tvist_lab.safety.subject import Subject
 from tvist_protocol import motions as m
 from tvist_protocol.replies import Reply
 

@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from proof.search import changes, programs, sequences, stops, streams
 from tvist_lab.runners import Processes, in_order
-from tvist_lab.safety import changes, programs, sequences, stops, streams
 from tvist_plant.description import RobotDescription, load
 
 Judge: TypeAlias = Callable[[RobotDescription, int], Any]
@@ -156,3 +156,33 @@ def _nearest(outcomes: Sequence[stops.Outcome | streams.StreamOutcome]) -> dict[
         "worst_below_clearance_m": max(one.near for one in outcomes),
         "worst_penetration_of_the_flexible_arm_m": max(arm) if arm else None,
     }
+
+
+def tables(result: dict[str, Any]) -> list[tuple[Sequence[str], list[list[str]]]]:
+    """Return the table of the figures of each search, and that of the kinds of stops."""
+    parts = {name: part for name, part in result.items() if isinstance(part, dict)}
+    figures = dict.fromkeys(key for part in parts.values() for key in part if key != "kinds")
+    rows = [[key, *(_figure(part.get(key)) for part in parts.values())] for key in figures]
+    found: list[tuple[Sequence[str], list[list[str]]]] = [(("figure", *parts), rows)]
+    if kinds := parts.get("stops", {}).get("kinds"):
+        columns = (
+            "kind",
+            "cases",
+            "duration, median [s]",
+            "maximum [s]",
+            "of the time left, median",
+            "ran out",
+        )
+        found.append((columns, [_kind(name, one) for name, one in kinds.items()]))
+    return found
+
+
+def _figure(value: Any) -> str:
+    """Return a figure, the number of broken promises, or a dash where there is none."""
+    return "–" if value is None else f"{len(value) if isinstance(value, list) else value:.4g}"
+
+
+def _kind(name: str, one: dict[str, Any]) -> list[str]:
+    lasted, share = one["duration_s"], one["share_of_time_left"]
+    figures = (one["count"], lasted["median"], lasted["max"], share["median"], one["ran_out"])
+    return [name, *(f"{value:.3g}" for value in figures)]

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from proof.search.own_calibration import own_calibration
 from tvist_controller.api import (
     STILL,
     Controller,
@@ -14,7 +15,6 @@ from tvist_controller.api import (
     central_differences,
 )
 from tvist_lab.recordings import Floats
-from tvist_lab.safety.own_calibration import own_calibration
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, Measurement

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from proof.bound.least_time import bound, farthest, least_ticks, poles_of
 from scipy import sparse
 from scipy.optimize import linprog
 from scipy.signal import cont2discrete
 
 from tvist_controller.api import MotionLimits
-from tvist_lab.bound.least_time import bound, farthest, least_ticks, poles_of
 from tvist_lab.evaluation.line import PAPER
 from tvist_plant.plant import PERIOD as H
 

@@ -1,37 +1,31 @@
 """The bound of each move beside what each shaper takes."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from tvist_controller.api import body, paper_payload
-from tvist_lab.bound.least_time import MODES, bound
+from proof.bound.least_time import MODES, bound
+from tvist_controller.api import body, load_calibration, paper_payload
 from tvist_lab.evaluation.evaluate import JudgedMove, MoveJob, judge
 from tvist_lab.evaluation.line import PAPER
-from tvist_lab.evaluation.moves import Move
+from tvist_lab.evaluation.moves import Move, draw_moves
 from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.runners import Processes, in_order
-from tvist_plant.description import RobotDescription
+from tvist_plant.description import RobotDescription, load
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.calibration import Calibration
 
+ROBOT, CALIBRATION = "ur5e", "ur5e_modal"
+"""The arm, and its calibration."""
+PAPERS = (("Q1", "Q2"), ("Q1", "Q3"), ("Q3", "Q1"))
+"""The paper's moves, which come before the random ones."""
 SHAPERS = ("zv", "auto", "auto-target", "planned")
 """Shapers that are compared unless others are named."""
 SHARE, MORE = 1.15, 4.0
 """A shaper is near the bound if it takes at most this share of it, and this much more [ms]."""
-COLUMNS = ("move", "kg", "bound ms")
 SUMMARY = ("shaper", "delay ms", "less bound ms", "near %", "less %", "p5", "min", "q̈/limit", "q̇/limit")
-TERMS = {
-    "bound": "least extra time in which a motion can leave the four lowest modes at rest, without feed-forward",
-    "delay": "extra duration of the reference compared with the unshaped one, median",
-    "less bound": "median of the difference to the bound; below 0, the shaper leaves some vibration instead of none",
-    "near": f"share of moves whose delay is at most {SHARE:g} times the bound and {MORE:g} ms",
-    "less": "reduction of the largest |α| later than 10 ms after the stop; median, 5th percentile and smallest",
-    "q̈, q̇": "largest acceleration and velocity of a joint, divided by the limit; largest of all moves",
-}
-"""What the columns mean."""
 
 
 @dataclass(frozen=True)
@@ -61,9 +55,24 @@ class Bounded:
     """What each shaper made of it."""
 
 
-def compare(jobs: Sequence[BoundJob]) -> Iterator[Bounded]:
-    """Yield the results in order, each as soon as it is available."""
-    return in_order(Processes(few=2, chunk=1), bounded, jobs)
+def compare(random: int, seed: int, shapers: Sequence[str] = SHAPERS) -> list[Bounded]:
+    """Bound the paper's moves and random ones of an arm without friction, gear errors and noise.
+
+    Args:
+        random: Number of random moves, each with a payload of its own up to the arm's rating.
+        seed: Seed of these.
+        shapers: Names of the shapers that make each move.
+    """
+    arm, known = load(ROBOT).disturbed_by(()), load_calibration(CALIBRATION)
+    moves = [
+        (f"{start}-{target}", Move(tuple(arm.poses[start]), tuple(arm.poses[target]), arm.payload.mass))
+        for start, target in PAPERS
+    ]
+    if random:
+        drawn = draw_moves(arm, random, seed, (0.0, arm.limits.payload)).moves
+        moves += [(str(number), move) for number, move in enumerate(drawn, 1)]
+    jobs = [BoundJob(name, arm, known, tuple(shapers), move) for name, move in moves]
+    return list(in_order(Processes(few=2, chunk=1), bounded, jobs))
 
 
 def bounded(job: BoundJob) -> Bounded:
@@ -79,12 +88,11 @@ def bounded(job: BoundJob) -> Bounded:
 
 
 def report(found: Sequence[Bounded]) -> dict[str, Any]:
-    """Return the part of `tvist bound --json` about the moves."""
-    names = list(found[0].judged) if found else []
+    """Return the bound of each move, what each shaper takes, and a summary for each shaper."""
     return {
         "moves": [_row(one) for one in found],
         "bound_ms": _spread([one.bound for one in found]),
-        "summary": {name: _summary(found, name) for name in names},
+        "summary": {name: _summary(found, name) for name in found[0].judged},
     }
 
 
@@ -98,7 +106,7 @@ def _row(one: Bounded) -> dict[str, Any]:
         "shapers": {
             name: {
                 "delay_ms": judged.delay(judged.shaped),
-                "near": near(one, name),
+                "near": _near(one, name),
                 "reduction_percent": judged.reduction(judged.shaped) if judged.counts else None,
             }
             for name, judged in one.judged.items()
@@ -106,7 +114,7 @@ def _row(one: Bounded) -> dict[str, Any]:
     }
 
 
-def near(one: Bounded, name: str) -> bool:
+def _near(one: Bounded, name: str) -> bool:
     """Return whether a shaper takes little more than the bound."""
     judged = one.judged[name]
     return judged.delay(judged.shaped) <= SHARE * one.bound + MORE
@@ -120,7 +128,7 @@ def _summary(found: Sequence[Bounded], name: str) -> dict[str, Any]:
     return {
         "delay_ms": _spread(delays.tolist()),
         "less_bound_ms": _spread((delays - bounds).tolist()),
-        "near_percent": 100.0 * float(np.mean([near(one, name) for one in found])),
+        "near_percent": 100.0 * float(np.mean([_near(one, name) for one in found])),
         "reduction_percent": _spread(reductions),
         "peak_acceleration_ratio": max(one.shaped.acceleration for one in judged),
         "peak_velocity_ratio": max(one.shaped.velocity for one in judged),
@@ -135,27 +143,9 @@ def _spread(values: Sequence[float]) -> dict[str, float | None]:
     }
 
 
-def move_columns(result: dict[str, Any]) -> tuple[str, ...]:
-    """Columns of the table of moves."""
-    return (*COLUMNS, *(f"{name} {what}" for name in result["summary"] for what in ("ms", "less %")))
-
-
-def move_rows(result: dict[str, Any]) -> list[list[str]]:
-    """Rows of the table of moves."""
-    return [
-        [row["name"], f"{row['payload_kg']:.1f}", f"{row['bound_ms']:.0f}"]
-        + [
-            cell
-            for one in row["shapers"].values()
-            for cell in (f"{one['delay_ms']:.0f}", _percent(one["reduction_percent"]))
-        ]
-        for row in result["moves"]
-    ]
-
-
-def summary_rows(result: dict[str, Any]) -> list[list[str]]:
-    """Rows of the table of shapers."""
-    return [
+def tables(result: dict[str, Any]) -> list[tuple[Sequence[str], list[list[str]]]]:
+    """Return the table of the shapers, that of the bounds and that of the moves."""
+    summary = [
         [
             name,
             f"{one['delay_ms']['median']:.0f}",
@@ -166,6 +156,23 @@ def summary_rows(result: dict[str, Any]) -> list[list[str]]:
             f"{one['peak_velocity_ratio']:.3f}",
         ]
         for name, one in result["summary"].items()
+    ]
+    bounds = [[f"{value:.0f}" for value in result["bound_ms"].values()]]
+    moves = [
+        [row["name"], f"{row['payload_kg']:.1f}", f"{row['bound_ms']:.0f}"]
+        + [
+            cell
+            for one in row["shapers"].values()
+            for cell in (f"{one['delay_ms']:.0f}", _percent(one["reduction_percent"]))
+        ]
+        for row in result["moves"]
+    ]
+    columns: tuple[str, ...] = ("move", "kg", "bound ms")
+    columns += tuple(f"{name} {what}" for name in result["summary"] for what in ("ms", "less %"))
+    return [
+        (SUMMARY, summary),
+        ([f"bound ms, {name}" for name in result["bound_ms"]], bounds),
+        (columns, moves),
     ]
 
 

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from proof.search import draws, stops, streams
+from proof.search.draws import WITHIN
+from proof.search.subject import Subject, speeds
 from tvist_controller.api import CLEARANCE, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_lab.safety import draws, stops, streams
-from tvist_lab.safety.draws import WITHIN
-from tvist_lab.safety.subject import Subject, speeds
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c

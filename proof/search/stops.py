@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from proof.search import draws
+from proof.search.draws import WITHIN
+from proof.search.subject import CLIENT, SESSION, Subject, refused, speeds, torques
 from tvist_controller.api import (
     CLEARANCE,
     TORQUE_SHARE,
@@ -15,9 +18,6 @@ from tvist_controller.api import (
     resting_after,
 )
 from tvist_lab.recordings import Floats
-from tvist_lab.safety import draws
-from tvist_lab.safety.draws import WITHIN
-from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused, speeds, torques
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c

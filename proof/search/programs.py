@@ -4,11 +4,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from proof.search import space
+from proof.search.scripts import Author
+from proof.search.sequences import SENT, Sequence
 from tvist_controller.api import CLEARANCE
 from tvist_lab.recordings import Floats
-from tvist_lab.safety import space
-from tvist_lab.safety.scripts import Author
-from tvist_lab.safety.sequences import SENT, Sequence
 from tvist_protocol import programs as p
 from tvist_protocol.io import SetRegisters
 from tvist_protocol.replies import Refused

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from proof.search import draws, space
+from proof.search.changes import far_payload
+from proof.search.draws import WITHIN
+from proof.search.subject import CLIENT, SESSION, Subject, speeds
+from proof.search.undisturbed import ROUNDING, Undisturbed
 from tvist_controller.api import CLEARANCE, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_lab.safety import draws, space
-from tvist_lab.safety.changes import far_payload
-from tvist_lab.safety.draws import WITHIN
-from tvist_lab.safety.subject import CLIENT, SESSION, Subject, speeds
-from tvist_lab.safety.undisturbed import ROUNDING, Undisturbed
 from tvist_plant.description import RobotDescription
 from tvist_protocol import commands as c
 from tvist_protocol.faults import FAULTS as FAULT_FIELDS

@@ -1,20 +1,18 @@
 """The searches themselves: they find what is broken."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from proof.__main__ import main
+from proof.search import draws, programs, sequences, stops
+from proof.search.own_calibration import own_calibration
+from proof.search.report import Counts, broken, search, tables
+from proof.search.subject import Subject, speeds
 
 from tvist_controller.api import paper_payload
 from tvist_controller.trajectory import PathStop
-from tvist_lab.safety import draws, programs, sequences, stops
-from tvist_lab.safety.markdown import page
-from tvist_lab.safety.own_calibration import own_calibration
-from tvist_lab.safety.report import Counts, broken, search
-from tvist_lab.safety.subject import Subject, speeds
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
@@ -32,29 +30,6 @@ def test_whatever_is_sent_the_promises_hold(number):
 @pytest.mark.parametrize("number", range(6))
 def test_whatever_programs_do_the_promises_hold(number):
     programs.ProgramSequence(UR5E, number).run()
-
-
-@pytest.mark.parametrize(
-    ("ahead", "late", "share", "says"),
-    [
-        (
-            1e-15,
-            0,
-            -0.0061,
-            ("than 1e-6 nrad (rounding),", "none came to rest later", "stayed at least 0.61 % below"),
-        ),
-        (2e-6, 3, 0.02, ("than 2e+03 nrad,", "more than 3 ticks later", "was at most 2.00 % above")),
-    ],
-)
-def test_the_page_says_on_which_side_of_a_bound_the_worst_stop_was(ahead, late, share, says):
-    stopped = {
-        "count": 1, "broken": [], "worst_ahead_rad": ahead, "worst_off_rad": 0.0, "worst_late_ticks": late,
-        "worst_torque_share": share,
-        "worst_velocity_share": 1.0, "worst_acceleration_share": 1.0,
-        "worst_penetration_of_the_flexible_arm_m": None, "kinds": {},
-    }  # fmt: skip
-    text = page({"robots": ["ur5e"], "stops": stopped}, "a command")
-    assert all(part in text for part in says), text
 
 
 def test_equal_numbers_are_equal_cases():
@@ -95,7 +70,8 @@ def test_robots_take_turns_each_with_its_own_calibration_and_every_shaper_is_tri
     result = search(Counts(stops=2, streams=2), 3, robots=tried)
     assert result["robots"] == tried
     assert result["stops"]["count"] == 2
-    page(result, "a command")
+    for columns, rows in tables(result):
+        assert {len(row) for row in rows} == {len(columns)}
     names = [draws.SHAPERS[0], "planned", "um_zvd", "ei3_exact", "elastic-auto"]
     for arm in map(load, [*tried, "ur30"]):
         known = own_calibration(arm)
@@ -134,22 +110,25 @@ def test_limits_are_drawn_at_the_arm_s_own_and_above_which_it_refuses(name):
         assert (reply.code, reply.where) == (draws.CODES[key], key)
 
 
-def test_the_command_prints_one_object_and_refuses_what_it_cannot_do():
-    command = [
-        sys.executable,
-        "-m",
-        "tvist_cli",
-        "search",
-        "--streams",
-        "0",
-        "--changes",
-        "0",
-        "--sequences",
-        "0",
-    ]
-    done = subprocess.run([*command, "--stops", "1", "--json"], capture_output=True, text=True, check=True)
-    assert json.loads(done.stdout)["stops"]["broken"] == []
-    for wrong, words in ((["--stops", "-1"], "stops is -1"), (["--stops", "0"], "nothing to search")):
-        refused = subprocess.run([*command, *wrong], capture_output=True, text=True, check=False)
-        assert refused.returncode == 2
-        assert words in refused.stderr
+def test_the_command_prints_one_object_and_refuses_what_it_cannot_do(capsys):
+    nothing = ["search", "--streams", "0", "--changes", "0", "--sequences", "0"]
+    assert main([*nothing, "--stops", "1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["stops"]["broken"] == []
+    for wrong, words in (
+        (["--stops", "-1"], "is -1"),
+        (["--stops", "0"], "nothing to search"),
+        (["--stops", "1", "--robot", "none.toml"], "none.toml"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main([*nothing, *wrong])
+        assert ended.value.code == 2
+        assert words in capsys.readouterr().err
+
+
+def test_the_command_fails_with_a_sentence_for_each_broken_promise(capsys, monkeypatch):
+    monkeypatch.setattr(stops, "ROUNDING", -1.0)  # no stop is so far behind
+    assert main(["search", "--stops", "2", "--streams", "0", "--changes", "0", "--sequences", "0"]) == 1
+    said = capsys.readouterr()
+    assert "ur5e, stops 0: " in said.err
+    assert "2 of 2 cases broke a promise" in said.err
+    assert "| broken | 2 |" in said.out

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from proof.search import space
 from tvist_controller.api import ToolKinematics
 from tvist_lab.recordings import Floats
-from tvist_lab.safety import space
 from tvist_plant.description import RobotDescription
 
 Random = np.random.Generator

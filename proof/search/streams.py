@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from proof.search import draws
+from proof.search.draws import WITHIN
+from proof.search.subject import CLIENT, SESSION, Subject, refused, speeds
 from tvist_controller.api import CLEARANCE, CollisionModel, JointLine, body, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_lab.safety import draws
-from tvist_lab.safety.draws import WITHIN
-from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused, speeds
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
