@@ -50,7 +50,7 @@ elsewhere: setup
 	$(BIN)/mypy --platform win32 $(addprefix --package ,tvist_client tvist_protocol tvist_shaping tvist_urscript)
 
 bench: setup
-	$(BIN)/tvist bench
+	$(BIN)/python -m proof bench
 
 # The tests that take minutes each, a release rehearsed, and a search for an hour of what `.ci/run` searches for a minute.
 soak: setup elsewhere rehearse

@@ -1,6 +1,8 @@
 """`python -m proof`: measure and search what the documents claim; README.md says what each part is for."""
 
 import argparse
+import asyncio
+import math
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -39,6 +41,18 @@ def _parser() -> argparse.ArgumentParser:
         one.add_argument("--json", action="store_true", help="Print one JSON object.")
         return one
 
+    bench = part(_bench, "bench", "Measure speed, each figure beside a reference from the same run.")
+    bench.add_argument(
+        "--seconds",
+        type=_up_to(86_400),
+        default=10,
+        help="Seconds of each measurement of a robot in real time; 0 serves none [10].",
+    )
+    bench.add_argument("--only", nargs="+", metavar="NAME", help="Parts to measure [all].")
+    soak = part(_soak, "soak", "Serve a robot under load, and tell whether memory and timing stay stable.")
+    soak.add_argument("minutes", type=_minutes)
+    late = part(_lateness, "lateness", "Compare the ticks that a robot misses with a bare thread's.")
+    late.add_argument("minutes", type=_minutes, help="for each: alone, with ten clients, with priority too")
     search = part(_search, "search", "Search for cases in which a robot breaks its promises.")
     for name, default, what in (
         ("stops", 100, "stops of every kind, at random moments of accepted moves"),
@@ -75,6 +89,42 @@ def _up_to(most: int) -> Callable[[str], int]:
         return int(text)
 
     return whole
+
+
+def _minutes(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"is {text}: must be more than 0")
+    return value
+
+
+def _bench(given: argparse.Namespace) -> int:
+    from proof.bench.report import PARTS, bench, tables
+
+    if unknown := set(given.only or ()) - set(PARTS):
+        given.refuse(f"there is no part {min(unknown)}: the parts are {' '.join(PARTS)}")
+    result = bench(given.seconds, _tell, given.only or PARTS)
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _soak(given: argparse.Namespace) -> int:
+    from proof.bench.soak import soak
+
+    result = asyncio.run(soak(given.minutes, _tell))
+    _print(
+        result, given.json, [(("what", "figure"), [[key, f"{value:.6g}"] for key, value in result.items()])]
+    )
+    return 0
+
+
+def _lateness(given: argparse.Namespace) -> int:
+    from proof.bench.on_time import on_time
+
+    result = asyncio.run(on_time(given.minutes, _tell))
+    rows = [[name, *(f"{value:.4g}" for value in found.values())] for name, found in result.items()]
+    _print(result, given.json, [(("missed ticks", *next(iter(result.values()))), rows)])
+    return 0
 
 
 def _search(given: argparse.Namespace) -> int:

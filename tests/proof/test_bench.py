@@ -1,23 +1,11 @@
-"""Figures of `tvist bench` beside their references: intervals, saved runs and their comparison."""
+"""Figures beside their references, and what the bench makes of them."""
 
-import math
+import json
 
-import msgspec
 import numpy as np
 import pytest
-
-from tvist_lab.benchmark.figure import figure, in_alternation, median_interval
-from tvist_lab.benchmark.machine import this_machine
-from tvist_lab.benchmark.saved_run import FORMAT, BenchRun, as_json, changes, load_run
-from tvist_plant.user_file import UserFileError
-
-
-def run(**figures):
-    return BenchRun(format=FORMAT, seconds=1.0, machine=this_machine(), figures=figures)
-
-
-def ratio(*values):
-    return figure("a tick", "µs", values, "another tick", [1.0] * len(values))
+from proof.__main__ import main
+from proof.bench.figure import figure, in_alternation, median_interval
 
 
 def test_the_interval_of_a_median_holds_it_as_often_as_it_says():
@@ -34,9 +22,8 @@ def test_a_ratio_is_that_of_each_repetition_so_that_a_drift_of_the_machine_cance
     assert (one.compared, one.low, one.high) == (0.5, 0.5, 0.5)
 
 
-def test_no_ratio_to_nothing_but_a_difference():
+def test_there_is_no_ratio_to_nothing():
     assert figure("ours", "", [1.0, 2.0], "theirs", [0.0, 0.0]).compared is None
-    assert figure("ours", "", [1.0, 2.0], "theirs", [0.0, 0.0], "difference").compared == 1.5
 
 
 def test_repetitions_alternate_forwards_and_backwards_after_a_first_one_that_does_not_count():
@@ -46,38 +33,39 @@ def test_repetitions_alternate_forwards_and_backwards_after_a_first_one_that_doe
     assert taken == {"a": [3, 6], "b": [4, 5]}
 
 
-def test_a_saved_run_is_read_as_it_was(tmp_path):
-    saved, path = run(line=ratio(1.0, 2.0, 3.0)), tmp_path / "run.json"
-    path.write_bytes(msgspec.json.encode(as_json(saved)))
-    assert load_run(path) == saved
-    assert as_json(saved)["line"] == 2.0
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["bench", "--only", "lines"], "no part lines: the parts are line motion"),
+        (["bench", "--seconds", "-1"], "is -1"),
+        (["soak", "0"], "is 0: must be more than 0"),
+        (["lateness", "nan"], "is nan"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(words, why, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2
+    assert why in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("content", ["", "no", "[]", "{}", '{"format": "tvist bench 0"}'])
-def test_another_file_is_refused(tmp_path, content):
-    path = tmp_path / "run.json"
-    path.write_text(content, encoding="utf-8")
-    with pytest.raises(UserFileError, match="is not a run that"):
-        load_run(path)
+@pytest.mark.nightly
+def test_the_bench_gives_each_figure_with_its_reference(capsys):
+    assert main(["bench", "--seconds", "0", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert {"plant_us_per_tick", "filter_us_per_tick", "line_us_per_tick", "realtime_factor"} <= said.keys()
+    for key, one in said["figures"].items():
+        assert one["value"] == said[key] > 0.0
+        assert one["low"] <= one["compared"] <= one["high"]
 
 
-def test_the_change_is_the_ratio_of_the_ratios_with_an_interval_of_both():
-    old, new = ratio(0.9, 1.0, 1.1), ratio(0.45, 0.5, 0.55)
-    (one,) = changes(run(line=old), run(line=new))
-    assert one.change == pytest.approx(0.5)
-    half = math.hypot(math.log(0.5 / 0.45), math.log(1.1))
-    assert one.low == pytest.approx(0.5 * math.exp(-half))
-    assert one.beyond
-
-
-def test_a_change_within_the_intervals_is_not_beyond_them():
-    (one,) = changes(run(line=ratio(0.9, 1.0, 1.1)), run(line=ratio(0.85, 0.95, 1.05)))
-    assert one.beyond is False
-    (alone,) = changes(run(line=ratio(1.0)), run(line=ratio(2.0)))
-    assert (alone.change, alone.beyond) == (2.0, None)
-
-
-def test_a_figure_of_one_run_only_is_told():
-    found = {one.key: one for one in changes(run(old=ratio(1.0)), run(new=ratio(1.0)))}
-    assert found["old"].new is None
-    assert found["new"].old is None
+@pytest.mark.nightly
+def test_a_short_soak_loses_nothing_and_says_what_it_saw(capsys):
+    assert main(["soak", "0.1", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["samples_lost"] == 0
+    assert said["states_recorded"] >= said["ticks"] > 0
+    assert said["observers"] == 5
+    assert said["states_observed"] + said["states_lost_by_observers"] >= 5 * said["ticks"]
+    assert 0 < said["setpoints_sent"] <= 3001
+    assert {"missed_percent", "late_p99_us", "memory_growth_percent"} <= said.keys()

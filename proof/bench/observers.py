@@ -1,6 +1,6 @@
 """Clients that read every state, each over its own connection, all in this process.
 
-    python -m tvist_lab.benchmark.observers ENDPOINT ROBOT COUNT
+    python -m proof.bench.observers ENDPOINT ROBOT COUNT
 
 A line on stdout says that all of them listen. They read until stdin ends; then another line gives the numbers of
 states that each received and missed.

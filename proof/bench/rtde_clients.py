@@ -1,6 +1,6 @@
-"""Clients of RTDE that read at 500 Hz, with so many different recipes, all in this process.
+"""Clients of RTDE that read at 500 Hz, each with a recipe of its own, all in this process.
 
-    python -m tvist_lab.benchmark.rtde_clients ADDRESS PORT COUNT RECIPES
+    python -m proof.bench.rtde_clients ADDRESS PORT COUNT
 
 A line on stdout says that all of them read. They read until stdin ends; then another line gives the numbers of
 packages that each received and missed.
@@ -98,9 +98,9 @@ class Client:
         return data
 
 
-def main(address: str, port: int, count: int, recipes: int) -> None:
+def main(address: str, port: int, count: int) -> None:
     """Read until stdin ends."""
-    clients = [Client(address, port, recipe(number % recipes)) for number in range(count)]
+    clients = [Client(address, port, recipe(number)) for number in range(count)]
     selector = selectors.DefaultSelector()
     for client in clients:
         selector.register(client.socket, selectors.EVENT_READ, client)

@@ -13,7 +13,7 @@ SLOW = "0.05"
 """Speed of the simulation: its robots have all that those in real time have, and leave the machine free."""
 
 
-async def memory(tell: Callable[[str], None]) -> dict[str, Any]:
+async def memory(_: float, tell: Callable[[str], None]) -> dict[str, Any]:
     """Measure the memory of servers of 1, 5 and 20 robots, and of one of 20 robots in two processes.
 
     Args:
@@ -25,12 +25,13 @@ async def memory(tell: Callable[[str], None]) -> dict[str, Any]:
     """
     few, more, many = [await _pss_mb(number, 1, tell) for number in (FEW, MORE, MANY)]
     spread = await _pss_mb(MANY, 2, tell)
-    return {
+    found = {
         "one_robot_mb": few,
         "further_robot_of_5_mb": (more - few) / (MORE - FEW),
         "further_robot_of_20_mb": (many - few) / (MANY - FEW),
         "robot_of_20_in_two_processes_mb": (spread - few) / (MANY - FEW),
     }
+    return {"memory": found}
 
 
 async def _pss_mb(robots: int, workers: int, tell: Callable[[str], None]) -> float:

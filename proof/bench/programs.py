@@ -1,14 +1,11 @@
 """Cost of programs in URScript: of a client library's idle loop in each tick, and of compiling a long program."""
 
 import gc
-import sys
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
+from proof.bench.figure import Figure, figure, in_alternation
 from tvist_controller.api import LoopbackHost, ScriptCompiler
-from tvist_lab.benchmark.figure import Figure, figure, in_alternation
 from tvist_lab.in_process import free_setup
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import TakeControl
@@ -25,12 +22,6 @@ PAIRS = 40
 """Number of pairs of runs."""
 COMPILED = 10
 """Number of times that it is compiled."""
-BUSY = 1_000_000
-"""Number to which a thread counts for comparison."""
-LISTENS = 1e-4
-"""Time between two looks at the clock while a program is compiled [s]."""
-SWITCHES = 1e-4
-"""Time for which a thread of the server keeps the interpreter while another one waits for it [s]."""
 
 
 def idle_loop() -> str:
@@ -81,10 +72,6 @@ def programs(tell: Callable[[str], None]) -> dict[str, Figure]:
     tell(f"compiling a program of {LINES} lines")
     ours, theirs = _our_compiler(), _python_compiler()
     compiling = in_alternation({"ours": lambda: _took(ours), "python": lambda: _took(theirs)}, COMPILED)
-    with _often_switching():
-        waiting = in_alternation(
-            {"ours": lambda: _longest_wait(ours), "python": lambda: _longest_wait(_busy)}, COMPILED
-        )
     return {
         "idle_loop_us_per_tick": figure(
             "a tick with a client library's idle loop", "µs", ticks["loop"], "an empty tick", ticks["empty"]
@@ -92,11 +79,7 @@ def programs(tell: Callable[[str], None]) -> dict[str, Figure]:
         "compile_ms": figure(
             f"compiling {LINES} lines", "ms", compiling["ours"], "Python's compiler", compiling["python"]
         ),
-        "compile_holds_up_ms": figure(
-            "how long compiling keeps a thread waiting", "ms", waiting["ours"],
-            "a thread that counts", waiting["python"],
-        ),
-    }  # fmt: skip
+    }
 
 
 def _ticks(text: str | None) -> Callable[[], float]:
@@ -122,9 +105,9 @@ def _ticks(text: str | None) -> Callable[[], float]:
 
 
 def _our_compiler() -> Callable[[], object]:
-    compiler = ScriptCompiler(free_setup().description)
+    description = free_setup().description
     command = ProgramRun(token="bench", text=long_program())  # noqa: S106  no secret
-    return lambda: compiler.compile(command)
+    return lambda: ScriptCompiler(description).compile(command)  # a compiler keeps what it has compiled
 
 
 def _python_compiler() -> Callable[[], object]:
@@ -140,34 +123,3 @@ def _took(work: Callable[[], object]) -> float:
     began = time.perf_counter()
     work()
     return 1e3 * (time.perf_counter() - began)
-
-
-def _busy() -> None:
-    for _ in range(BUSY):
-        pass
-
-
-@contextmanager
-def _often_switching() -> Iterator[None]:
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(SWITCHES)
-    gc.collect()
-    gc.freeze()  # as the server does when it starts
-    try:
-        yield
-    finally:
-        sys.setswitchinterval(before)
-        gc.unfreeze()
-
-
-def _longest_wait(work: Callable[[], object]) -> float:
-    """Longest delay of a thread that often wakes up while another one works [ms]."""
-    thread = threading.Thread(target=work)
-    longest = 0.0
-    thread.start()
-    while thread.is_alive():
-        asleep = time.perf_counter()
-        time.sleep(LISTENS)
-        longest = max(longest, time.perf_counter() - asleep - LISTENS)
-    thread.join()
-    return 1e3 * longest

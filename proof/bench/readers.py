@@ -18,7 +18,7 @@ async def readers(module: str, *arguments: str) -> AsyncIterator[list[dict[str, 
     Yields:
         A list, which at the end contains the numbers received and lost of each client.
     """
-    command = [sys.executable, "-m", f"tvist_lab.benchmark.{module}", *arguments]
+    command = [sys.executable, "-m", f"proof.bench.{module}", *arguments]
     pipe = asyncio.subprocess.PIPE
     process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe)
     said: list[dict[str, int]] = []

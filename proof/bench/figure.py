@@ -1,19 +1,17 @@
 """A figure beside its reference from the same run, compared by medians over repetitions in alternating order."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Literal
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 from scipy import stats
 
+from tvist_lab.bench.moving import Run
+
 CONFIDENCE = 0.95
 
 Floats = NDArray[np.float64]
-Relation = Literal["ratio", "difference"]
-Run = Callable[[], float]
-"""Measures something once, and returns the result."""
 
 
 class Figure(Struct, frozen=True, kw_only=True):
@@ -29,10 +27,8 @@ class Figure(Struct, frozen=True, kw_only=True):
     """What it is compared with."""
     reference_value: float
     """Median of the reference over the same repetitions."""
-    relation: Relation = "ratio"
-    """Whether the two are divided or subtracted."""
     compared: float | None
-    """Median of value / reference, or of value - reference; None if a reference of a ratio is 0."""
+    """Median of value / reference; None if a reference is 0."""
     low: float | None = None
     """Lower end of the interval of `compared`; None after one repetition."""
     high: float | None = None
@@ -42,12 +38,7 @@ class Figure(Struct, frozen=True, kw_only=True):
 
 
 def figure(
-    what: str,
-    unit: str,
-    values: Sequence[float],
-    reference: str,
-    references: Sequence[float],
-    relation: Relation = "ratio",
+    what: str, unit: str, values: Sequence[float], reference: str, references: Sequence[float]
 ) -> Figure:
     """Compare what several repetitions gave.
 
@@ -57,26 +48,18 @@ def figure(
         values: The figure in each repetition.
         reference: What it is compared with.
         references: The reference in the same repetitions.
-        relation: Whether to divide or to subtract.
     """
     ours, theirs = np.array(values, dtype=float), np.array(references, dtype=float)
-    compared: tuple[float | None, float | None, float | None]
-    if relation == "difference":
-        compared = median_interval(ours - theirs)
-    elif np.all(theirs > 0.0):
-        compared = median_interval(ours / theirs)
-    else:
-        compared = None, None, None
+    compared, low, high = median_interval(ours / theirs) if np.all(theirs > 0.0) else (None, None, None)
     return Figure(
         what=what,
         value=float(np.median(ours)),
         unit=unit,
         reference=reference,
         reference_value=float(np.median(theirs)),
-        relation=relation,
-        compared=compared[0],
-        low=compared[1],
-        high=compared[2],
+        compared=compared,
+        low=low,
+        high=high,
         repetitions=len(ours),
     )
 

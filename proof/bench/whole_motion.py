@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from proof.bench.figure import Figure, figure, in_alternation
 from tvist_controller.api import DrivenLine, body, respond
-from tvist_lab.benchmark.figure import Figure, figure, in_alternation
 from tvist_lab.evaluation.line import Unchanged, point_to_point
 from tvist_lab.in_process import free_setup
 from tvist_lab.paper.published import pose

@@ -1,6 +1,6 @@
 """A server that does nothing but send: the least that RTDE's packages can cost.
 
-    python -m tvist_lab.benchmark.bare_send ADDRESS PORT
+    python -m proof.bench.bare_send ADDRESS PORT
 
 It answers the set-up of RTDE clients, and then sends each of them a package of the size of its recipe every 2 ms, by
 one call of `send()`. All packages are made before. It ends with its stdin.

@@ -6,7 +6,8 @@ import sys
 import time
 from collections.abc import Callable
 
-from tvist_lab.benchmark.figure import Figure, Run, figure, in_alternation
+from proof.bench.figure import Figure, figure, in_alternation
+from tvist_lab.bench.moving import Run
 from tvist_lab.served import served
 
 REPETITIONS = 7
@@ -56,7 +57,7 @@ def _serve() -> float:
 def _interpreter(*arguments: str) -> Run:
     def run() -> float:
         began = time.perf_counter()
-        subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)  # noqa: S603  our own
+        subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)
         return time.perf_counter() - began
 
     return run

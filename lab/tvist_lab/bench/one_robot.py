@@ -4,7 +4,7 @@ import asyncio
 import random
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,8 @@ import numpy as np
 
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
-from tvist_lab.benchmark.lateness import missed_share, over_all
-from tvist_lab.benchmark.process import cpu_seconds, rss_mb
+from tvist_lab.bench.lateness import missed_share, over_all
+from tvist_lab.bench.process import cpu_seconds, rss_mb
 from tvist_lab.served import Served, served
 from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import State, Telemetry
@@ -24,15 +24,18 @@ COMMANDS = 200
 """Number of commands whose response time is measured."""
 
 
-async def one_robot(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
+async def one_robot(
+    seconds: float, tell: Callable[[str], None], options: Sequence[str] = ()
+) -> dict[str, Any]:
     """Measure a robot served by another process, with a recorder and a client that reads every state.
 
     Args:
         seconds: How long to measure its ticks, and how long to stream set-points [s].
         tell: Called with a description of each measurement before it starts.
+        options: Further options of `tvist serve`.
     """
     with tempfile.TemporaryDirectory() as folder:
-        async with served(["--record", str(Path(folder) / "bench.mcap")]) as server:
+        async with served(["--record", str(Path(folder) / "bench.mcap"), *options]) as server:
             await server.robot.state()
             start_s = server.took
             tell(f"a served robot for {seconds:g} s")

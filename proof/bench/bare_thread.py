@@ -1,6 +1,6 @@
 """A thread that does nothing but sleep to the deadlines of a robot's ticks.
 
-    python -m tvist_lab.benchmark.bare_thread SECONDS
+    python -m proof.bench.bare_thread SECONDS
 
 Each line on stdin starts a segment of this many seconds; a line on stdout then gives the ticks that were due
 and how many were missed. It ends when stdin does.

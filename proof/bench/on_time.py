@@ -9,10 +9,10 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, nullcontext
 
 import numpy as np
+from scipy import stats
 
-from tvist_lab.benchmark.in_turn import mean_and_interval
-from tvist_lab.benchmark.lateness import missed_share
-from tvist_lab.benchmark.readers import readers
+from proof.bench.readers import readers
+from tvist_lab.bench.lateness import missed_share
 from tvist_lab.served import Served, served
 from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import Telemetry
@@ -73,7 +73,9 @@ async def _in_turn(
                 os.kill(server.pid, signal.SIGCONT)
             await server.robot.advance(SETTLE_TICKS)  # its next halt begins a lease of its own
     missed, of_thread = np.array(robots), np.array(threads)
-    difference, half = mean_and_interval(missed - of_thread)
+    differences = missed - of_thread
+    difference = float(differences.mean())
+    half = float(stats.t.ppf(0.975, pairs - 1) * differences.std(ddof=1) / np.sqrt(pairs))
     return {
         "pairs": pairs,
         "bare_percent": float(of_thread.mean()),
@@ -98,7 +100,7 @@ async def _robot_missed(server: Served) -> float:
 @asynccontextmanager
 async def _bare_thread() -> AsyncIterator[Callable[[], "asyncio.Future[float]"]]:
     pipe = asyncio.subprocess.PIPE
-    command = [sys.executable, "-m", "tvist_lab.benchmark.bare_thread", str(SEGMENT)]
+    command = [sys.executable, "-m", "proof.bench.bare_thread", str(SEGMENT)]
     process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe)
     assert process.stdin is not None
     assert process.stdout is not None

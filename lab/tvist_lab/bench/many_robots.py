@@ -4,14 +4,13 @@ import asyncio
 import os
 import sys
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import zenoh
 from zenoh.handlers import Callback
 
 from tvist_client.transports.session import close_session, open_session
-from tvist_lab.benchmark.lateness import missed_share
-from tvist_lab.benchmark.process import cpu_seconds
+from tvist_lab.bench.lateness import missed_share
 from tvist_lab.served import ServedError, served
 from tvist_protocol import keys
 from tvist_protocol.codec import decode_telemetry
@@ -25,13 +24,11 @@ TRIES = 2
 """Number of tries, of which the better counts, since other load on the machine only ever adds lateness."""
 MISSED = 0.001
 """Share of its ticks that each robot may miss [-]."""
-SEVERAL, SLOWER = 8, 0.25
-"""Number of robots whose processor time is measured, and their speed relative to real time."""
 SETTLE = 2
 """Number of telemetry messages ignored at first, so that the start is not measured."""
 
 
-async def robots_at_500_hz(seconds: float, tell: Callable[[str], None]) -> int:
+async def robots_at_500_hz(seconds: float, tell: Callable[[str], None], options: Sequence[str] = ()) -> int:
     """Return the largest number of robots in one process on one core such that none misses more than `MISSED`.
 
     A client, on another core if there is one, reads every state of every robot.
@@ -39,13 +36,14 @@ async def robots_at_500_hz(seconds: float, tell: Callable[[str], None]) -> int:
     Args:
         seconds: How long each number is measured [s].
         tell: Called with a description of each measurement before it starts.
+        options: Further options of `tvist serve`.
     """
     most, failed = 0, 0
     for number in NUMBERS:
         shares: list[float] = []
         while not shares or (len(shares) < TRIES and min(shares) > MISSED):
             tell(f"{number} robots on one core for {seconds:g} s")
-            shares.append(await worst_share(number, seconds))
+            shares.append(await _worst_share(number, seconds, options))
         if min(shares) <= MISSED:
             most, failed = number, 0
         elif (failed := failed + 1) == FAILURES:
@@ -53,35 +51,7 @@ async def robots_at_500_hz(seconds: float, tell: Callable[[str], None]) -> int:
     return most
 
 
-async def us_per_robot_and_tick(seconds: float, tell: Callable[[str], None]) -> float:
-    """Return the processor time of a process with `SEVERAL` robots, for each of their ticks [µs].
-
-    A client reads every state of every robot. They run at a fraction of their speed, so that none is late.
-
-    Args:
-        seconds: How long it is measured [s].
-        tell: Called with a description of each measurement before it starts.
-    """
-    tell(f"{SEVERAL} robots at speed {SLOWER:g} for {seconds:g} s")
-    ticks = 0
-
-    def count(_: zenoh.Sample) -> None:
-        nonlocal ticks
-        ticks += 1
-
-    options = ["--robots", f"ur5e*{SEVERAL}", "--speed", str(SLOWER)]
-    async with served(options, "ur5e-1", several=True) as server:
-        session = await asyncio.to_thread(open_session, server.endpoint)
-        session.declare_subscriber(f"{keys.PREFIX}/*/state", Callback(count, indirect=False))
-        await asyncio.sleep(SETTLE)
-        used, before = cpu_seconds(server.pid), ticks
-        await asyncio.sleep(seconds)
-        used, ticked = cpu_seconds(server.pid) - used, ticks - before
-        await asyncio.to_thread(close_session, session)
-    return 1e6 * used / max(1, ticked)
-
-
-async def worst_share(number: int, seconds: float) -> float:
+async def _worst_share(number: int, seconds: float, options: Sequence[str]) -> float:
     """Return the largest share of missed ticks of any robot in a process bound to one core."""
     core = None
     if sys.platform == "linux":  # elsewhere nothing binds a process to a core
@@ -97,7 +67,7 @@ async def worst_share(number: int, seconds: float) -> float:
             loop.call_soon_threadsafe(enough.set)
 
     try:
-        options = ["--robots", f"ur5e*{number}"]
+        options = ("--robots", f"ur5e*{number}", *options)
         async with served(options, name, several=True, core=core, patience=60.0) as server:
             session = await asyncio.to_thread(open_session, server.endpoint)
             session.declare_subscriber(f"{keys.PREFIX}/*/state", Callback(_ignore, indirect=False))
