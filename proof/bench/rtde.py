@@ -42,8 +42,9 @@ async def rtde(seconds: float, tell: Callable[[str], None]) -> dict[str, Figure]
                 f"round {number + 1} of {ROUNDS}: a robot and a bare sender, without and with {CLIENTS} clients"
             )
             _, alone = await punctuality(server, part)
-            async with readers("rtde_clients", ADDRESS, port, several):
+            async with readers("rtde_clients", ADDRESS, port, several) as said:
                 _, share = await punctuality(server, part)
+            assert all(one["received"] for one in said), "a client has received nothing"
             ours.append(share - alone)
             alone = await _share(sender, part)
             async with readers("rtde_clients", ADDRESS, bare_port, several):

@@ -2,16 +2,17 @@
 
     python -m proof.bench.rtde_clients ADDRESS PORT COUNT
 
-A line on stdout says that all of them read. They read until stdin ends; then another line gives the numbers of
-packages that each received and missed.
+A line on stdout says that all of them read. They read until stdin ends; then another line gives the number of
+packages that each received.
 """
 
 import json
-import os
 import selectors
 import socket
 import struct
 import sys
+
+from tvist_server.gateways.ur.rtde.codec import PackageKind, PackageReader, package
 
 JOINT_VALUES = (
     "target_q", "target_qd", "target_qdd", "target_current", "target_moment", "actual_q", "actual_qd", "actual_current",
@@ -25,8 +26,6 @@ SINGLE_VALUES = (
 )  # fmt: skip
 RECIPE = 22
 """Number of variables of each client, about as many as real clients request."""
-PERIOD = 0.002
-"""Control period [s]."""
 
 
 def recipe(number: int) -> list[str]:
@@ -46,56 +45,28 @@ class Client:
 
     def __init__(self, address: str, port: int, names: list[str]) -> None:
         self.received = 0
-        self.lost = 0
-        """Number of ticks missing between two that arrived."""
-        self._last: int | None = None
-        self._data = b""
         self.socket = socket.create_connection((address, port), 10.0)
-        self._ask("V", struct.pack(">H", 2))
-        types = self._ask("O", struct.pack(">d", 500.0) + ",".join(names).encode())
-        if b"NOT_FOUND" in types:
-            raise SystemExit(f"a variable is not known: {types!r}")
-        self._ask("S", b"")
+        self._reader = PackageReader()
+        self._ask(PackageKind.REQUEST_PROTOCOL_VERSION, struct.pack(">H", 2))
+        types = self._ask(PackageKind.SETUP_OUTPUTS, struct.pack(">d", 500.0) + ",".join(names).encode())
+        assert b"NOT_FOUND" not in types, f"a variable is not known: {types!r}"
+        self._ask(PackageKind.START, b"")
 
-    def read(self) -> bool:
-        """Take the received data; return whether the connection is still open."""
-        data = self.socket.recv(65536)
-        self._data += data
-        while len(self._data) >= 3 and len(self._data) >= (size := int.from_bytes(self._data[:2], "big")):
-            package, self._data = self._data[:size], self._data[size:]
-            if package[2] == ord("U"):
-                self.sample(package[4:])
-        return bool(data)
+    def read(self) -> None:
+        """Take what has arrived."""
+        self.received += len(self._packages())
 
-    def sample(self, values: bytes) -> None:
-        """Count a sample.
-
-        Args:
-            values: The values of its recipe, `timestamp` first.
-        """
-        (stamp,) = struct.unpack_from(">d", values)
-        tick = round(stamp / PERIOD)
-        if self._last is not None:
-            self.lost += tick - self._last - 1
-        self._last = tick
-        self.received += 1
-
-    def _ask(self, kind: str, payload: bytes) -> bytes:
-        self.socket.sendall(struct.pack(">HB", 3 + len(payload), ord(kind)) + payload)
+    def _ask(self, kind: PackageKind, payload: bytes) -> bytes:
+        self.socket.sendall(package(kind, payload))
         while True:
-            size, answer = struct.unpack(">HB", self._exactly(3))
-            said = self._exactly(size - 3)
-            if answer == ord(kind):
-                return said
+            for answer, said in self._packages():
+                if answer == kind:
+                    return said
 
-    def _exactly(self, count: int) -> bytes:
-        data = b""
-        while len(data) < count:
-            more = self.socket.recv(count - len(data))
-            if not more:
-                raise SystemExit("the robot closed the connection")
-            data += more
-        return data
+    def _packages(self) -> list[tuple[int, bytes]]:
+        data = self.socket.recv(65536)
+        assert data, "the robot closed the connection"
+        return list(self._reader.feed(data))
 
 
 def main(address: str, port: int, count: int) -> None:
@@ -110,12 +81,9 @@ def main(address: str, port: int, count: int) -> None:
     while True:
         for key, _ in selector.select():
             if key.data is None:
-                os.read(sys.stdin.fileno(), 1)
-                said = [{"received": client.received, "lost": client.lost} for client in clients]
-                sys.stdout.write(json.dumps(said) + "\n")
+                sys.stdout.write(json.dumps([{"received": client.received} for client in clients]) + "\n")
                 return
-            if not key.data.read():
-                raise SystemExit("the robot closed the connection")
+            key.data.read()
 
 
 if __name__ == "__main__":

@@ -106,7 +106,7 @@ def _row(one: Bounded) -> dict[str, Any]:
         "shapers": {
             name: {
                 "delay_ms": judged.delay(judged.shaped),
-                "near": _near(one, name),
+                "near": near(one, name),
                 "reduction_percent": judged.reduction(judged.shaped) if judged.counts else None,
             }
             for name, judged in one.judged.items()
@@ -114,7 +114,7 @@ def _row(one: Bounded) -> dict[str, Any]:
     }
 
 
-def _near(one: Bounded, name: str) -> bool:
+def near(one: Bounded, name: str) -> bool:
     """Return whether a shaper takes little more than the bound."""
     judged = one.judged[name]
     return judged.delay(judged.shaped) <= SHARE * one.bound + MORE
@@ -128,7 +128,7 @@ def _summary(found: Sequence[Bounded], name: str) -> dict[str, Any]:
     return {
         "delay_ms": _spread(delays.tolist()),
         "less_bound_ms": _spread((delays - bounds).tolist()),
-        "near_percent": 100.0 * float(np.mean([_near(one, name) for one in found])),
+        "near_percent": 100.0 * float(np.mean([near(one, name) for one in found])),
         "reduction_percent": _spread(reductions),
         "peak_acceleration_ratio": max(one.shaped.acceleration for one in judged),
         "peak_velocity_ratio": max(one.shaped.velocity for one in judged),

@@ -60,6 +60,7 @@ def test_the_bench_gives_each_figure_with_its_reference(capsys):
 
 
 @pytest.mark.nightly
+@pytest.mark.realtime
 def test_a_short_soak_loses_nothing_and_says_what_it_saw(capsys):
     assert main(["soak", "0.1", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
