@@ -49,8 +49,6 @@ GROUPS = {
         "evaluate": "Compare the vibration of any moves unshaped and shaped.",
         "shaperbench": "Rank shapers, your own included, on ten simulated arms.",
         "study": f"Run a study, one's own from a file or one of {', '.join(STUDY)}.",
-        "bound": "Compute the least time that moves need to end without vibration, and what shapers take.",
-        "search": "Search for cases in which a robot breaks its promises.",
     },
     "Make and manage": {
         "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",

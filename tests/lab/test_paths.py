@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from proof.search.subject import Subject
 from scipy.spatial.transform import Rotation
 
 from tvist_controller import calibrations
 from tvist_controller.setup import paper_payload
-from tvist_lab.safety.subject import Subject
 from tvist_lab.studies.path_examples import circle, corner
 from tvist_lab.studies.path_report import COLUMNS, page, report, rows
 from tvist_lab.studies.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, planned, shaped

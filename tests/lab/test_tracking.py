@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from proof.search.subject import RigidArm
 
-from tvist_lab.safety.subject import RigidArm
 from tvist_lab.tracking.following import BEFORE, LOOKAHEAD, TrackingError, follow
 from tvist_lab.tracking.report import columns, page, report, rows
 from tvist_lab.tracking.study import UNSHAPED, Tracked, TrackingJob, compare, refusal, speed_at, track

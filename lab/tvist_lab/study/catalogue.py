@@ -17,9 +17,9 @@ from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
 from tvist_shaping.named import BUILT_IN
 
-Menu = Literal["bench", "baselines", "paths", "bound", "load", "lesson"]
+Menu = Literal["bench", "baselines", "paths", "bound", "lesson"]
 """Where a method is made unless others are named: ShaperBench and robustness; `evaluate`, beside the shaper; `paths`;
-the bound; the load test of `bench`; and where the notebooks offer it.
+the bound; and where the notebooks offer it.
 """
 Kind = Literal[
     "filter", "for target", "for payload", "for workspace", "held", "longer", "as long as", "jerk of a period"
@@ -47,7 +47,7 @@ class Row:
     """Number of modes; more than one needs a modal calibration."""
 
 
-SHOWN: tuple[Menu, ...] = ("bench", "paths", "load", "lesson")
+SHOWN: tuple[Menu, ...] = ("bench", "paths", "lesson")
 """Menus of a shaper without a row."""
 ROWS = (
     Row("equal_duration_double_s", "longer double S", ("baselines",), "longer"),
@@ -65,14 +65,14 @@ ROWS = (
     Row("fixed_mzv", "fixed MZV", ("baselines", "bench"), "for workspace", "mzv"),
     Row("fixed_ei2", "fixed EI2", ("baselines", "bench"), "for workspace", "ei2"),
     Row("fixed_ei3", "fixed EI3", ("baselines", "bench"), "for workspace", "ei3"),
-    Row("zv", "TVIST-ZV, lowest mode", ("bench", "paths", "bound", "load", "lesson")),
+    Row("zv", "TVIST-ZV, lowest mode", ("bench", "paths", "bound", "lesson")),
     Row("zv_3_modes", "TVIST-ZV, three modes", ("bench",), of="zv", modes=3),
     Row("mzv", "TVIST-MZV, lowest mode", ("paths", "lesson")),
-    Row("zvd", "TVIST-ZVD, lowest mode", ("bench", "paths", "load", "lesson")),
-    Row("ei", "TVIST-EI, lowest mode", ("bench", "paths", "load", "lesson")),
+    Row("zvd", "TVIST-ZVD, lowest mode", ("bench", "paths", "lesson")),
+    Row("ei", "TVIST-EI, lowest mode", ("bench", "paths", "lesson")),
     Row("ei2", "TVIST-EI2, lowest mode", ("lesson",)),
     Row("ei3", "TVIST-EI3, lowest mode", ("lesson",)),
-    Row("auto", "constant mean delay, auto", ("bench", "paths", "bound", "load")),
+    Row("auto", "constant mean delay, auto", ("bench", "paths", "bound")),
     Row("auto-target", "constant mean delay, given the end of each move", ("bench", "paths", "bound")),
     Row("short", "constant mean delay, short", ("bench", "paths")),
     Row("planned", "planned to leave no vibration", ("bound",)),
@@ -80,7 +80,7 @@ ROWS = (
     Row("elastic-position", "smoothing, elastic feed-forward without torques", ("bench",)),
     Row("elastic-auto", "auto, smoothing, elastic feed-forward", ("bench",)),
     Row("product", "constant mean delay, product of three ZV", ("bench",), "held", modes=3),
-    Row(UNSHAPED, "waiting, unshaped", ("load",)),
+    Row(UNSHAPED, "waiting, unshaped"),
     # These are variants of the shapers above, which no menu needs beside them.
     *(Row(name, f"TVIST-{name.upper()}, lowest mode")
       for name in ("um_zv", "um_zvd", "ei_exact", "si", "zvdd", "ei2_exact", "zvddd", "ei3_exact")),
