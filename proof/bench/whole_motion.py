@@ -8,7 +8,7 @@ import numpy as np
 from proof.bench.figure import Figure, figure, in_alternation
 from tvist_controller.api import DrivenLine, body, respond
 from tvist_lab.in_process import free_setup
-from tvist_lab.paper.published import pose
+from tvist_lab.studies.paper.published import pose
 from tvist_lab.study.line import Unchanged, point_to_point
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_shaping import TvistFilter, shaper

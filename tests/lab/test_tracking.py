@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from proof.search.subject import RigidArm
 
-from tvist_lab.tracking.following import BEFORE, LOOKAHEAD, TrackingError, follow
-from tvist_lab.tracking.report import columns, page, report, rows
-from tvist_lab.tracking.study import UNSHAPED, Tracked, TrackingJob, compare, refusal, speed_at, track
-from tvist_lab.tracking.ways import CONSTANT, RAMP, WAYS, jump, level_end, ramp, turn
+from tvist_lab.studies.tracking.following import BEFORE, LOOKAHEAD, TrackingError, follow
+from tvist_lab.studies.tracking.report import columns, page, report, rows
+from tvist_lab.studies.tracking.study import UNSHAPED, Tracked, TrackingJob, compare, refusal, speed_at, track
+from tvist_lab.studies.tracking.ways import CONSTANT, RAMP, WAYS, jump, level_end, ramp, turn
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 

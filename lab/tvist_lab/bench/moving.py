@@ -19,7 +19,7 @@ from tvist_controller.api import (
     quickest_motion,
 )
 from tvist_lab.in_process import free_setup
-from tvist_lab.paper.published import pose
+from tvist_lab.studies.paper.published import pose
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD

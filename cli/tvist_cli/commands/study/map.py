@@ -43,7 +43,7 @@ def map(  # noqa: A001  the command's name
         look: How to write the figures.
         json: Print one JSON object.
     """
-    from tvist_lab.workspace_map import QUANTITIES, MapError, workspace_map
+    from tvist_lab.studies.workspace_map import QUANTITIES, MapError, workspace_map
     from tvist_plant.description import DescriptionError, load
     from tvist_shaping import ShapingError
 

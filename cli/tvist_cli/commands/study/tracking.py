@@ -9,7 +9,7 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.output import print_json, progress, say, table
 
 if TYPE_CHECKING:
-    from tvist_lab.tracking.study import Tracked, TrackingJob
+    from tvist_lab.studies.tracking.study import Tracked, TrackingJob
 
 FASTEST = 3.1
 """Highest speed [rad/s], a little below the UR5e's."""
@@ -42,10 +42,10 @@ def tracking(
         markdown: File to write a page with the tables to.
         json: Print one JSON object.
     """
-    from tvist_lab.tracking.following import GAIN, LOOKAHEAD
-    from tvist_lab.tracking.report import TITLES, columns, page, report, rows
-    from tvist_lab.tracking.study import SPEEDS, UNSHAPED, TrackingJob
-    from tvist_lab.tracking.ways import WAYS
+    from tvist_lab.studies.tracking.following import GAIN, LOOKAHEAD
+    from tvist_lab.studies.tracking.report import TITLES, columns, page, report, rows
+    from tvist_lab.studies.tracking.study import SPEEDS, UNSHAPED, TrackingJob
+    from tvist_lab.studies.tracking.ways import WAYS
     from tvist_plant.plant import PERIOD
 
     at = tuple(sorted(set(speeds or SPEEDS)))
@@ -98,7 +98,7 @@ def _usable(shapers: list[str] | None, payload: float) -> tuple[list[str], dict[
         Failure: A shaper that was named cannot be used.
     """
     from tvist_cli.misuse import lower
-    from tvist_lab.tracking.study import SHAPERS, UNSHAPED, refusal
+    from tvist_lab.studies.tracking.study import SHAPERS, UNSHAPED, refusal
 
     wanted = dict.fromkeys(str(lower(name)) for name in shapers or SHAPERS)
     wanted.pop(UNSHAPED, None)  # it is measured in any case
@@ -110,8 +110,8 @@ def _usable(shapers: list[str] | None, payload: float) -> tuple[list[str], dict[
 
 
 def _tracked(jobs: "list[TrackingJob]") -> "list[Tracked]":
-    from tvist_lab.tracking.following import TrackingError
-    from tvist_lab.tracking.study import compare
+    from tvist_lab.studies.tracking.following import TrackingError
+    from tvist_lab.studies.tracking.study import compare
 
     tracked: list[Tracked] = []
     with progress(len(jobs), "motions") as bar, told(TrackingError):

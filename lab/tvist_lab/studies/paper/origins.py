@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tvist_lab.paper.published import published
+from tvist_lab.studies.paper.published import published
 
 FITTED = "fitted"
 TUNED = "tuned"

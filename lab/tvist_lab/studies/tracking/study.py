@@ -9,8 +9,8 @@ from tvist_controller.api import Controller, Setup
 from tvist_lab.in_process import free_setup
 from tvist_lab.recordings import Floats
 from tvist_lab.runners import Processes, in_order
-from tvist_lab.tracking.following import follow
-from tvist_lab.tracking.ways import WAYS, WayName, level_end
+from tvist_lab.studies.tracking.following import follow
+from tvist_lab.studies.tracking.ways import WAYS, WayName, level_end
 from tvist_shaping.named import BUILT_IN
 
 UNSHAPED = "none"

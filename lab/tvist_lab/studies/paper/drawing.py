@@ -18,8 +18,8 @@ from tvist_lab.figures import (
 )
 from tvist_lab.metrics import motions
 from tvist_lab.one_joint.lesson import lesson
-from tvist_lab.paper.experiment import Experiment
-from tvist_lab.paper.published import MOTIONS
+from tvist_lab.studies.paper.experiment import Experiment
+from tvist_lab.studies.paper.published import MOTIONS
 
 NUMBERS = {"Q1-Q2": 12, "Q1-Q3": 13, "Q3-Q1": 14}
 DEFINED_ON = "Q1-Q2"

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tvist_lab.markdown_table import markdown_table
-from tvist_lab.tracking.study import UNSHAPED, Tracked, speed_at
-from tvist_lab.tracking.ways import APPROACH, CONSTANT, DISTANCE, RAMP, WayName
+from tvist_lab.studies.tracking.study import UNSHAPED, Tracked, speed_at
+from tvist_lab.studies.tracking.ways import APPROACH, CONSTANT, DISTANCE, RAMP, WayName
 
 TITLES: Mapping[WayName, str] = {
     "ramp": f"first joint alone, speeding up and slowing down with {RAMP:g} rad/s²",

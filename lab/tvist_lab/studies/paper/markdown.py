@@ -3,8 +3,8 @@
 from typing import Any
 
 from tvist_lab.markdown_table import markdown_table
-from tvist_lab.paper.origins import MEANINGS, origins
-from tvist_lab.paper.published import published
+from tvist_lab.studies.paper.origins import MEANINGS, origins
+from tvist_lab.studies.paper.published import published
 
 COLUMNS = {
     "delay_ms": ("delay ms", "{:.1f}"),

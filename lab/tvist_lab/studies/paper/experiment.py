@@ -17,7 +17,9 @@ from tvist_lab.metrics import (
     peak_after_stop,
     still_after,
 )
-from tvist_lab.paper.methods import (
+from tvist_lab.recordings import Recording
+from tvist_lab.robust import robust_over
+from tvist_lab.studies.paper.methods import (
     EqualDuration,
     FixedShaper,
     FrozenAtEnd,
@@ -25,9 +27,7 @@ from tvist_lab.paper.methods import (
     TimeVarying,
     Unshaped,
 )
-from tvist_lab.paper.published import MOTIONS, pose
-from tvist_lab.recordings import Recording
-from tvist_lab.robust import robust_over
+from tvist_lab.studies.paper.published import MOTIONS, pose
 from tvist_protocol.info import Info
 
 BEFORE = 0.1

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from tvist_lab.metrics import table_2, table_notes
-from tvist_lab.paper.experiment import Experiment, JudgedRun
-from tvist_lab.paper.methods import ACCELERATION
-from tvist_lab.paper.published import MOTIONS
+from tvist_lab.studies.paper.experiment import Experiment, JudgedRun
+from tvist_lab.studies.paper.methods import ACCELERATION
+from tvist_lab.studies.paper.published import MOTIONS
 
 
 def as_dict(done: Experiment) -> dict[str, Any]:
