@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from tvist_cli.overview import ABOUT, overview
+from tvist_cli.study_names import STUDY
 from tvist_server.ending import end_like_interrupted, ending_signals
 
 if TYPE_CHECKING:
@@ -23,14 +24,6 @@ LOG = {
     "replay": "Run a recording's commands again and compare bit by bit, or publish it.",
 }
 """The commands of `tvist log`."""
-STUDY = {
-    "sweep": "Compare shapers over payloads, errors, moves and robots, on all cores or a cluster.",
-    "robustness": "Compare shapers on arms that are stiffer, softer or loaded otherwise than they are told.",
-    "paths": "Compare paths shaped along the path with the same paths shaped joint by joint.",
-    "tracking": "Measure how closely the arm follows positions sent to servoj, with every shaper.",
-    "map": "Map frequency, damping and a shaper's delay over the workspace, identified against true.",
-}
-"""The commands of `tvist study`."""
 GROUPS = {
     "Robots": {
         "serve": "Run a robot on the network.",

@@ -10,11 +10,11 @@ import numpy as np
 
 from tvist_lab.figures import FigureFiles
 from tvist_lab.metrics import NotMeasurableError
+from tvist_lab.paper_drawing import draw, overview
 from tvist_lab.recordings import Recording, RecordingError
 from tvist_lab.recordings.mcap_file import RecordingFile, read
 from tvist_lab.replay import replay_file
 from tvist_lab.served import served_robot
-from tvist_lab.studies.paper.drawing import draw, overview
 from tvist_lab.studies.paper.experiment import Experiment, judge, run, table_1
 from tvist_lab.studies.paper.methods import TimeVarying, Unshaped
 from tvist_lab.studies.paper.published import MOTIONS

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tvist_controller import calibrations
 from tvist_controller.setup import paper_payload
 from tvist_lab.studies.path_examples import circle, corner
-from tvist_lab.studies.path_report import COLUMNS, page, report, rows
+from tvist_lab.studies.path_report import COLUMNS, page_of, report, rows
 from tvist_lab.studies.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, planned, shaped
 from tvist_lab.studies.paths import PathJob, compare, draw
 from tvist_lab.studies.random_paths import KINDS, REGULAR
@@ -146,6 +146,6 @@ class TestComparison:
             "command": "tvist study paths --random 2 --seed 5", "plant": "clean", "payload_kg": [0.0, 5.0],
             "calibration": "ur5e_modal", "circle": circle(ur5e, modal), **report(judged),
         }  # fmt: skip
-        text = page(told)
+        text = page_of(told, told["command"])
         assert "tvist study paths --random 2 --seed 5" in text
         assert "| auto | joint by joint |" in text

@@ -7,7 +7,7 @@ import pytest
 from proof.search.subject import RigidArm
 
 from tvist_lab.studies.tracking.following import BEFORE, LOOKAHEAD, TrackingError, follow
-from tvist_lab.studies.tracking.report import columns, page, report, rows
+from tvist_lab.studies.tracking.report import columns, page_of, report, rows
 from tvist_lab.studies.tracking.study import UNSHAPED, Tracked, TrackingJob, compare, refusal, speed_at, track
 from tvist_lab.studies.tracking.ways import CONSTANT, RAMP, WAYS, jump, level_end, ramp, turn
 from tvist_plant.description import Payload
@@ -163,7 +163,7 @@ class TestReport:
         ]
         assert found["ramp"][1] == ["zv", "0.0", "34.0", "0.120", "**0.240**", "1.67 rad/s"]
         assert {len(row) for row in found["ramp"]} == {len(columns(result, "ramp"))}
-        text = page(result)
+        text = page_of(result)
         assert "tvist study tracking --shapers zv --speeds 1 2" in text
         assert "`um_zv`: zeta_max is too large" in text
 

@@ -62,14 +62,14 @@ def paper(
 
         done = asyncio.run(run())
     if figures is not None:
-        from tvist_lab.studies.paper.drawing import draw
+        from tvist_lab.paper_drawing import draw
 
         write(look.into(figures), draw(done, all_figures=True))
     result = as_dict(done)
     if markdown is not None:
-        from tvist_lab.studies.paper.markdown import page
+        from tvist_lab.studies.paper.markdown import page_of
 
-        markdown.write_text(page(result, typed()), encoding="utf-8")
+        markdown.write_text(page_of(result, typed()), encoding="utf-8")
     if json:
         print_json(result)
     else:

@@ -7,6 +7,7 @@ import numpy as np
 
 from tvist_lab.markdown_table import markdown_table
 from tvist_lab.studies.evaluate import interval
+from tvist_lab.studies.pages import page
 from tvist_lab.studies.path_shaping import JOINTS, WAYS
 from tvist_lab.studies.paths import Followed, JudgedPath
 from tvist_lab.study.measures import WORTH
@@ -141,32 +142,12 @@ def _cells(found: dict[str, Any]) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def page(result: dict[str, Any]) -> str:
+def page_of(result: dict[str, Any], command: str) -> str:
     """Return the tables with explanations, as the body of a page."""
-    low, high = result["payload_kg"]
-    terms = "\n".join(f"- *{word}*: {meaning}." for word, meaning in TERMS.items())
-    tables = "\n\n".join(
-        f"**{title_of(kind, group)}**\n\n{markdown_table(COLUMNS, rows(group), left=2)}"
-        for kind, group in result["summary"].items()
-        if kind != "all"
-    )
-    return f"""```sh
-{result["command"]}
-```
-
-The arm is {result["plant"]}; payloads are {low:g} to {high:g} kg, and the calibration is `{
-        result["calibration"]
-    }`.
-The planner refused {result["refused"]} of the drawn paths, and {
-        result["stopping"]
-    } would have stopped on their way; they were replaced.
-
-{tables}
-
-{terms}
-
-{circle_in_words(result["circle"])}
-"""
+    kinds = [(kind, group) for kind, group in result["summary"].items() if kind != "all"]
+    tables = [(title_of(*one), markdown_table(COLUMNS, rows(one[1]), left=2)) for one in kinds]
+    in_words = circle_in_words(result["circle"])
+    return page("paths", result, command, tables=tables, terms=TERMS, circle_in_words=in_words)
 
 
 def title_of(kind: str, group: dict[str, Any]) -> str:

@@ -8,6 +8,7 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import print_json, say, table, typed
 from tvist_cli.report_file import write_report
+from tvist_cli.study_names import STUDY
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,8 +43,6 @@ def file(
         report: File to write a web page with table and figure to; for Python files.
         json: Print one JSON object.
     """
-    from tvist_cli.main import STUDY
-
     if not file.suffix and not file.exists():
         raise Failure(f"there is no study {file}: give a file, or one of {', '.join(STUDY)}", code=2)
     if file.suffix != ".py":

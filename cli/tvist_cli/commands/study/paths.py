@@ -60,7 +60,7 @@ def paths(
         json: Print one JSON object.
     """
     from tvist_lab.studies.path_examples import circle
-    from tvist_lab.studies.path_report import page, report
+    from tvist_lab.studies.path_report import page_of, report
     from tvist_lab.studies.paths import SHAPERS, PathJob
     from tvist_lab.studies.random_paths import KINDS
     from tvist_plant.description import load
@@ -87,7 +87,7 @@ def paths(
     }
     with told(OSError):
         if markdown is not None:
-            markdown.write_text(page({**result, "command": typed()}), encoding="utf-8")
+            markdown.write_text(page_of(result, typed()), encoding="utf-8")
         if figures is not None:
             _draw(result["paths"], plant, known, look.into(figures))
     if json:

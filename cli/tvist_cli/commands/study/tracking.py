@@ -43,7 +43,7 @@ def tracking(
         json: Print one JSON object.
     """
     from tvist_lab.studies.tracking.following import GAIN, LOOKAHEAD
-    from tvist_lab.studies.tracking.report import TITLES, columns, page, report, rows
+    from tvist_lab.studies.tracking.report import TITLES, columns, page_of, report, rows
     from tvist_lab.studies.tracking.study import SPEEDS, UNSHAPED, TrackingJob
     from tvist_lab.studies.tracking.ways import WAYS
     from tvist_plant.plant import PERIOD
@@ -70,7 +70,7 @@ def tracking(
     result["shapers"] = report(_tracked(jobs), tolerance)
     if markdown is not None:
         with told(OSError):
-            markdown.write_text(page(result), encoding="utf-8")
+            markdown.write_text(page_of(result), encoding="utf-8")
     if json:
         print_json(result)
         return

@@ -21,5 +21,5 @@ def page(name: str, result: dict[str, Any], command: str, **more: object) -> str
         loader=PackageLoader("tvist_lab.studies", "pages"), undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
-    environment.globals |= {"in_markdown": in_markdown, "markdown_table": markdown_table}
+    environment.globals |= {"g": "{:g}".format, "in_markdown": in_markdown, "markdown_table": markdown_table}
     return environment.get_template(f"{name}.md.j2").render({**result, **more, "command": command})

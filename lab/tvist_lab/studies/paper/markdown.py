@@ -3,6 +3,7 @@
 from typing import Any
 
 from tvist_lab.markdown_table import markdown_table
+from tvist_lab.studies.pages import page
 from tvist_lab.studies.paper.origins import MEANINGS, origins
 from tvist_lab.studies.paper.published import published
 
@@ -23,41 +24,17 @@ METHOD_COLUMNS = {
 }
 
 
-RV = """\
-RV is measured as in the paper, by an exponential through the peaks of the tool's acceleration after the stop. After
-shaping there are often fewer than two peaks. RV is then the largest value; sensor noise of 0.03 m/s² per axis alone
-raises this to about 0.1."""
-COMMON_CLOCK = """\
-Times are measured from the start of the unshaped reference. The peak is that of the true acceleration (without noise)
-from 10 ms after the reference's own stop. The arm is still when the true acceleration of the tool stays below 0.1 m/s².
-The method that is still first is in bold."""
-
-
-def page(result: dict[str, Any], command: str) -> str:
+def page_of(result: dict[str, Any], command: str) -> str:
     """Return Tables 1 and 2 beside the paper's, the baselines, and the origin of each figure."""
-    made = (
-        f"This page was made by `{command}`; do not edit it. Each motion was simulated {result['runs']} times, each "
-        f"time with other noise and gear errors, with seed {result['seed']} and calibration `{result['calibration']}`. "
-        "The paper is Thomsen et al., ICINCO 2019, doi 10.5220/0007834504880498."
+    return page(
+        "paper",
+        result,
+        command,
+        second=_table_2(result["table_2"]),
+        methods_of={motion: _methods(result, rows) for motion, rows in result["baselines"].items()},
+        meanings=MEANINGS,
+        origins=markdown_table(("figure", "paper", "here", "origin", "remark"), origins(result)),
     )
-    parts = [
-        "# The paper's experiment in this simulation",
-        made,
-        "## Table 2, ours and the paper's",
-        _table_2(result["table_2"]),
-        RV,
-        "## Every method on a common clock",
-        COMMON_CLOCK,
-        *(
-            part
-            for motion, rows in result["baselines"].items()
-            for part in (f"### {motion}", _methods(result, rows))
-        ),
-        "## Origin of each figure",
-        *(f"- **{word}**: {meaning}" for word, meaning in MEANINGS.items()),
-        markdown_table(("figure", "paper", "here", "origin", "remark"), origins(result)),
-    ]
-    return "\n\n".join(parts).replace("\n\n- **", "\n- **") + "\n"
 
 
 def _table_2(table: dict[str, Any]) -> str:
