@@ -5,6 +5,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tvist_cli.overview import ABOUT, overview
@@ -117,9 +118,8 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
         app.command(group)
         _add(group, f"tvist_cli.commands.{name}", commands, called[1:2] if called[:1] == [name] else ())
         if name == "study":
-            from tvist_cli.commands.study.file import file
-
-            group.default(file)
+            # The parser takes no path for what a group does without a command of its own.
+            group.default(import_module("tvist_cli.commands.study.file").file)
     return app
 
 
