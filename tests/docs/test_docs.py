@@ -142,7 +142,7 @@ def check_command(words):
     program, *arguments = words
     match program.removeprefix(".venv/bin/"):
         case "tvist" | "marimo" | "dask" as name:
-            verbs = list(itertools.takewhile(lambda word: not word.startswith(("-", "lab/")), arguments))
+            verbs = list(itertools.takewhile(lambda word: re.fullmatch(r"[a-z][\w-]*,?", word), arguments))
             words = None if name == "marimo" else 1 + (verbs[:1] in (["log"], ["study"]))
             verbs = [word.rstrip(",") for word in verbs][:words]
             unknown = {word for word in arguments if word.startswith("--")} - options(name, *verbs)
@@ -218,8 +218,6 @@ def tell(folder, words, endpoint):
     return told
 
 
-@pytest.mark.slow
-@pytest.mark.realtime
 class TestTutorial:
     def test_every_command_works_in_its_order(self, story):
         _, said = story
@@ -250,8 +248,6 @@ class TestSnippets:
         assert results.attempted > 0
         assert results.failed == 0
 
-    @pytest.mark.slow
-    @pytest.mark.realtime
     @pytest.mark.parametrize("text", blocks("python"))
     def test_scripts_run(self, text, request, tmp_path):
         folder = ROOT
