@@ -78,6 +78,8 @@ class Study:
                 raise StudyError(f"cases[{place}] has the axes {sorted(case.axes)}: all need the same")
             if len(case.arms) != len(self.cases[0].arms):
                 raise StudyError(f"cases[{place}] has {counted(len(case.arms), 'arm')}: all need as many")
+            if len({arm.name for arm in case.arms}) < len(case.arms):
+                raise StudyError(f"cases[{place}] has two arms of one name")
         for name in self.measured:
             if name not in MEASURES:
                 raise StudyError(f"{name!r} is no measure: there are {', '.join(MEASURES)}")
