@@ -33,7 +33,7 @@ notebooks: setup
 BESIDE := $(BIN)/pytest --numprocesses $(WORKERS) --dist loadgroup --no-loadscope-reorder
 
 test: setup
-	$(BESIDE) --hypothesis-profile quick -m "not (slow or nightly)"
+	$(BESIDE) --hypothesis-profile quick --quick
 
 test-all: setup
 	$(BESIDE) --hypothesis-profile $(PROFILE) -m "not nightly" --durations 20

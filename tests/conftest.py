@@ -1,15 +1,13 @@
-"""What all tests share: which of them `make test` runs, which run alone, and figures that they measure."""
+"""What all tests share: options, the order in which they run side by side, and figures that they measure."""
 
 import asyncio
+import os
 import signal
-from pathlib import Path
 
 import pytest
 import tests.examples  # noqa: F401  registers the profiles
 from hypothesis import settings
-from tests.durations import Durations, arrange
-
-SYSTEM = Path(__file__).parent / "system"
+from tests.durations import Durations, arrange, quick
 
 settings.load_profile("full")
 
@@ -18,6 +16,7 @@ def pytest_addoption(parser):
     parser.addoption(
         "--keep-durations", action="store_true", help="write how long tests took: durations.json"
     )
+    parser.addoption("--quick", action="store_true", help="run what is quick by durations.json")
 
 
 def pytest_configure(config):
@@ -25,12 +24,19 @@ def pytest_configure(config):
         config.pluginmanager.register(Durations())
 
 
+def pytest_xdist_auto_num_workers(config):
+    """As many processes as processors, and one whose tests mostly wait: the one that has the clock."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(config, items):
-    """Mark what needs no mark of its own, see README.md, and order what runs side by side."""
+    """Mark what needs no mark of its own, see README.md, choose what is quick, and order what runs side by side."""
+    if config.option.quick:
+        chosen = quick(items)
+        config.hook.pytest_deselected(items=list(set(items) - set(chosen)))
+        items[:] = chosen
     for item in items:
-        if SYSTEM in item.path.parents and not item.get_closest_marker("quick"):
-            item.add_marker(pytest.mark.slow)
         if "realtime" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.realtime)
     if not hasattr(config, "workerinput"):

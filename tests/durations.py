@@ -1,10 +1,12 @@
-"""How long tests took, kept in durations.json; by it, what is longest begins first when tests run side by side.
+"""How long tests took, kept in durations.json: it says what begins first, and what is quick.
 
-`pytest --keep-durations` writes the seconds of every test function that it ran, set-up and end included, its cases
+When tests run side by side, what is longest begins first. `pytest --quick` runs of each test function as many cases as
+fit into a short time, spread over all, and none of one whose single case takes long. `pytest --keep-durations` writes the seconds of every test function that it ran, set-up and end included, its cases
 taken together; what it did not run keeps its figure, and what is no longer there is dropped.
 """
 
 import json
+import math
 from collections import defaultdict
 from pathlib import Path
 
@@ -15,6 +17,8 @@ KEPT = Path(__file__).with_name("durations.json")
 LEAST = 0.1
 """Shorter test functions are kept as one sum a file [s]."""
 OTHERS = "the others"
+QUICK, LONGEST = 2.0, 2.0
+"""How long the cases of a quick test function may take together, and how long one [s]."""
 CLOCK = "clock"
 """The group of tests that need time to pass: one process has them all, so there is only one of them at a time."""
 
@@ -24,12 +28,36 @@ def kept():
     return json.loads(KEPT.read_text()) if KEPT.exists() else {}
 
 
+def quick(items):
+    """The cases that `pytest --quick` runs."""
+    seconds = kept()
+    functions = defaultdict(list)
+    for item in items:
+        if not item.get_closest_marker("nightly"):
+            functions[_function(item.nodeid)].append(item)
+    return [item for (file, test), cases in functions.items() for item in _few(cases, seconds, file, test)]
+
+
+def _few(cases, seconds, file, test):
+    each = seconds.get(file, {}).get(test, 0.0) / len(cases)
+    if each > LONGEST:
+        return []
+    apart = max(1, math.ceil(len(cases) * each / QUICK))
+    return cases[::apart]
+
+
+def _function(nodeid):
+    """A test's file, and its function without case and group."""
+    file, _, test = nodeid.partition("::")
+    return file, test.partition("[")[0].partition("@")[0]
+
+
 def arrange(items):
     """Let one process have each file's tests, one have all that need the clock, and the longest group begin first."""
     seconds = kept()
     took = defaultdict(float)
     for item in items:
-        file = item.nodeid.partition("::")[0]
+        file, _ = _function(item.nodeid)
         group = CLOCK if item.get_closest_marker("realtime") else file
         item.add_marker(pytest.mark.xdist_group(group))
         took[group] = max(took[group], sum(seconds.get(file, {OTHERS: 10.0}).values()))
@@ -44,8 +72,8 @@ class Durations:
         self.seconds = defaultdict(lambda: defaultdict(float))
 
     def pytest_runtest_logreport(self, report):
-        file, _, test = report.nodeid.partition("::")
-        self.seconds[file][test.partition("[")[0].partition("@")[0]] += report.duration
+        file, test = _function(report.nodeid)
+        self.seconds[file][test] += report.duration
 
     def pytest_sessionfinish(self):
         whole = {file: tests for file, tests in kept().items() if (ROOT / file).exists()} | {

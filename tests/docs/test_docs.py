@@ -217,8 +217,6 @@ def tell(folder, words, endpoint):
     return told
 
 
-@pytest.mark.slow
-@pytest.mark.realtime
 class TestTutorial:
     def test_every_command_works_in_its_order(self, story):
         _, said = story
@@ -249,8 +247,6 @@ class TestSnippets:
         assert results.attempted > 0
         assert results.failed == 0
 
-    @pytest.mark.slow
-    @pytest.mark.realtime
     @pytest.mark.parametrize("text", blocks("python"))
     def test_scripts_run(self, text, request, tmp_path):
         folder = ROOT

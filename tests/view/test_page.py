@@ -8,8 +8,6 @@ from tests.conformance.wire import TICK, Wire
 
 from .browser import Page, browser
 
-pytestmark = [pytest.mark.realtime, pytest.mark.slow]
-
 Q3 = 2
 STOPPED = 1
 MS = PATIENCE * 1000.0

@@ -17,9 +17,10 @@ from tvist_protocol.commands import SetEstimator
 from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
 from tvist_shaping.errors import EstimatorError
+from tvist_shaping.named import AnyShaper
 
-KEPT = 32
-"""Number of filters whose `surplus` is kept."""
+SURPLUSES = deque[tuple[ModeSource, AnyShaper | None, str, int, tuple[float, float]]](maxlen=32)
+"""`surplus` of the latest filters of all robots: modes' source, own shaper, name, number of modes, and what was found."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,6 @@ class FilterPlanner:
     def __init__(self, setup: Setup) -> None:
         self._setup, self._known = setup, setup.registry
         self._modal = modal_source(setup.description, setup.calibration)
-        self._surpluses = deque[tuple[ModeSource, str, int, tuple[float, float]]](maxlen=KEPT)
 
     def first(self) -> PlannedFilter:
         """Return the robot's initial filter. Code that its first use would compile is compiled now.
@@ -121,16 +121,16 @@ class FilterPlanner:
         return tvist
 
     def _surplus(self, tvist: Filter, source: ModeSource) -> tuple[float, float]:
-        """The filter's `surplus` with any payload. It takes long, so that it is kept for the latest filters."""
-        for known, name, modes, found in self._surpluses:
-            if known is source and (name, modes) == (tvist.name, tvist.estimator.modes):
+        """The filter's `surplus` with any payload. It takes long, so that it is kept for robots that are alike."""
+        name, modes, own = tvist.name, tvist.estimator.modes, self._known.own.get(tvist.name)
+        for known, same, named, with_modes, found in tuple(SURPLUSES):
+            if same is own and (named, with_modes) == (name, modes) and known == source:
                 return found
         masses = (0.0, self._setup.description.limits.payload) if source.knows_payload else (0.0,)
         payloads = [paper_payload(self._setup.description, mass) for mass in masses]
-        modes = tvist.estimator.modes
         estimators = [source.estimator(modes, payload) for payload in payloads]
         found = surplus_of(tvist, estimators, self._setup.description)
-        self._surpluses.append((source, tvist.name, modes, found))
+        SURPLUSES.append((source, own, name, modes, found))
         return found
 
     def _with_feed_forward(self, source: ModeSource, tvist: Filter, where: str) -> PlannedFilter:
