@@ -29,6 +29,7 @@ def option_values() -> dict[str, Values]:
         "robots": robot,
         "shaper": shaper,
         "shapers": shaper,
+        "sensitivity": shaper,
         "profile": Values(get_args(ProfileName)),
     }
 

@@ -4,7 +4,7 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from tvist_cli.overview import ABOUT, overview
@@ -13,46 +13,57 @@ from tvist_server.ending import end_like_interrupted, ending_signals
 if TYPE_CHECKING:
     import cyclopts
 
-COMMANDS = {
-    "serve": "Run a robot on the network.",
-    "robots": "List the arms: what is measured, what assumed, and how well auto stills each.",
-    "run": "Run a program in URScript on a robot of its own; exit code 0 if it ends by itself.",
-    "check-script": "Look for errors in programs in URScript without running them.",
-    "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",
-    "check": "Check that a robot answers and is ready to be moved; exit code 0 if so.",
-    "unlock": "Make a stopped robot ready to be moved again; exit code 0 if it is.",
-    "move": "Move a served robot to a pose.",
-    "watch": "Show live what a served robot is doing.",
-    "fleet": "Show the robots that a router reaches and how they are, or stop them all.",
-    "router": "Run a router, through which the robots and clients of a fleet reach each other.",
-    "view": "Show a robot on a web page, its vibration magnified.",
+LOG = {
     "record": "Record a served robot as MCAP.",
+    "info": "Print what a recording holds.",
     "analyze": "Measure the motions of a recording, or of another robot's log.",
     "compare": "Compare two recordings of the same motions, motion by motion.",
-    "info": "Print what a recording holds.",
     "report": "Write a web page about recordings: a verdict, tables and figures in one file.",
     "export": "Write a recording as CSV, Parquet, npz or mat.",
     "replay": "Run a recording's commands again and compare bit by bit, or publish it.",
-    "paper": "Run the paper's experiment and print its tables beside ours.",
-    "lesson": "Show on an arm with one flexible joint why a fixed shaper is not enough.",
-    "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",
-    "sensitivity": "Compute what shapers leave of the vibration when the frequency is wrong.",
-    "identify": "Calibrate a robot from its own accelerometer.",
-    "map": "Map frequency, damping and a shaper's delay over the workspace, identified against true.",
-    "evaluate": "Compare the vibration of any moves unshaped and shaped.",
-    "bound": "Compute the least time that moves need to end without vibration, and what shapers take.",
-    "paths": "Compare paths shaped along the path with the same paths shaped joint by joint.",
-    "tracking": "Measure how closely the arm follows positions sent to servoj, with every shaper.",
-    "robustness": "Compare shapers on arms that are stiffer, softer or loaded otherwise than they are told.",
-    "sweep": "Compare shapers over payloads, errors, moves and robots, on all cores or a cluster.",
-    "shaperbench": "Rank shapers, your own included, on ten simulated arms.",
-    "search": "Search for cases in which a robot breaks its promises.",
-    "bench": "Measure how fast tvist runs on this machine.",
-    "kernels": "Compile ahead what a robot computes at every tick, so that no start has to.",
-    "keys": "Create TLS certificates for a robot and its clients.",
-    "completion": "Print the script by which a shell completes commands, options and their values.",
 }
-"""The commands with their one-line help, in the order in which a new user meets them."""
+"""The commands of `tvist log`."""
+GROUPS = {
+    "Robots": {
+        "serve": "Run a robot on the network.",
+        "run": "Run a program in URScript on a robot of its own; exit code 0 if it ends by itself.",
+        "check": "Check that a robot answers and is ready to be moved; exit code 0 if so.",
+        "move": "Move a served robot to a pose.",
+        "watch": "Show live what a served robot is doing.",
+        "view": "Show a robot on a web page, its vibration magnified.",
+        "stop": "Stop a served robot, whoever has control; exit code 0 if it is at rest.",
+        "unlock": "Make a stopped robot ready to be moved again; exit code 0 if it is.",
+    },
+    "Logs": {
+        "log": f"Recordings, and other robots' logs: {', '.join(LOG)}.",
+    },
+    "Studies": {
+        "evaluate": "Compare the vibration of any moves unshaped and shaped.",
+        "shaperbench": "Rank shapers, your own included, on ten simulated arms.",
+        "map": "Map frequency, damping and a shaper's delay over the workspace, identified against true.",
+        "bound": "Compute the least time that moves need to end without vibration, and what shapers take.",
+        "paths": "Compare paths shaped along the path with the same paths shaped joint by joint.",
+        "tracking": "Measure how closely the arm follows positions sent to servoj, with every shaper.",
+        "robustness": "Compare shapers on arms that are stiffer, softer or loaded otherwise than they are told.",
+        "sweep": "Compare shapers over payloads, errors, moves and robots, on all cores or a cluster.",
+        "search": "Search for cases in which a robot breaks its promises.",
+    },
+    "Make and manage": {
+        "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",
+        "paper": "Run the paper's experiment and print its tables beside ours.",
+        "lesson": "Show on an arm with one flexible joint why a fixed shaper is not enough.",
+        "identify": "Calibrate a robot from its own accelerometer.",
+        "robots": "List the arms: what is measured, what assumed, and how well auto stills each.",
+        "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",
+        "keys": "Create TLS certificates for a robot and its clients.",
+        "router": "Run a router, through which the robots and clients of a fleet reach each other.",
+        "fleet": "Show the robots that a router reaches and how they are, or stop them all.",
+        "bench": "Measure how fast tvist runs on this machine.",
+        "completion": "Print the script by which a shell completes commands, options and their values.",
+    },
+}
+"""The commands with their one-line help, in groups, in the order in which a new user meets them."""
+COMMANDS = {name: what for group in GROUPS.values() for name, what in group.items()}
 
 
 def program() -> None:
@@ -85,8 +96,8 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
     """Return the program's commands and options, as the parser knows them.
 
     Args:
-        called: The command that was called, if any: its own help is its docstring, while the list of all commands has
-            their short ones.
+        called: The words of the command that was called, if any: its own help is its docstring, while the list of all
+            commands has their short ones.
     """
     from importlib.metadata import version
 
@@ -103,19 +114,24 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
         config=check_whole,
         suppress_keyboard_interrupt=False,  # `main` says that it was interrupted
     )
-    for place, (name, what) in enumerate(COMMANDS.items()):
-        module = name.replace("-", "_")
-        app.command(
-            f"tvist_cli.commands.{module}:{module}",
-            name=name,
-            help=None if name in called else what,
-            sort_key=place,
-        )
+    log = cyclopts.App(name="log", help=COMMANDS["log"], sort_key=list(COMMANDS).index("log"))
+    app.command(log)
+    _add(app, "tvist_cli.commands", COMMANDS, called[:1])
+    _add(log, "tvist_cli.commands.log", LOG, called[1:2] if called[:1] == ["log"] else ())
     return app
 
 
+def _add(app: "cyclopts.App", package: str, commands: Mapping[str, str], called: Sequence[str]) -> None:
+    for place, (name, what) in enumerate(commands.items()):
+        if name == "log":
+            continue
+        app.command(
+            f"{package}.{name}:{name}", name=name, help=None if name in called else what, sort_key=place
+        )
+
+
 def _run() -> None:
-    if sys.argv[1:2] == ["serve"]:
+    if sys.argv[1:2] == ["serve"] and "--compile" not in sys.argv:
         # Nothing is served yet, so a signal can end the process at once. As the first process of a container,
         # it has no default action for signals.
         for number in ending_signals():
@@ -125,7 +141,7 @@ def _run() -> None:
         end_like_interrupted()
     if sys.argv[1:] in (["--help"], ["-h"]):
         try:
-            print(overview(COMMANDS), flush=True)
+            print(overview(GROUPS), flush=True)
         except BrokenPipeError:  # the reader has seen enough
             os._exit(1)
         return
@@ -143,12 +159,15 @@ def _run() -> None:
 
     # A sentence, without a line of ours.
     warnings.formatwarning = lambda message, *_, **__: harmless(f"tvist: {message}\n")
-    app = application(sys.argv[1:2])
+    app = application(sys.argv[1:3])
     try:
         with told(OSError):  # a folder for figures that is none, mostly
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
-        print(harmless(f"tvist: {sentence(error, tuple(COMMANDS))}"), file=sys.stderr)
+        print(
+            harmless(f"tvist: {sentence(error, tuple(LOG if error.command_chain else COMMANDS))}"),
+            file=sys.stderr,
+        )
         sys.exit(2)
     except Failure as failure:
         print(harmless(f"tvist: {failure}"), file=sys.stderr)

@@ -15,6 +15,7 @@ from cyclopts import (
 )
 from cyclopts.exceptions import RepeatArgumentError, UnusedCliTokensError, ValidationError
 
+from tvist_cli.removed import INSTEAD
 from tvist_protocol.errors import quoted, short
 
 if TYPE_CHECKING:
@@ -67,14 +68,17 @@ def sentence(error: CycloptsError, commands: Sequence[str]) -> str:
 
     Args:
         error: Error from the parser.
-        commands: Names of all commands.
+        commands: Names of the commands that can stand where it went wrong.
     """
     command = " ".join(["tvist", *(error.command_chain or ())])
     seek = f"see {command} --help"
     match error:
         case UnknownCommandError():
             name = (error.unused_tokens or [""])[0]
-            said = f"there is no command {quoted(name)}: {_near(name, commands)}see tvist --help"
+            removed = None if error.command_chain else INSTEAD.get(name)
+            said = f"there is no command {quoted(name)}: " + (
+                f"{_near(name, commands)}{seek}" if removed is None else f"it is now {removed}"
+            )
         case UnknownOptionError():
             name = error.token.keyword or error.token.value
             known = [known for argument in error.argument_collection for known in argument.names]

@@ -1,4 +1,4 @@
-"""`tvist replay --publish`: put a recording back on the network."""
+"""`tvist log replay --publish`: put a recording back on the network."""
 
 import asyncio
 from collections.abc import Sequence

@@ -1,10 +1,13 @@
 """Reading of programs in URScript, and what is wrong with them."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tvist_cli.failure import Failure, told
+from tvist_cli.output import print_json
+from tvist_protocol.errors import harmless
 
 if TYPE_CHECKING:
     from tvist_controller.programs.checking import Finding
@@ -48,6 +51,31 @@ def placed(file: Path, finding: "Finding") -> str:
     """Return a finding as FILE:LINE:COLUMN: text, which editors understand."""
     kind = "" if finding.level == "error" else f"{finding.level}: "
     return f"{named(file)}:{finding.line}:{finding.column}: {kind}{finding.text}"
+
+
+def check_scripts(files: Sequence[Path], *, json: bool) -> None:
+    """Print what is wrong with programs.
+
+    Raises:
+        Failure: One has an error, or cannot be read.
+    """
+    from tvist_controller.programs.checking import check_program
+
+    found = [(one, finding) for one in files for finding in check_program(read_script(one))]
+    errors = sum(finding.level == "error" for _, finding in found)
+    if json:
+        findings = [
+            {"file": named(one), "line": finding.line, "column": finding.column, "level": finding.level,
+             "text": finding.text}
+            for one, finding in found
+        ]  # fmt: skip
+        print_json({"ok": errors == 0, "files": len(files), "errors": errors, "findings": findings})
+    else:
+        for one, finding in found:
+            print(harmless(placed(one, finding)))
+    if errors:
+        programs = "1 program" if len(files) == 1 else f"{len(files)} programs"
+        raise Failure(f"{errors} {'error' if errors == 1 else 'errors'} in {programs}")
 
 
 def _is_stdin(file: Path) -> bool:

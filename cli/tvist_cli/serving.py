@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from tvist_cli.failure import Failure
 from tvist_cli.output import err, progress, say
 
 if TYPE_CHECKING:
@@ -15,6 +14,8 @@ if TYPE_CHECKING:
     from tvist_server.workers import Workers
 
 
+BEGAN = time.monotonic()
+"""When this program began, nearly: what takes long to import comes after."""
 SAY_EVERY = 10.0
 """Shortest time between two lines about progress where stderr is no terminal [s]."""
 
@@ -55,20 +56,6 @@ def compile_shown(processes: int | None, tell: Callable[[int, int], None] = lamb
             shown = done
 
         compile_ahead(processes, show)
-
-
-def ur_ports(given: Sequence[str] | None) -> dict[str, int] | None:
-    """Split INTERFACE=PORT of each; the configuration checks whether there are such interfaces."""
-    return None if given is None else dict(map(_ur_port, given))
-
-
-def _ur_port(text: str) -> tuple[str, int]:
-    interface, equals, port = text.partition("=")
-    if not equals or not (port == "off" or (port.isascii() and port.isdigit() and len(port) < 9)):
-        raise Failure(
-            f"ur-port is {text!r}: must be INTERFACE=PORT such as rtde=31004, or INTERFACE=off", code=2
-        )
-    return interface, 0 if port == "off" else int(port)
 
 
 def introduction(setups: Sequence["Setup"], profile: str | None) -> str:

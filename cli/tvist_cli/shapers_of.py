@@ -2,12 +2,13 @@
 
 from typing import TYPE_CHECKING
 
-from tvist_cli.failure import told
+from tvist_cli.failure import Failure, told
 
 if TYPE_CHECKING:
     from tvist_controller.own_shapers import OwnShaper
     from tvist_plant.description import RobotDescription
     from tvist_protocol.calibration import Calibration
+    from tvist_shaping import Shaper
 
 
 def loaded(shaper: str) -> "tuple[str, tuple[OwnShaper, ...]]":
@@ -37,6 +38,23 @@ def load_given(place: str) -> "OwnShaper":
 
     with told(OwnShaperError, code=2):
         return load_own(place)
+
+
+def of_impulses(shaper: str) -> "Shaper":
+    """Return the shaper of a name or of FILE.py:NAME; only those with impulses have a delay for each mode.
+
+    Raises:
+        Failure: There is no such shaper, or it is none of impulses.
+    """
+    from tvist_shaping import SHAPERS, Shaper
+
+    name, own = loaded(shaper)
+    found = own[0].shaper if own else SHAPERS.get(name)
+    if not isinstance(found, Shaper):
+        if own:
+            raise Failure(f"shaper {shaper} has no impulses of one mode: give one that has", code=2)
+        raise Failure(f"shaper is {name!r}: must be FILE.py:NAME or one of {', '.join(SHAPERS)}", code=2)
+    return found
 
 
 def calibration_for(

@@ -61,7 +61,7 @@ class RobotOfTest:
             f"recording: {recording}",
             f"log:       {self.kept / self.log.name}",
             f"seed:      {self.seed}",
-            f"next:      tvist analyze {recording}; tvist replay {recording}",
+            f"next:      tvist log analyze {recording}; tvist log replay {recording}",
         ]
         try:
             told = self.log.read_text(encoding="utf-8", errors="replace").splitlines()

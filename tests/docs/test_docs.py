@@ -142,8 +142,9 @@ def check_command(words):
     program, *arguments = words
     match program.removeprefix(".venv/bin/"):
         case "tvist" | "marimo" | "dask" as name:
-            verbs = itertools.takewhile(lambda word: not word.startswith(("-", "lab/")), arguments)
-            verbs = [word.rstrip(",") for word in verbs][: None if name == "marimo" else 1]
+            verbs = list(itertools.takewhile(lambda word: not word.startswith(("-", "lab/")), arguments))
+            words = None if name == "marimo" else 1 + (verbs[:1] in (["log"], ["study"]))
+            verbs = [word.rstrip(",") for word in verbs][:words]
             unknown = {word for word in arguments if word.startswith("--")} - options(name, *verbs)
             assert not unknown, f"{name} {' '.join(verbs)} does not know {unknown}"
             assert all((ROOT / word).exists() for word in arguments if word.startswith("lab/"))
@@ -163,7 +164,7 @@ def check_command(words):
 @functools.cache
 def options(program, *verbs):
     told = run("-m", {"tvist": "tvist_cli"}.get(program, program), *verbs, "--help")
-    assert program != "tvist" or not verbs or f"tvist {verbs[0]}" in told
+    assert program != "tvist" or not verbs or f"tvist {' '.join(verbs)}" in told
     return set(re.findall(r"--[\w-]+", told))
 
 
@@ -201,7 +202,7 @@ def story(tmp_path_factory):
     said = []
     with Served(*how) as served:
         for words in rest:
-            if words[0] in {"analyze", "replay"} and served.process.poll() is None:
+            if words[0] == "log" and served.process.poll() is None:
                 assert served.end(signal.SIGINT) == 0
             said.append((words, tell(folder, words, served.endpoint)))
     return folder, said
@@ -220,7 +221,7 @@ def tell(folder, words, endpoint):
 class TestTutorial:
     def test_every_command_works_in_its_order(self, story):
         _, said = story
-        assert [words[0] for words, _ in said] == ["check", "watch", *["move"] * 4, "analyze", "replay"]
+        assert [words[0] for words, _ in said] == ["check", "watch", *["move"] * 4, "log", "log"]
         assert "every state equal to the last bit" in said[-1][1]
 
     def test_figures_are_where_it_says(self, story):
@@ -230,7 +231,7 @@ class TestTutorial:
 
     def test_the_shaped_motions_end_later_and_are_still_earlier(self, story):
         folder, _ = story
-        found = json.loads(run("-m", "tvist_cli", "analyze", "first.mcap", "--json", cwd=folder))
+        found = json.loads(run("-m", "tvist_cli", "log", "analyze", "first.mcap", "--json", cwd=folder))
         unshaped, shaped = found["motions"][:2], found["motions"][2:]
         assert len(shaped) == 2
         for before, after in zip(unshaped, shaped, strict=True):

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.realtime
 
 PAGE = DOCS / "how-to" / "change-a-shaper.md"
 TEXT = PAGE.read_text(encoding="utf-8")
-NEVER_SERVED = {"shapers", "evaluate", "shaperbench", "replay"}
+NEVER_SERVED = {"shapers", "evaluate", "shaperbench", "log"}
 
 
 def blocks(kind):
@@ -46,7 +46,7 @@ def test_every_command_works_in_its_order(folder, monkeypatch):
     with Served(*how) as served:
         assert "shaper early" in served.said
         for words in after:
-            if words[0] == "replay":
+            if words[0] == "log":
                 assert served.end(signal.SIGINT) == 0
             at = [] if words[0] in NEVER_SERVED else ["--endpoint", served.endpoint]
             said.append(run("-m", "tvist_cli", *words, *at, cwd=folder))
@@ -56,7 +56,7 @@ def test_every_command_works_in_its_order(folder, monkeypatch):
                     assert robot.info().shaper == chosen
                     assert "early" in robot.info().shapers
     assert [words[0] for words in [*before, *after]] == [
-        "shapers", "evaluate", "evaluate", "shaperbench", "move", "move", "move", "replay"
+        "shapers", "evaluate", "evaluate", "shaperbench", "move", "move", "move", "log"
     ]  # fmt: skip
     for told, name in zip(said[:4], ("early", "early", "bell", "early"), strict=True):
         assert name in told

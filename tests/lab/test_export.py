@@ -10,8 +10,8 @@ import polars as pl
 import pytest
 from tests.lab.synthetic_logs import SyntheticLog
 
-from tvist_cli.commands.export import export as export_command
-from tvist_cli.commands.info import info as info_command
+from tvist_cli.commands.log.export import export as export_command
+from tvist_cli.commands.log.info import info as info_command
 from tvist_cli.failure import Failure
 from tvist_lab.recordings import Recording, RecordingError, read
 from tvist_lab.recordings.description import KEY, sidecar

@@ -6,7 +6,7 @@ from itertools import islice
 import msgspec
 import pytest
 
-from tvist_cli.commands.replay import replay
+from tvist_cli.commands.log.replay import replay
 from tvist_cli.failure import Failure
 from tvist_lab import republish
 from tvist_lab.recordings import RecordingError

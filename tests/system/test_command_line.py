@@ -69,10 +69,10 @@ def slow():
 
 @pytest.fixture(scope="module")
 def recorded(lockstep, tmp_path_factory):
-    """A recording that `tvist record` made of a motion, and what it said; in lockstep no state is lost."""
+    """A recording that `tvist log record` made of a motion, and what it said; in lockstep no state is lost."""
     path = tmp_path_factory.mktemp("recorded") / "seen.mcap"
     process = forked.Popen(
-        [sys.executable, "-m", "tvist_cli", "record", path, "--endpoint", lockstep.endpoint, "--json"],
+        [sys.executable, "-m", "tvist_cli", "log", "record", path, "--endpoint", lockstep.endpoint, "--json"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -225,7 +225,9 @@ class TestRecordAndAnalyze:
 
     def test_it_ends_by_itself_after_the_time_asked_for(self, realtime, tmp_path):
         path = tmp_path / "second.mcap"
-        ended = tvist("record", path, "--endpoint", realtime.endpoint, "--seconds", 1, "--json").assert_done()
+        ended = tvist(
+            "log", "record", path, "--endpoint", realtime.endpoint, "--seconds", 1, "--json"
+        ).assert_done()
         assert ended.json["states"] > 0
         assert path.stat().st_size > 0
 
@@ -238,6 +240,7 @@ class TestRecordAndAnalyze:
                 sys.executable,
                 "-m",
                 "tvist_cli",
+                "log",
                 "record",
                 path,
                 "--endpoint",
@@ -255,35 +258,35 @@ class TestRecordAndAnalyze:
         _, err = process.communicate(timeout=PATIENCE)
         assert process.returncode == 130
         assert f"s recorded into {path}" in err.splitlines()[-1]
-        tvist("analyze", path, "--json").assert_done()
+        tvist("log", "analyze", path, "--json").assert_done()
 
     def test_analyze_measures_the_motion(self, recorded):
-        said = tvist("analyze", recorded[0], "--json").assert_done().json
+        said = tvist("log", "analyze", recorded[0], "--json").assert_done().json
         (motion,) = said["motions"]
         assert motion["residual_vibration_m_s2"] is not None
         assert 0.3 < motion["stop_s"] - motion["start_s"] < 3.0
 
     def test_analyze_prints_a_table_for_people(self, recorded):
-        said = tvist("analyze", recorded[0]).assert_done().out
+        said = tvist("log", "analyze", recorded[0]).assert_done().out
         assert "RV m/s²" in said
         assert not said.startswith("{")
 
     def test_analyze_draws_a_figure_of_each_motion(self, recorded, tmp_path):
-        tvist("analyze", recorded[0], "--figures", tmp_path / "drawn").assert_done()
+        tvist("log", "analyze", recorded[0], "--figures", tmp_path / "drawn").assert_done()
         drawn = {path.name for path in (tmp_path / "drawn").iterdir()}
         assert drawn == {"motion_1.png", "ring_down_1.png"}
 
     def test_what_was_recorded_from_outside_cannot_be_replayed_and_says_why(self, recorded):
-        tvist("replay", recorded[0]).assert_failed(1, "serve --record")
+        tvist("log", "replay", recorded[0]).assert_failed(1, "serve --record")
 
     def test_a_file_is_not_replaced(self, realtime, recorded):
-        tvist("record", recorded[0], "--endpoint", realtime.endpoint).assert_failed(1, "exists")
+        tvist("log", "record", recorded[0], "--endpoint", realtime.endpoint).assert_failed(1, "exists")
 
     @pytest.mark.parametrize("command", ["analyze", "replay"])
     def test_what_is_no_recording_is_a_sentence(self, command, tmp_path):
-        tvist(command, tmp_path / "nope.mcap").assert_failed(1, "nope.mcap")
+        tvist("log", command, tmp_path / "nope.mcap").assert_failed(1, "nope.mcap")
         (tmp_path / "text.mcap").write_text("hello", encoding="utf-8")
-        ended = tvist(command, tmp_path / "text.mcap", "--json").assert_failed(1, "no MCAP file")
+        ended = tvist("log", command, tmp_path / "text.mcap", "--json").assert_failed(1, "no MCAP file")
         assert ended.out == ""
 
     def test_a_robot_in_lockstep_that_nobody_steps_is_recorded_once_and_not_for_ever(
@@ -293,7 +296,7 @@ class TestRecordAndAnalyze:
             wire.step(token, 1)
         path = tmp_path / "still.mcap"
         options = ("--endpoint", lockstep.endpoint, "--seconds", 1.5, "--json")
-        assert tvist("record", path, *options).assert_done().json["states"] == 1
+        assert tvist("log", "record", path, *options).assert_done().json["states"] == 1
 
 
 class TestMoveAndWatch:
@@ -377,6 +380,27 @@ class TestMoveAndWatch:
         with Wire(realtime.endpoint) as wire, wire.control("somebody"):
             tvist("move", NEAR, "--endpoint", realtime.endpoint).assert_failed(1, "somebody")
 
+    @pytest.mark.quick
+    def test_stop_ends_the_motion_of_another_who_keeps_control(self, realtime):
+        at = ("--endpoint", realtime.endpoint)
+        with Wire(realtime.endpoint) as wire, wire.control("somebody") as token:
+            wire.listen("state")
+            move = {"q": [3.0, -3.0, 0.0, -1.5, 0.0, 0.0], "velocity": 0.2}
+            motion = wire.command("move_j", token=token, **move)["id"]
+            wire.wait("state", lambda state: state["target_qd"][0] > 0.1)
+            said = tvist("stop", "ur5e", *at, "--json").assert_done().json
+            assert (said["stopped"], said["control"]) == ([f"motion {motion}"], "somebody")
+            assert said["runtime_state"] == "STOPPED"
+            assert tvist("stop", *at).assert_done().out == "ur5e: nothing was under way\n"
+
+    def test_stop_leaves_the_steps_of_lockstep_to_who_has_them(self, lockstep):
+        with Wire(lockstep.endpoint) as wire, wire.control() as token:
+            wire.command("move_j", token=token, q=[0.5, -3.0, 0.0, -1.5, 0.0, 0.0])
+            wire.step(token, 100)
+            assert "next step" in tvist("stop", "--endpoint", lockstep.endpoint).assert_done().out
+            state = wire.until(wire.step(token, 500)["tick"])
+            assert (state["runtime_state"], state["target_q"][0] < 0.4) == (STOPPED, True)
+
     def test_watch_prints_an_object_a_line(self, realtime):
         ended = tvist("watch", realtime.endpoint, "--seconds", 1, "--json").assert_done()
         states = [json.loads(line) for line in ended.out.splitlines()]
@@ -397,49 +421,15 @@ class TestMoveAndWatch:
         assert process.returncode == 130
 
 
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (("move",), "target"),
-        (("move", "Q2", "--velocity", "fast"), "--velocity"),
-        (("analyze",), "file"),
-        (("dance",), "dance"),
-        (("check", "--colour"), "--colour"),
-        (("paper", "--runs", "0"), "runs"),
-        (("paper", "--calibration", "nope"), "calibration"),
-        (("identify", "--configurations", "0"), "configurations"),
-        (("identify", "--at", "there"), "at"),
-        (("identify", "--robot", "nope"), "robot"),
-    ],
-)
-def test_misuse_is_exit_code_2_and_a_sentence_that_names_it(arguments, named):
-    assert tvist(*arguments).assert_failed(2, named).out == ""
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("move", "Q2", "--endpoint"),
-        ("record", "never.mcap", "--endpoint"),
-        ("watch",),
-        ("identify",),
-        ("unlock",),
-    ],
-)
-def test_nobody_there_is_exit_code_1_and_a_sentence(arguments, tmp_path):
-    endpoint = free_endpoint()
-    assert tvist(*arguments, endpoint, cwd=tmp_path).assert_failed(1, "no server answers", endpoint).out == ""
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize(("what", "kept"), json.loads((HERE / "kept_keys.json").read_text("utf-8")).items())
 def test_the_keys_of_json_stay(what, kept):
     """Those of a published version: docs/reference/what-stays.md."""
-    command, *list_of_it = what.split()
+    words = what.split()
+    command, list_of_it = words[: 1 + (words[0] == "log")], words[1 + (words[0] == "log") :]
     journal = HERE.parent / "journals" / "live_moves.mcap"
     wave = HERE.parents[1] / "clients" / "examples" / "wave.script"
-    about = {"shapers": (), "compare": (journal, journal), "run": (wave, "--lockstep")}
-    said = tvist(command, *about.get(command, (journal,)), "--json").assert_done().json
+    about = {"shapers": (), "log compare": (journal, journal), "run": (wave, "--lockstep")}
+    said = tvist(*command, *about.get(" ".join(command), (journal,)), "--json").assert_done().json
     for key in list_of_it:
         said = said[key][0]
     assert set(kept) <= said.keys()

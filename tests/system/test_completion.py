@@ -8,19 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from tvist_cli.main import COMMANDS
+from tvist_cli.main import COMMANDS, LOG
 
 pytestmark = pytest.mark.quick
 
 ASKING_ZSH = Path(__file__).with_name("completion")
 CASES = {
-    "tvist che": {"check-script", "check"},
+    "tvist che": {"check"},
+    "tvist log an": {"analyze"},
     "tvist run --lo": {"--lockstep"},
     "tvist run wave.script --input digital_input_1=1 --prof": {"--profile"},
     "tvist serve --no-f": {"--no-floor"},
     "tvist completion f": {"fish"},
     "tvist run wav": {"wave.script"},
-    "tvist check-script one.script wav": {"wave.script"},
+    "tvist run --check one.script wav": {"wave.script"},
     "tvist serve --shaper zvd": {"zvd", "zvdd", "zvddd"},
     "tvist serve --shaper ow": {"own.py"},
     "tvist serve --robot ur5": {"ur5e"},
@@ -75,7 +76,7 @@ def test_the_last_word_is_completed(shell, typed, folder):
 @pytest.mark.parametrize("file", ["bash-script", "_tvist", "fish-script"])
 def test_every_command_is_in_the_script(folder, file):
     text = (folder / file).read_text(encoding="utf-8")
-    assert [name for name in COMMANDS if name not in text] == []
+    assert [name for name in (*COMMANDS, *LOG) if name not in text] == []
 
 
 @pytest.mark.parametrize("file", ["bash-script", "_tvist", "fish-script"])

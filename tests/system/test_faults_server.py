@@ -206,9 +206,9 @@ class TestAnArmThatFails:
                 assert hit.event("motion_done")["id"] == motion
                 hit.assert_undisturbed()
                 other.assert_undisturbed()
-            served.wait_until_said("look with tvist analyze")
+            served.wait_until_said("look with tvist log analyze")
         (dump,) = tmp_path.glob("*.mcap")
         assert f"tvist-ur5e-1-{served.process.pid}-{event['tick']}" in dump.name
-        analysed = finished("-m", "tvist_cli", "analyze", dump, "--json")
+        analysed = finished("-m", "tvist_cli", "log", "analyze", dump, "--json")
         assert analysed.returncode == 0, analysed.stderr
         assert json.loads(analysed.stdout)

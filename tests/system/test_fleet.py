@@ -120,7 +120,7 @@ def test_a_router_that_was_killed_finds_all_again_and_no_robot_has_stopped():
 
 
 def test_a_reduced_rate_holds_for_each_listed_robot_and_leaves_events_alone():
-    """A round follows when all events of the last one have come, so nothing waits in a queue: no link is lost by that."""
+    """A round follows when all events of the last one have come: nothing waits in a queue, and no link is lost."""
     names, rounds = [f"r-{number}" for number in (1, 2, 3)], 0
     came, got = Queue(), Counter()
     with (

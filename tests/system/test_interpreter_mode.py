@@ -96,5 +96,5 @@ def test_statements_moved_the_arm_and_what_was_skipped_did_nothing(recording):
 
 
 def test_its_replay_is_equal_to_the_last_bit(recording):
-    code, said, _ = tvist("replay", recording)
+    code, said, _ = tvist("log", "replay", recording)
     assert (code, said["equal"], said["first_difference"]) == (0, True, None)

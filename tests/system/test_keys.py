@@ -245,7 +245,7 @@ class TestProgram:
         assert json.loads(watched.stdout.splitlines()[0])["type"] == "state"
         file = tmp_path / "seen.mcap"
         options = ("--endpoint", endpoint, "--security", ring / "wall", "--seconds", "0.5")
-        assert tvist("record", file, *options).returncode == 0
+        assert tvist("log", "record", file, *options).returncode == 0
         assert file.stat().st_size > 1000
 
     @pytest.mark.parametrize("command", [("move", "Q1", "--endpoint"), ("identify",)])

@@ -61,7 +61,7 @@ def live(tmp_path_factory):
 
 
 def test_its_replay_is_equal_to_the_last_bit(live):
-    code, said, _ = tvist("replay", live[0])
+    code, said, _ = tvist("log", "replay", live[0])
     assert code == 0
     assert said["equal"] is True
     assert said["first_difference"] is None
@@ -90,7 +90,7 @@ def test_the_recording_has_every_tick_from_the_first_on_and_lost_nothing(live):
 
 
 def test_analyze_finds_the_motions_and_measures_them(live):
-    code, said, _ = tvist("analyze", live[0])
+    code, said, _ = tvist("log", "analyze", live[0])
     assert code == 0
     first = said["motions"][0]
     assert len(said["motions"]) >= 2
@@ -104,7 +104,7 @@ def test_analyze_finds_the_motions_and_measures_them(live):
 
 
 def test_a_replay_can_be_recorded_and_is_the_same_recording(live, tmp_path):
-    code, _, said = tvist("replay", live[0], tmp_path / "again.mcap")
+    code, _, said = tvist("log", "replay", live[0], tmp_path / "again.mcap")
     assert code == 0, said
     before, after = read(live[0]), read(tmp_path / "again.mcap")
     assert after.states == before.states

@@ -1,4 +1,4 @@
-"""`tvist map` and `tvist sensitivity`: what they write for people, for programs and for papers."""
+"""`tvist map` and `tvist shapers --sensitivity`: what they write for people, for programs and for papers."""
 
 import json
 
@@ -22,20 +22,8 @@ def test_a_map_is_one_object_and_a_figure_of_each_quantity(tmp_path):
 
 
 def test_sensitivity_has_a_curve_of_each_shaper_and_its_band(tmp_path):
-    ended = tvist(
-        "sensitivity",
-        "--shapers",
-        "zv",
-        "ei",
-        "--errors",
-        -20,
-        20,
-        "--figures",
-        tmp_path,
-        "--format",
-        "pdf",
-        "--json",
-    ).assert_done()
+    drawn = ("--figures", tmp_path, "--format", "pdf", "--json")
+    ended = tvist("shapers", "--sensitivity", "zv", "ei", "--errors", -20, 20, *drawn).assert_done()
     curves = {curve["name"]: curve for curve in ended.json["shapers"]}
     assert list(curves) == ["zv", "ei"]
     for curve in curves.values():
@@ -47,7 +35,7 @@ def test_sensitivity_has_a_curve_of_each_shaper_and_its_band(tmp_path):
 
 
 def test_people_get_tables():
-    assert "5 % from" in tvist("sensitivity").assert_done().out
+    assert "5 % from" in tvist("shapers", "--sensitivity").assert_done().out
     said = tvist("map", "--points", 3, "--robot", "one-joint").assert_done().out
     assert "f_d Hz" in said
     assert "error % median" in said

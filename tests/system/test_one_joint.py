@@ -38,16 +38,16 @@ class TestServed:
         options = ("--robot", "one-joint", "--truth", "--clock", "lockstep", "--record", str(path))
         with Served(*options) as served:
             at = ("--endpoint", served.endpoint)
-            tvist("record", seen, *at, "--seconds", 1).assert_done()
-            assert tvist("analyze", seen, "--json").assert_done().json["motions"] == []
+            tvist("log", "record", seen, *at, "--seconds", 1).assert_done()
+            assert tvist("log", "analyze", seen, "--json").assert_done().json["motions"] == []
             for pose in ("Q3", "q1"):
                 assert "moved to" in tvist("move", pose, *at).assert_done().out
             with Wire(served.endpoint) as wire, wire.control() as token:
                 wire.step(token, 400)  # what rings after the motion
-        found = tvist("analyze", path, "--figures", tmp_path, "--json").assert_done().json["motions"]
+        found = tvist("log", "analyze", path, "--figures", tmp_path, "--json").assert_done().json["motions"]
         assert len(found) == 2
         assert (tmp_path / "motion_2.png").exists()
-        assert tvist("replay", path, "--json").assert_done().json["equal"]
+        assert tvist("log", "replay", path, "--json").assert_done().json["equal"]
 
 
 def test_its_moves_are_evaluated_beside_every_baseline():

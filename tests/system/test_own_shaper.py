@@ -63,7 +63,7 @@ def test_every_command_refuses_it_alike(folder, command, place):
 
 
 def test_a_replay_takes_a_file_alone(folder):
-    tvist("replay", "none.mcap", "--shaper", "zv", cwd=folder).assert_failed(2, "must be FILE.py:NAME")
+    tvist("log", "replay", "none.mcap", "--shaper", "zv", cwd=folder).assert_failed(2, "must be FILE.py:NAME")
 
 
 def test_it_stands_in_the_table_and_the_json_of_shapers(folder):

@@ -187,7 +187,7 @@ def live(tmp_path_factory):
 @pytest.mark.slow
 def test_the_replay_of_a_live_run_with_a_client_is_equal_to_the_last_bit(live):
     told, path = live
-    code, said, _ = tvist("replay", path)
+    code, said, _ = tvist("log", "replay", path)
     assert (code, said["equal"], said["first_difference"]) == (0, True, None)
     by_tick = {state.tick: state for state in read(path).states}
     assert told.states
@@ -213,7 +213,7 @@ async def test_a_run_with_statements_in_lockstep_is_the_same_again_and_in_its_re
     one = await served(with_statements, "--clock", "lockstep", "--truth", "--record", str(path))
     other = await served(with_statements, "--clock", "lockstep", "--truth")
     assert_equal(one, other)
-    code, said, _ = tvist("replay", path)
+    code, said, _ = tvist("log", "replay", path)
     assert (code, said["equal"], said["first_difference"]) == (0, True, None)
 
 

@@ -1,4 +1,4 @@
-"""`tvist replay --publish`: a recording on the network, cut off as it may be, for the clients that robots have."""
+"""`tvist log replay --publish`: a recording on the network, cut off as it may be, for the clients that robots have."""
 
 from itertools import pairwise
 
@@ -29,7 +29,7 @@ INFO, STATE, TRUTH, IO = map(golden, (Info, State, Truth, Io))
 class PublishedRecording(Served):
     """A recording as a server of its own."""
 
-    program = ("-m", "tvist_cli", "replay")
+    program = ("-m", "tvist_cli", "log", "replay")
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""`tvist run` and `tvist check-script`, as a robot programmer's CI starts them."""
+"""`tvist run` and `tvist run --check`, as a robot programmer's CI starts them."""
 
 import json
 import signal
@@ -154,8 +154,10 @@ class TestInLockstep:
             (("run", "moves.script", "--lockstep", "--payload", "9"), ["9 kg", "--overload"]),
             (("run", "moves.script", "--lockstep", "--config", "several.toml"), ["robots", "one robot"]),
             (("run", "moves.script", "--lockstep", "--config", "clock.toml"), ["clock", "--lockstep"]),
-            (("check-script", "moves.script", "nope.script"), ["nope.script", "No such file"]),
-            (("check-script",), ["missing"]),
+            (("run", "--check", "moves.script", "nope.script"), ["nope.script", "No such file"]),
+            (("run", "--check", "--lockstep", "moves.script"), ["--check runs nothing"]),
+            (("run", "moves.script", "wrong.script"), ["wrong.script", "--check"]),
+            (("run", "--check"), ["missing"]),
         ],
         ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
     )
@@ -259,7 +261,7 @@ class TestInRealTime:
 @pytest.mark.quick
 class TestCheckScript:
     def test_every_error_is_a_line_on_stdout_and_exit_code_1(self, tvist):
-        code, out, err = tvist("check-script", "moves.script", "wrong.script")
+        code, out, err = tvist("run", "--check", "moves.script", "wrong.script")
         assert code == 1
         assert out.splitlines() == [
             "wrong.script:2:9: compile_error_name_not_found:x:",
@@ -268,13 +270,13 @@ class TestCheckScript:
         assert err == "tvist: 1 error in 2 programs\n"
 
     def test_warnings_alone_are_exit_code_0(self, tvist):
-        code, out, err = tvist("check-script", "-", stdin="freedrive_mode()\n")
+        code, out, err = tvist("run", "--check", "-", stdin="freedrive_mode()\n")
         assert (code, err) == (0, "")
         assert out.startswith("<stdin>:1:1: warning: ")
-        assert tvist("check-script", "moves.script", "fails.script") == (0, "", "")
+        assert tvist("run", "--check", "moves.script", "fails.script") == (0, "", "")
 
     def test_with_json_there_is_one_object(self, tvist):
-        code, out, _ = tvist("check-script", "wrong.script", "--json")
+        code, out, _ = tvist("run", "--check", "wrong.script", "--json")
         assert code == 1
         told = json.loads(out)
         assert (told["ok"], told["files"], told["errors"]) == (False, 1, 1)

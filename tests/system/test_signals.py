@@ -1,4 +1,4 @@
-"""Signals: what ends `tvist serve` and `tvist record` in order, before, while and after they serve."""
+"""Signals: what ends `tvist serve` and `tvist log record` in order, before, while and after they serve."""
 
 import itertools
 import os
@@ -129,7 +129,7 @@ def test_a_signal_ends_a_client_s_recording_complete(number, tmp_path):
     path = tmp_path / "seen.mcap"
     with Served(cold=True) as served:
         process = subprocess.Popen(
-            [sys.executable, "-m", "tvist_cli", "record", path, "--endpoint", served.endpoint],
+            [sys.executable, "-m", "tvist_cli", "log", "record", path, "--endpoint", served.endpoint],
             stderr=subprocess.PIPE,
             text=True,
         )

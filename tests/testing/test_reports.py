@@ -148,7 +148,7 @@ def test_of_failed_tests_everything_is_kept_and_of_others_nothing(light):
             "*settling time*",
             f"recording: {recording}",
             "seed: * 5",
-            f"next: * tvist analyze {recording}; tvist replay {recording}",
+            f"next: * tvist log analyze {recording}; tvist log replay {recording}",
         ]
     )
     assert len(read(recording)) > 100

@@ -42,81 +42,107 @@ class ConfigError(ValueError):
 
 
 class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Options of `tvist serve`; every key is optional. What is None depends on the profile, if not stated otherwise."""
+    """Options of `tvist serve` and keys of its configuration file; their docstrings are the help of the command line.
+
+    A default that is no plain value stands in brackets.
+    """
 
     name: RobotName = DEFAULT_NAME
     """Name of the robot on the network."""
     robot: str = "ur5e"
     """Name of a robot that comes with the package, or path of a robot file."""
     robots: str | None = None
-    """Several robots, ROBOT[*COUNT] separated by commas and named after their files; replaces `name` and `robot`."""
+    """Serve several robots, given as `ROBOT[*COUNT]` separated by commas: `ur5e*2,other.toml` serves ur5e-1, ur5e-2 and
+    other. Replaces --name and --robot."""
     workers: Annotated[int, Meta(ge=1, le=256)] = 1
-    """Number of processes that the robots are spread over."""
+    """Number of processes that the robots are spread over, behind the same endpoint; each further one uses one more
+    core. If one dies, all end, with exit code 1."""
     listen: tuple[str, ...] | None = None
-    """Zenoh endpoints to listen on; default: `DEFAULT_ENDPOINT`, and none with `connect`."""
+    """Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447; none with --connect]."""
     connect: tuple[str, ...] = ()
-    """Zenoh endpoints of routers to connect to; the robot uses the first that answers."""
+    """Endpoint of a router through which clients reach the robot, repeatable: the robot uses the first that answers. If
+    none does within 10 s, the command fails; a router that is lost later is looked for again."""
     namespace: Namespace | None = None
-    """Chunks that precede the robot's keys, so that robots of several places can share a network."""
+    """Words separated by / that precede the robot's keys, such as hall-3, so that robots of one name can share a
+    network. Clients give the same --namespace."""
     metrics: str | None = None
-    """ADDRESS:PORT to publish figures for Prometheus on, or a port of the loopback interface."""
+    """ADDRESS:PORT to publish figures for Prometheus on, over HTTP without encryption, or PORT of 127.0.0.1."""
     security: str | None = None
-    """Folder with certificates and roles, made by `tvist keys`; endpoints are then tls/… With `connect`, the folder of
-    a client with the role robot."""
+    """Folder made by tvist keys. The endpoint is then tls/ADDRESS:PORT, and clients without a role have no access. With
+    --connect, the folder of a robot, made by tvist keys --member; the router checks clients."""
     insecure: bool = False
     """Accept remote connections without TLS and do not authenticate clients; anyone can move the robot."""
     profile: ProfileName | None = None
-    """Set of defaults: `ursim` is like UR's simulator, `real` like a robot; default: `ursim` with `ur`, else none."""
+    """Set of defaults. ursim is like UR's simulator: it starts an arm of UR's kind in URSim's posture, with a payload
+    of 0 kg, shaper none, --quiet, --no-floor and --compensate-sag. real starts in the same posture and is otherwise
+    like a robot: it has the robot file's payload, noise, a floor, sag and shaper zv. Options that you give take
+    precedence [ursim with --ur and for tvist run; without it, the defaults named at each option]."""
     payload: Annotated[float, Meta(ge=0, le=100)] | None = None
-    """Mass of the disc on the flange, both declared and carried [kg]."""
+    """Mass of the disc on the flange in kg, both carried and declared to the controller [that of the robot file, 5 for
+    the ur5e; 0 with the profile ursim]."""
     overload: bool = False
-    """Start even if the declared payload exceeds the robot's rating."""
+    """Start even if the payload exceeds the robot's rating. The drives may not hold it; the robot then makes a
+    protective stop."""
     shaper: str | None = None
-    """Initial shaper: its name, or FILE.py:NAME for your own."""
+    """Any name that tvist shapers lists, such as none, zv, auto or elastic; or FILE.py:NAME, which runs that file and
+    adds your own shaper to those that clients can choose [zv; none with the profile ursim]."""
     shape_servo: bool = False
-    """Shape `servoj`, `speedj` and `speedl` of programs where they begin at rest."""
+    """Shape servoj, speedj and speedl of programs too, where they begin at rest. Without this option they bypass the
+    shaper, since their client usually closes a loop, to which the shaper would add its delay."""
     calibration: str | None = None
-    """Name of a calibration that comes with the package, path of one, or "none"; default: the package's, if any."""
+    """Name of a calibration that comes with the package, or path of a calibration file; none for a robot that is yet to
+    be identified [the one that comes with the package for this robot]."""
     clock: Clock = "realtime"
-    """What advances simulation time."""
+    """realtime, or lockstep, in which a client steps the simulation."""
     speed: Annotated[float, Meta(gt=0, le=100)] = 1.0
-    """Simulation speed relative to real time [-]; only with the clock realtime."""
+    """Simulation speed relative to real time."""
     realtime_priority: bool = False
-    """Run the control loop with real-time priority, if the system permits it; only with the clock realtime."""
+    """Run the control loop with real-time priority (SCHED_FIFO), if the system permits it."""
     processor: Annotated[int, Meta(ge=0, le=4095)] | None = None
-    """Processor for the control loop, and for no other thread of the server; only with the clock realtime."""
+    """Run the control loop on this processor, counted from 0, and all other threads of the server on others [any]."""
     lock_memory: bool = False
     """Keep the server's memory from being swapped out, if the system permits it."""
     start: str | tuple[float, ...] | None = None
-    """Initial pose: a name from the robot file, or joint angles [rad]."""
+    """Pose to start in: a name from the robot file, such as Q1, Q2 or Q3, or joint angles in rad separated by commas
+    [Q1; the posture of URSim with a profile]."""
     state: str | None = None
-    """TOML or JSON file with the initial state: any of q, payload (the carried one), mode, shaper, seed."""
+    """TOML or JSON file with the state to start in: any of q, payload (the carried one), mode, shaper, seed."""
     seed: Seed = 0
-    """Seed of sensor noise and gear errors; with several robots, each further one adds 1."""
+    """Seed of sensor noise and gear errors; with several robots, each further one uses the next."""
     record: str | None = None
-    """MCAP file to record into; with several robots, each has a file of its own that ends with its name."""
+    """MCAP file to record into. It must not exist, unless --keep is given. With several robots, each records into a
+    file of its own, FILE-NAME.mcap."""
     keep: str | None = None
-    """Duration that the recording keeps at least, such as "10min"; it forgets what was before. Default: all of it."""
+    """Let the recording keep the last 90s, 10min or 2h, and at most twice as much, and forget what was before [it keeps
+    all]. At a start, what an earlier run has left in FILE.mcap becomes FILE.earlier-1.mcap, FILE.earlier-2.mcap and so
+    on; the five latest stay."""
     dump: str | None = None
-    """Folder to save the last second before a failure of the simulated arm to. Default: the system's temporary one."""
+    """Folder to save the last second before a failure of the simulated arm to [the system's temporary folder]."""
     truth: bool = False
-    """Publish what a real robot cannot measure, too."""
+    """Publish what a real robot cannot measure, such as the arm's deflection, on tvist/NAME/truth and in the
+    recording."""
     quiet: bool | None = None
-    """Simulate sensors without noise and angles with an encoder's resolution: at rest, no value changes."""
+    """Simulate sensors without noise and angles with an encoder's resolution, for clients that wait until values stop
+    changing [off]."""
     floor: bool | None = None
-    """Keep the arm clear of the floor of the robot file; false: there is no floor."""
+    """Refuse motions that bring the arm or its payload to the floor of the robot file [on]."""
     compensate_sag: bool | None = None
-    """Let the drives lead by the twist of the gears under gravity, so that the arm rests on its target."""
+    """Let the drives lead by the angle that gravity twists the gears, so that the measured joint angles at rest are the
+    target angles [off]."""
     programs: str | None = None
-    """Folder with programs that clients load by their names; a robot may have a folder of its name in it."""
+    """Folder with programs in URScript, NAME.script or NAME.urp, that clients load by their names. With several robots,
+    a robot uses the folder of its name in it, if there is one."""
     ur: bool = False
-    """Open UR's own interfaces, too."""
+    """Open UR's own interfaces as well: RTDE, real-time client, dashboard, primary and secondary, interpreter mode. The
+    profile is then ursim, if you give no other."""
     ur_address: str = "127.0.0.1"
     """IP address on which UR's interfaces listen; each further robot uses the next address."""
     ur_ports: UrPorts = UrPorts()
-    """Ports of UR's interfaces that differ from UR's defaults; 0 closes an interface."""
+    """Change the port of one UR interface, repeatable: rtde=31004, or dashboard=off to close it. The others are
+    primary, secondary, realtime, interpreter, primary_read_only, secondary_read_only and realtime_read_only."""
     ur_allow: tuple[str, ...] = ()
-    """Machines that programs may open sockets to, besides the one that sent them: IP addresses, networks, names."""
+    """Let programs open sockets to this machine too, repeatable: an IP address, a network such as 192.168.1.0/24, or a
+    name as programs write it [only the machine that sent the program]."""
 
     def setups(self) -> list[Setup]:
         """Return the initial setup of every robot's controller.

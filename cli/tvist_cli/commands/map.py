@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import number, out, print_json, table, write_json
-from tvist_cli.shapers_of import loaded
+from tvist_cli.shapers_of import of_impulses
 from tvist_cli.simulated_arm import masses_of
 
 if TYPE_CHECKING:
     from tvist_protocol.calibration import Calibration
-    from tvist_shaping import Shaper
 
 
 def map(  # noqa: A001  the command's name
@@ -92,23 +91,6 @@ def map(  # noqa: A001  the command's name
         [_row(key, result) for key in QUANTITIES],
     )
     out.print("error: size of the deviation of what is identified from what is true, in percent")
-
-
-def of_impulses(shaper: str) -> "Shaper":
-    """Return the shaper of a name or of FILE.py:NAME; only those with impulses have a delay for each mode.
-
-    Raises:
-        Failure: There is no such shaper, or it is none of impulses.
-    """
-    from tvist_shaping import SHAPERS, Shaper
-
-    name, own = loaded(shaper)
-    found = own[0].shaper if own else SHAPERS.get(name)
-    if not isinstance(found, Shaper):
-        if own:
-            raise Failure(f"shaper {shaper} has no impulses of one mode: give one that has", code=2)
-        raise Failure(f"shaper is {name!r}: must be FILE.py:NAME or one of {', '.join(SHAPERS)}", code=2)
-    return found
 
 
 def _calibration(name: str | None, model: str) -> "Calibration":

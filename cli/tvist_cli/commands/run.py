@@ -9,39 +9,35 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, interrupted, told
-from tvist_cli.misuse import lower
 from tvist_cli.output import print_json, say
 from tvist_cli.program_output import Tell
-from tvist_cli.scripts import named, placed, read_script
+from tvist_cli.robot_options import configuration, content_of, with_robot_options
+from tvist_cli.scripts import check_scripts, named, placed, read_script
 from tvist_cli.serving import compile_if_new, introduction, leave, say_recorded, say_who_can_reach
+from tvist_server.config import ConfigError, ServeConfig
 
 if TYPE_CHECKING:
     from tvist_lab.programs.watch import ProgramWatch
-    from tvist_server.config import ServeConfig
     from tvist_server.server import Server
 
 
+OPTIONS = {
+    "robot", "profile", "payload", "overload", "shaper", "shape_servo", "start", "seed", "record", "truth", "listen",
+    "ur", "ur_allow",
+}  # fmt: skip
+"""Options of `tvist serve` that one robot which ends with its program can do with."""
+
+
+@with_robot_options(OPTIONS)
 def run(
-    file: Path,
-    *,
+    *file: Annotated[Path, Parameter(required=True)],
+    check: bool = False,
     lockstep: bool = False,
-    robot: str | None = None,
-    profile: str | None = None,
-    payload: float | None = None,
-    overload: bool = False,
-    shaper: str | None = None,
-    shape_servo: bool = False,
-    start: str | None = None,
-    seed: int | None = None,
     inputs: Annotated[list[str] | None, Parameter(name="--input")] = None,
     timeout: float | None = None,
-    record: Path | None = None,
-    truth: bool = False,
-    listen: list[str] | None = None,
-    ur: bool = False,
-    ur_allow: list[str] | None = None,
     config: str | None = None,
     json: bool = False,
+    **given: Any,
 ) -> None:
     """Run a program in URScript on a robot of its own, print its messages as they come, and end with an exit code.
 
@@ -52,45 +48,40 @@ def run(
     The program runs in real time, on a robot that other programs can reach as if tvist serve ran it. Popups do not
     hold it up: they are printed and closed.
 
+    With --check, nothing runs. Errors are what keeps a program from starting: wrong syntax, unknown names, and calls
+    that do not fit their functions. A function of UR's robots that tvist does not simulate is a warning: the program
+    starts, and ends with an error when it calls that function.
+
     Args:
-        file: Program to run; - reads the standard input.
+        file: Program to run, or programs to check; - reads the standard input.
+        check: Look for errors without running anything: each is a line FILE:LINE:COLUMN: text. Exit code 0: there is
+            none. Exit code 1: there is at least one. Exit code 2: a file cannot be read.
         lockstep: Run as fast as this machine computes, without network; the arm moves exactly as in real time. A
             program that waits for a client then waits for ever: see --input and --timeout. It cannot open sockets.
-        robot: Name of a robot that comes with the package, or path of a robot file [ur5e].
-        profile: Set of defaults, see tvist serve: ursim, which is like UR's simulator, or real, which has a payload,
-            noise, a floor, sag and shaper zv [ursim].
-        payload: Mass of the disc on the flange in kg, both carried and declared to the controller [0 with the profile
-            ursim, that of the robot file with real].
-        overload: Start even if the payload exceeds the robot's rating.
-        shaper: Any shaper that tvist shapers lists, or FILE.py:NAME [none with the profile ursim, zv with real].
-        shape_servo: Shape servoj, speedj and speedl too, where they begin at rest.
-        start: Pose to start in: a name from the robot file, such as Q1, Q2 or Q3, or joint angles in rad separated by
-            commas [the posture of URSim].
-        seed: Seed of sensor noise and gear errors [0].
         inputs: Input to set before the start as NAME=VALUE, repeatable. NAME is digital_input_N, input_bit_register_N,
             input_int_register_N or input_double_register_N.
         timeout: End the run after this time in s as the robot counts it, with exit code 1 [the program may run for
             ever].
-        record: MCAP file to record into, for tvist analyze, tvist view and tvist replay.
-        truth: Record also what a real robot cannot measure, such as the arm's deflection.
-        listen: Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
-        ur: Open UR's own interfaces as well, so that their clients can watch the robot and write its registers.
-        ur_allow: Let the program open sockets to this machine too, repeatable, see tvist serve [only this machine].
         config: TOML file with any options of tvist serve for one robot; options on the command line take precedence.
         json: Print one JSON object at the end instead of messages.
+        given: Fields of `ServeConfig`.
     """
+    if check:
+        if given or lockstep or inputs or config or timeout is not None:
+            raise Failure(
+                "--check runs nothing, so that only --json goes with it: leave the others out", code=2
+            )
+        check_scripts(file, json=json)
+        return
+    program, *others = file
+    if others:
+        raise Failure(f"tvist run runs one program: leave {others[0]} out, or give --check", code=2)
     if timeout is not None and timeout <= 0.0:
         raise Failure(f"timeout is {timeout:g}: must be more than 0", code=2)
-    text = read_script(file)
-    _check(file, text, json=json)
-    given: dict[str, Any] = {
-        "robot": robot, "profile": lower(profile), "payload": payload, "overload": overload or None,
-        "shaper": lower(shaper), "shape_servo": shape_servo or None, "start": start, "seed": seed,
-        "record": None if record is None else str(record), "truth": truth or None, "listen": listen,
-        "ur": ur or None, "ur_allow": ur_allow,
-    }  # fmt: skip
+    text = read_script(program)
+    _check(program, text, json=json)
     checked = _configuration(given, config, lockstep=lockstep)
-    job = _Job(file, text, inputs or (), timeout, Tell(quiet=json))
+    job = _Job(program, text, inputs or (), timeout, Tell(quiet=json))
     watch, errors, server = job.in_lockstep(checked) if lockstep else job.in_real_time(checked)
     job.tell(watch)
     job.tell.clear()
@@ -98,9 +89,9 @@ def run(
         from tvist_lab.programs.report import as_dict
 
         print_json(
-            {"file": named(file), "lockstep": lockstep, "recording": record and str(record), **as_dict(watch)}
+            {"file": named(program), "lockstep": lockstep, "recording": checked.record, **as_dict(watch)}
         )
-    failure = _failure(file, watch, errors)
+    failure = _failure(program, watch, errors)
     if failure is None and not json:
         from tvist_lab.programs.report import summary
 
@@ -132,26 +123,20 @@ def _check(file: Path, text: str, *, json: bool) -> None:
     )
 
 
-def _configuration(given: dict[str, Any], config: str | None, *, lockstep: bool) -> "ServeConfig":
+def _configuration(given: dict[str, Any], file: str | None, *, lockstep: bool) -> ServeConfig:
     """The robot's configuration: that of `tvist serve` for one robot, with the profile `ursim`."""
-    from tvist_server.config import ConfigError, from_mapping, read_toml
-
-    if lockstep:
-        for name in ("listen", "ur", "ur_allow"):
-            if given[name] is not None:
-                option = name.replace("_", "-")
-                raise Failure(
-                    f"--lockstep and --{option} exclude each other: in lockstep there is no network", code=2
-                )
-    source = "configuration" if config is None else f"configuration {config}"
+    for name in ("listen", "ur", "ur_allow"):
+        if lockstep and name in given:
+            option = name.replace("_", "-")
+            raise Failure(
+                f"--lockstep and --{option} exclude each other: in lockstep there is no network", code=2
+            )
     with told(ConfigError, code=2):
-        content = {} if config is None else read_toml(config)
-        for key, instead in (("robots", "tvist run has one robot"), ("clock", "tvist run has --lockstep")):
-            if key in content:
-                raise ConfigError(f"{source}: leave {key} out, since {instead}")
-        content = {"profile": "ursim", **content, "clock": "free" if lockstep else "realtime"}
-        content |= {key: value for key, value in given.items() if value is not None}
-        return from_mapping(content, source)
+        content = content_of(file)
+    for key, instead in (("robots", "tvist run has one robot"), ("clock", "tvist run has --lockstep")):
+        if key in content:
+            raise Failure(f"configuration {file}: leave {key} out, since {instead}", code=2)
+    return configuration({**given, "clock": "free" if lockstep else "realtime"}, file, profile="ursim")
 
 
 class _Job:
@@ -162,11 +147,10 @@ class _Job:
     ) -> None:
         self.file, self.text, self.inputs, self.timeout, self.tell = file, text, inputs, timeout, tell
 
-    def in_lockstep(self, config: "ServeConfig") -> "tuple[ProgramWatch, list[str], None]":
+    def in_lockstep(self, config: ServeConfig) -> "tuple[ProgramWatch, list[str], None]":
         """Run it in this process; return what was observed, and errors of the recording."""
         from tvist_lab.programs.in_lockstep import run_in_lockstep
         from tvist_lab.programs.start import InputError
-        from tvist_server.config import ConfigError
         from tvist_server.recording import RecorderError
 
         errors: list[str] = []
@@ -187,11 +171,10 @@ class _Job:
             say(f"recorded into {config.record}")
         return watch, errors, None
 
-    def in_real_time(self, config: "ServeConfig") -> "tuple[ProgramWatch, list[str], Server]":
+    def in_real_time(self, config: ServeConfig) -> "tuple[ProgramWatch, list[str], Server]":
         """Serve a robot that runs it; return what was observed, errors of the recording, and the server."""
         from tvist_lab.programs.in_real_time import ProgramServer
         from tvist_lab.programs.start import InputError
-        from tvist_server.config import ConfigError
         from tvist_server.ending import Ending
         from tvist_server.gateways.base import GatewayError
         from tvist_server.recording import RecorderError

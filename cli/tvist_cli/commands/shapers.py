@@ -2,17 +2,22 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from tvist_cli.failure import told
+from cyclopts import Parameter
+
+from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import out, print_json, table
+from tvist_cli.sensitivity import print_sensitivity
 from tvist_cli.shapers_of import load_given
 
 if TYPE_CHECKING:
     from tvist_shaping import Impulses
     from tvist_shaping.named import AnyShaper
 
+ERRORS = (-40.0, 60.0)
+"""Range of the errors of --sensitivity [%]."""
 BANDS = {"5": 0.05, "10": 0.1}
 """Residual vibration that bounds each band [-], by its percentage."""
 TOUCHING = 1.0 + 1e-4
@@ -24,6 +29,9 @@ def shapers(
     f_d: float = 10.0,
     zeta: float = 0.0,
     shaper: list[str] | None = None,
+    sensitivity: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    errors: tuple[float, float] = ERRORS,
+    output: Path | None = None,
     figures: Path | None = None,
     look: FigureOptions = AS_USUAL,
     json: bool = False,
@@ -34,12 +42,23 @@ def shapers(
         f_d: Damped frequency of the mode in Hz.
         zeta: Damping ratio of the mode.
         shaper: FILE.py:NAME, repeatable: run that file and list the shaper in it, too.
+        sensitivity: Instead of the list, compute what these shapers, names or FILE.py:NAME, leave of the vibration
+            of a mode whose frequency they assume wrongly [zv zvd ei].
+        errors: With --sensitivity, lowest and highest percentage by which the assumed frequency is too high [-40 60].
+        output: With --sensitivity, JSON file to write the curves to.
         figures: Folder to write figures to: residual vibration for a wrong frequency, settling time against delay, and
-            the effects of a varying mean delay and of elastic feed-forward.
+            the effects of a varying mean delay and of elastic feed-forward; with --sensitivity, the curves.
         look: How to write the figures.
         json: Print one JSON object.
     """
     look.check(figures)
+    if sensitivity is None and (output is not None or errors != ERRORS):
+        raise Failure("--errors and --output are for --sensitivity: give it, or leave them out", code=2)
+    if sensitivity is not None:
+        if shaper:
+            raise Failure("--sensitivity names its shapers itself: leave --shaper out", code=2)
+        print_sensitivity(sensitivity, zeta, errors, output, figures, look, json=json)
+        return
     from tvist_shaping import BUILT_IN, SHAPERS, Registry, Shaper, ShapingError
     from tvist_shaping.named import OF_SEVERAL_MODES
 

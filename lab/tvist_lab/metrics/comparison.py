@@ -39,7 +39,7 @@ class ComparedMotion:
         }
 
     def as_dict(self) -> dict[str, Any]:
-        """Convert to plain values, as `tvist compare` prints them."""
+        """Convert to plain values, as `tvist log compare` prints them."""
         return {
             "number": {"a": self.a, "b": self.b},
             "a": self.first.as_dict(),

@@ -82,7 +82,7 @@ class MotionResult:
     """Field to a note about its value."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Convert the result to plain values, as `tvist analyze` prints them."""
+        """Convert the result to plain values, as `tvist log analyze` prints them."""
         return {**asdict(self), "notes": dict(self.notes)}
 
 

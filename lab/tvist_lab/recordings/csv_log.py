@@ -1,4 +1,4 @@
-"""Logs in CSV with RTDE's names, as UR's record.py, ur_rtde and `tvist export` write them."""
+"""Logs in CSV with RTDE's names, as UR's record.py, ur_rtde and `tvist log export` write them."""
 
 import io
 import re

@@ -1,4 +1,4 @@
-"""Recordings from Parquet, npz and mat: those that `tvist export` wrote, and others with columns of RTDE's names."""
+"""Recordings from Parquet, npz and mat: those of `tvist log export`, and others with columns of RTDE's names."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -73,7 +73,7 @@ READERS: dict[str, Callable[[Path], Recording]] = {
 
 
 def with_sidecar(recording: Recording, path: Path) -> Recording:
-    """Add events, info and notes from the file beside a CSV, if `tvist export` wrote one that belongs to it."""
+    """Add events, info and notes from the file beside a CSV, if `tvist log export` wrote one that belongs to it."""
     try:
         check_is_file(sidecar(path), "description")
         (note, *_) = parse_json(sidecar(path).read_bytes())["notes"]

@@ -15,7 +15,7 @@ SHOWN = 4096
 def read(path: str | os.PathLike[str], columns: str | None = None) -> Recording:
     """Read a recording of this controller, or a log of another one.
 
-    Recordings: MCAP, and what `tvist export` writes (CSV, Parquet, npz, mat). Logs: CSV with RTDE's names, dumps of
+    Recordings: MCAP, and what `tvist log export` writes (CSV, Parquet, npz, mat). Logs: CSV with RTDE's names, dumps of
     UR's port 30003, rosbag2 in MCAP (a file, or its folder). CSV and dumps may be compressed by gzip.
 
     Args:

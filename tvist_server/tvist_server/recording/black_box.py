@@ -99,5 +99,8 @@ class BlackBox(Sink):
         except RecorderError as error:
             log.error("the last second before the failure is lost: %s", error)  # noqa: TRY400  the sentence says it
         else:
-            why = recorder.error or f"the last second before it is in {path}: look with tvist analyze {path}"
+            why = (
+                recorder.error
+                or f"the last second before it is in {path}: look with tvist log analyze {path}"
+            )
             log.error("robot %s: the simulated arm failed; %s", info.name, why)

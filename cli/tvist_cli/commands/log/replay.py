@@ -1,4 +1,4 @@
-"""`tvist replay`: run a recording's commands again and compare."""
+"""`tvist log replay`: run a recording's commands again and compare."""
 
 from pathlib import Path
 
@@ -31,7 +31,7 @@ def replay(
     With --publish, put the recording itself on the network instead, for programs that watch or record a robot.
 
     Args:
-        file: MCAP file that `tvist serve --record` wrote; with --publish also one of `tvist record`.
+        file: MCAP file that `tvist serve --record` wrote; with --publish also one of `tvist log record`.
         output: MCAP file to write the second run to.
         shaper: FILE.py:NAME, repeatable: your own shaper that the robot was served with. A recording names the file,
             but replay runs it only if it is given here.

@@ -1,4 +1,4 @@
-"""`tvist compare`: two recordings of the same motions side by side."""
+"""`tvist log compare`: two recordings of the same motions side by side."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,7 +22,7 @@ def compare(a: Path, b: Path, *, columns: str | None = None, json: bool = False)
     contains are listed, and not compared.
 
     Args:
-        a: First file, in any format that `tvist analyze` reads.
+        a: First file, in any format that `tvist log analyze` reads.
         b: Second file; its format may be another one.
         columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
             after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.

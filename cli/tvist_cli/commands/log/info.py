@@ -1,4 +1,4 @@
-"""`tvist info`: what a recording holds."""
+"""`tvist log info`: what a recording holds."""
 
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ def info(file: Path, *, columns: str | None = None, json: bool = False) -> None:
     """Print what a recording or a log holds: its robot, time, events, and its columns with their shapes and units.
 
     Args:
-        file: A recording, an exported file, or any log that tvist analyze reads.
+        file: A recording, an exported file, or any log that tvist log analyze reads.
         columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
             after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
         json: Print one JSON object.

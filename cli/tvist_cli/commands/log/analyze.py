@@ -1,4 +1,4 @@
-"""`tvist analyze`: measure the motions of a recording or of a robot's log."""
+"""`tvist log analyze`: measure the motions of a recording or of a robot's log."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,8 +31,8 @@ def analyze(
     Frequency and damping have 95 % intervals. A dash has its reason in a line below the table.
 
     Args:
-        file: Recording of `tvist serve --record`, `tvist record` or `tvist export`; or a log of another robot: CSV
-            with RTDE's names, a dump of UR's port 30003, a rosbag2 in MCAP.
+        file: Recording of `tvist serve --record`, `tvist log record` or `tvist log export`; or a log of another robot:
+            CSV with RTDE's names, a dump of UR's port 30003, a rosbag2 in MCAP.
         figures: Folder for the figures of each motion: what was recorded, and the ring-down after it.
         look: How to write the figures.
         columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit

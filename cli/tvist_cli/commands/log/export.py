@@ -1,4 +1,4 @@
-"""`tvist export`: write a recording as CSV, Parquet, npz or mat."""
+"""`tvist log export`: write a recording as CSV, Parquet, npz or mat."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def export(
     """Write a recording or a log as CSV, Parquet, npz or mat, in full precision.
 
     Args:
-        file: A recording, or any log that tvist analyze reads.
+        file: A recording, or any log that tvist log analyze reads.
         to: csv, parquet, npz or mat. A vector becomes columns NAME_0, NAME_1, ... in CSV and Parquet, and one array in
             npz and mat. Units, events and info go along; those of a CSV into FILE.csv-metadata.json.
         output: File to write [FILE with its ending replaced, such as run.csv for run.mcap].

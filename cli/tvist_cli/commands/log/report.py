@@ -1,4 +1,4 @@
-"""`tvist report`: a web page about recordings, in one file."""
+"""`tvist log report`: a web page about recordings, in one file."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def report(
     It says in a sentence how much the tool vibrates; of several files, whether the others vibrate less than the first.
 
     Args:
-        files: Recordings or logs in any format that tvist analyze reads. The first one is what others are compared
+        files: Recordings or logs in any format that tvist log analyze reads. The first one is what others are compared
             with.
         output: File to write.
         force: Replace an existing file.
@@ -28,7 +28,7 @@ def report(
         json: Print the verdict as one JSON object.
     """
     if not files:
-        raise Failure("report needs at least one recording or log: tvist report run.mcap", code=2)
+        raise Failure("report needs at least one recording or log: tvist log report run.mcap", code=2)
     if output.exists() and not force:
         raise Failure(f"{output} exists already: give --force to replace it, or --output")
     from tvist_lab.recordings import RecordingError

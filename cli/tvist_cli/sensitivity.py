@@ -1,14 +1,13 @@
-"""`tvist sensitivity`: what shapers leave of the vibration when the frequency is wrong."""
+"""What shapers leave of the vibration when the frequency is wrong."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import Parameter
-
-from tvist_cli.commands.map import of_impulses
 from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.figure_files import FigureOptions, write
 from tvist_cli.output import number, out, print_json, table, write_json
+from tvist_cli.shapers_of import of_impulses
 
 if TYPE_CHECKING:
     from tvist_shaping import Shaper
@@ -21,26 +20,26 @@ POINTS = 401
 """Number of errors of a curve."""
 
 
-def sensitivity(
+def print_sensitivity(
+    shapers: Sequence[str],
+    zeta: float,
+    errors: tuple[float, float],
+    output: Path | None,
+    figures: Path | None,
+    look: FigureOptions,
     *,
-    shapers: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
-    zeta: float = 0.0,
-    errors: tuple[float, float] = (-40.0, 60.0),
-    output: Path | None = None,
-    figures: Path | None = None,
-    look: FigureOptions = AS_USUAL,
-    json: bool = False,
+    json: bool,
 ) -> None:
-    """Compute the residual vibration of shapers for a mode whose frequency they assume wrongly.
+    """Compute and print the residual vibration of shapers for a mode whose frequency they assume wrongly.
 
     Args:
-        shapers: Names of the shapers, as tvist shapers lists them, or FILE.py:NAME [zv zvd ei].
+        shapers: Names of the shapers, or FILE.py:NAME; if empty, those of the paper.
         zeta: Damping ratio of the mode, both assumed and true.
-        errors: Lowest and highest percentage by which the assumed frequency is too high [-40 60].
+        errors: Lowest and highest percentage by which the assumed frequency is too high.
         output: JSON file to write the curves to.
         figures: Folder to write a figure of the curves to.
         look: How to write the figures.
-        json: Print one JSON object.
+        json: Whether to print one JSON object.
     """
     import numpy as np
 
@@ -48,7 +47,6 @@ def sensitivity(
     from tvist_shaping import ShapingError
     from tvist_shaping.impulses import check_mode
 
-    look.check(figures)
     low, high = errors
     if not -90.0 <= low < high <= 900.0:
         raise Failure(

@@ -1,4 +1,4 @@
-"""`tvist record`: record a served robot over the network."""
+"""`tvist log record`: record a served robot over the network."""
 
 import asyncio
 from pathlib import Path
@@ -20,7 +20,8 @@ def record(
 ) -> None:
     """Record what a served robot publishes as MCAP until Control+C: states, events, truth, inputs and outputs.
 
-    Commands are known only to the server and are not recorded: `tvist replay` needs a file from `tvist serve --record`.
+    Commands are known only to the server and are not recorded: `tvist log replay` needs a file from `tvist serve
+    --record`.
 
     Args:
         file: MCAP file to write.

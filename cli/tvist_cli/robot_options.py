@@ -1,0 +1,103 @@
+"""The options of a robot: each field of `ServeConfig` is one, with its docstring as its help."""
+
+import inspect
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import Annotated, Any, TypeVar
+
+from cyclopts import Parameter
+from msgspec import inspect as types
+from msgspec.structs import FieldInfo, fields
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.misuse import lower
+from tvist_protocol.schema import field_docs
+from tvist_server.config import ConfigError, ServeConfig, from_mapping, read_toml
+
+Command = TypeVar("Command", bound=Callable[..., object])
+_IN_ANY_CASE = ("profile", "shaper", "clock")
+
+
+def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Command]:
+    """Give a command, whose last parameter is `**given`, the fields of `ServeConfig` as options.
+
+    Args:
+        only: Names of the fields, if not all of them.
+    """
+
+    def decorate(command: Command) -> Command:
+        signature = inspect.signature(command)
+        *own, _ = signature.parameters.values()
+        options = [_option(field) for field in fields(ServeConfig) if not only or field.name in only]
+        command.__signature__ = signature.replace(parameters=own + options)  # type: ignore[attr-defined]
+        return command
+
+    return decorate
+
+
+def configuration(given: Mapping[str, Any], file: str | None, **defaults: object) -> ServeConfig:
+    """Return what the command line gives, beyond that what the file does, and beyond that `defaults`.
+
+    Raises:
+        Failure: A value is invalid, with exit code 2.
+        UserFileError: The file has the wrong kind of content.
+    """
+    source = "configuration" if file is None else f"configuration {file}"
+    with told(ConfigError, code=2):
+        return from_mapping(defaults | content_of(file) | dict(_plain(given)), source)
+
+
+def content_of(file: str | None) -> dict[str, object]:
+    """Return the unchecked content of a configuration file; nothing if there is none."""
+    return {} if file is None else read_toml(file)
+
+
+def _option(field: FieldInfo) -> inspect.Parameter:
+    may_be = types.type_info(field.type)
+    kind = may_be.types[0] if isinstance(may_be, types.UnionType) else may_be
+    read: Any = str
+    match kind:
+        case types.BoolType():
+            read = bool
+        case types.IntType():
+            read = int
+        case types.FloatType():
+            read = float
+        case types.VarTupleType() | types.StructType():
+            read = list[str]
+    name = "ur-port" if field.name == "ur_ports" else field.name.replace("_", "-")
+    # What a profile may switch on can be switched off.
+    negative = f"--no-{name}" if read is bool and kind is not may_be else ()
+    about = Parameter(name=f"--{name}", negative=negative, help=_help(field))
+    return inspect.Parameter(
+        field.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[read | None, about]
+    )
+
+
+def _help(field: FieldInfo) -> str:
+    """Return a field's docstring, with the default where a word can say it."""
+    text, default = field_docs(ServeConfig)[field.name], field.default
+    if isinstance(default, bool) or not isinstance(default, str | int | float):
+        return text
+    word = f"{default:g}" if isinstance(default, float) else default
+    return f"{text.removesuffix('.')} [{word}]."
+
+
+def _plain(given: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
+    """Return what is given as a configuration file would."""
+    if "ur_address" in given or "ur_ports" in given:
+        yield "ur", True
+    for name, value in given.items():
+        if name == "ur_ports":
+            yield name, dict(map(_ur_port, value))
+        else:
+            yield name, lower(value) if name in _IN_ANY_CASE else value
+
+
+def _ur_port(text: str) -> tuple[str, int]:
+    """Split INTERFACE=PORT; the configuration checks whether there is such an interface."""
+    interface, equals, port = text.partition("=")
+    if not equals or not (port == "off" or (port.isascii() and port.isdigit() and len(port) < 9)):
+        raise Failure(
+            f"ur-port is {text!r}: must be INTERFACE=PORT such as rtde=31004, or INTERFACE=off", code=2
+        )
+    return interface, 0 if port == "off" else int(port)

@@ -1,0 +1,103 @@
+"""Stop one robot, whoever has control of it, and say what that has stopped."""
+
+import asyncio
+
+import msgspec
+
+from tvist_client.errors import AnswerTimeoutError
+from tvist_client.readiness import mode_name
+from tvist_client.robot import ENDPOINT, NAME, Robot
+from tvist_client.transports.certificates import Folder
+from tvist_client.transports.zenoh import only_robot
+from tvist_protocol.modes import RuntimeState
+from tvist_protocol.stream import Event, State
+
+
+class HaltReport(msgspec.Struct, frozen=True):
+    """What was stopped, and whether the arm rests."""
+
+    ok: bool
+    """Whether the arm is at rest, or in lockstep will be after the next steps."""
+    endpoint: str
+    robot: str
+    """Name of the robot."""
+    stopped: list[str] | None
+    """What was stopped, in order, such as "motion 3"; empty if nothing was under way; null in lockstep, where the stop
+    begins with the next step."""
+    control: str | None
+    """Client that has control, which can move the robot again; null if none has."""
+    runtime_state: str | None
+    """RTDE name of the state afterwards; null in lockstep."""
+    why: str
+    """What is wrong, as a sentence; empty if all is well."""
+
+
+def halt(
+    endpoint: str = ENDPOINT,
+    name: str | None = None,
+    *,
+    security: Folder | None = None,
+    namespace: str = "",
+) -> HaltReport:
+    """Send `stop` without control, and wait until the arm is at rest; in lockstep, that is up to who steps.
+
+    Args:
+        endpoint: Endpoint of the server, `tcp/<host>:<port>`.
+        name: Name of the robot; None: the only one at the endpoint, or `ur5e`.
+        security: Folder with this client's certificate, for `tls/<host>:<port>`.
+        namespace: Namespace of the robot.
+
+    Raises:
+        NotConnectedError: No server listens there, there is no such robot, or there are several and no name was given.
+        DeniedError: This client's certificate is not an operator's.
+    """
+    return asyncio.run(_halt(endpoint, name, security, namespace))
+
+
+async def _halt(endpoint: str, name: str | None, security: Folder | None, namespace: str) -> HaltReport:
+    name = name or await only_robot(endpoint, NAME, security, namespace)
+    async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
+        stopped: list[str] = []
+
+        def hear(event: Event) -> None:
+            stopped.extend(_ended(event))
+
+        robot.on_event(hear)
+        robot.watch()
+        await robot.stop()
+        info, state, why = await robot.info(), None, ""
+        if info.clock == "realtime":
+            try:
+                state = await _rest(robot, info.tick)
+            except AnswerTimeoutError:
+                why = "it has accepted the stop but publishes no state: look whether it moves"
+        if state is not None and state.runtime_state == RuntimeState.PLAYING:
+            why = f"it was stopped and moves again: {info.control or 'another client'} has control, end that first"
+    return HaltReport(
+        ok=not why,
+        endpoint=endpoint,
+        robot=name,
+        stopped=stopped if info.clock == "realtime" else None,
+        control=info.control,
+        runtime_state=None if state is None else mode_name(RuntimeState, state.runtime_state),
+        why=why,
+    )
+
+
+async def _rest(robot: Robot, tick: int) -> State:
+    """Return the first state after a tick in which no stop is under way."""
+    state = await robot.until(tick + 1)
+    while state.runtime_state == RuntimeState.STOPPING:
+        state = await robot.until(state.tick + 1)
+    return state
+
+
+def _ended(event: Event) -> list[str]:
+    match event.kind:
+        case "motion_stopped":
+            return [f"motion {event.id}"]
+        case "stream_stopped":
+            return ["the stream of set-points"]
+        case "program_stopped":
+            return ["a program" if event.program is None else f"the program {event.program}"]
+    return []
