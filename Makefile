@@ -50,12 +50,12 @@ elsewhere: setup
 	$(BIN)/mypy --platform win32 $(addprefix --package ,tvist_client tvist_protocol tvist_shaping tvist_urscript)
 
 bench: setup
-	$(BIN)/tvist bench
+	$(BIN)/python -m proof bench
 
 # The tests that take minutes each, a release rehearsed, and a search for an hour of what `.ci/run` searches for a minute.
 soak: setup elsewhere rehearse
 	$(BIN)/pytest -m nightly
-	$(BIN)/tvist search --stops 2000 --streams 500 --changes 500 --sequences 3000 --flexible --robot ur3e ur5e ur16e ur30 tests/plant/urdf/seven.urdf
+	$(BIN)/python -m proof search --stops 2000 --streams 500 --changes 500 --sequences 3000 --flexible --robot ur3e ur5e ur16e ur30 tests/plant/urdf/seven.urdf
 
 format: setup
 	$(BIN)/ruff check --fix

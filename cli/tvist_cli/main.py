@@ -5,9 +5,11 @@ import signal
 import sys
 import warnings
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tvist_cli.overview import ABOUT, overview
+from tvist_cli.study_names import STUDY
 from tvist_server.ending import end_like_interrupted, ending_signals
 
 if TYPE_CHECKING:
@@ -40,13 +42,7 @@ GROUPS = {
     "Studies": {
         "evaluate": "Compare the vibration of any moves unshaped and shaped.",
         "shaperbench": "Rank shapers, your own included, on ten simulated arms.",
-        "map": "Map frequency, damping and a shaper's delay over the workspace, identified against true.",
-        "bound": "Compute the least time that moves need to end without vibration, and what shapers take.",
-        "paths": "Compare paths shaped along the path with the same paths shaped joint by joint.",
-        "tracking": "Measure how closely the arm follows positions sent to servoj, with every shaper.",
-        "robustness": "Compare shapers on arms that are stiffer, softer or loaded otherwise than they are told.",
-        "sweep": "Compare shapers over payloads, errors, moves and robots, on all cores or a cluster.",
-        "search": "Search for cases in which a robot breaks its promises.",
+        "study": f"Run a study, one's own from a file or one of {', '.join(STUDY)}.",
     },
     "Make and manage": {
         "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",
@@ -63,6 +59,8 @@ GROUPS = {
     },
 }
 """The commands with their one-line help, in groups, in the order in which a new user meets them."""
+OF_GROUPS = {"log": LOG, "study": STUDY}
+"""Commands that have commands of their own."""
 COMMANDS = {name: what for group in GROUPS.values() for name, what in group.items()}
 
 
@@ -114,16 +112,25 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
         config=check_whole,
         suppress_keyboard_interrupt=False,  # `main` says that it was interrupted
     )
-    log = cyclopts.App(name="log", help=COMMANDS["log"], sort_key=list(COMMANDS).index("log"))
-    app.command(log)
     _add(app, "tvist_cli.commands", COMMANDS, called[:1])
-    _add(log, "tvist_cli.commands.log", LOG, called[1:2] if called[:1] == ["log"] else ())
+    for name, commands in OF_GROUPS.items():
+        group = cyclopts.App(name=name, help=COMMANDS[name], sort_key=list(COMMANDS).index(name))
+        app.command(group)
+        _add(group, f"tvist_cli.commands.{name}", commands, called[1:2] if called[:1] == [name] else ())
+        if name == "study":
+            # The parser takes no path for what a group does without a command of its own.
+            group.default(import_module("tvist_cli.commands.study.file").file)
     return app
+
+
+def _known(chain: Sequence[str]) -> Mapping[str, str]:
+    """Return the commands among which one was sought."""
+    return OF_GROUPS.get(chain[0], COMMANDS) if chain else COMMANDS
 
 
 def _add(app: "cyclopts.App", package: str, commands: Mapping[str, str], called: Sequence[str]) -> None:
     for place, (name, what) in enumerate(commands.items()):
-        if name == "log":
+        if name in OF_GROUPS:
             continue
         app.command(
             f"{package}.{name}:{name}", name=name, help=None if name in called else what, sort_key=place
@@ -165,7 +172,7 @@ def _run() -> None:
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
         print(
-            harmless(f"tvist: {sentence(error, tuple(LOG if error.command_chain else COMMANDS))}"),
+            harmless(f"tvist: {sentence(error, tuple(_known(error.command_chain or ())))}"),
             file=sys.stderr,
         )
         sys.exit(2)

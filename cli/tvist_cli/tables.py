@@ -27,7 +27,7 @@ METHOD_TERMS = {
 
 def print_paper(result: dict[str, Any]) -> None:
     """Print the results of `tvist paper` and `tvist demo`."""
-    from tvist_lab.paper.published import published
+    from tvist_lab.studies.paper.published import published
 
     theirs = published()
     table(

@@ -176,9 +176,8 @@ def _():
 
 @app.cell(hide_code=True)
 def _():
-    chosen = mo.ui.multiselect(
-        ["zv", "mzv", "zvd", "ei", "ei2", "ei3"], value=["zv", "zvd", "ei"], label="shapers"
-    )
+    _names = [name for name in ts.SHAPERS if name != "none"]
+    chosen = mo.ui.multiselect(_names, value=["zv", "zvd", "ei"], label="shapers")
     error = mo.ui.slider(-40, 40, 1, value=10, label="true frequency is higher by (%)", show_value=True)
     mo.vstack([chosen, error])
     return chosen, error

@@ -11,7 +11,8 @@ with app.setup:
 
     from tvist_controller.api import estimator_of, load_calibration
     from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, note, panels, title
-    from tvist_lab.paper.published import pose
+    from tvist_lab.studies.paper.published import pose
+    from tvist_lab.study.catalogue import names
     from tvist_lab.workspace import identified, ranges
     from tvist_plant.description import load
     from tvist_shaping import residual, shaper
@@ -110,7 +111,7 @@ def _():
 
 @app.cell(hide_code=True)
 def _():
-    chosen = mo.ui.dropdown(["zv", "mzv", "zvd", "ei", "ei2", "ei3"], value="zv", label="shaper")
+    chosen = mo.ui.dropdown(names("lesson"), value="zv", label="shaper")
     design = mo.ui.slider(6.0, 18.0, 0.5, value=10.5, label="designed for (Hz)", show_value=True)
     mo.vstack([chosen, design])
     return chosen, design

@@ -12,9 +12,9 @@ with app.setup:
     from tvist_lab.figures.style import INK, SHAPED, THIRD, UNSHAPED, legend, panels
     from tvist_lab.in_process import free_setup, robot_in_process
     from tvist_lab.metrics import amplitude, best_tool_acceleration, motions
-    from tvist_lab.paper.experiment import judge, run, table_1
-    from tvist_lab.paper.methods import FixedShaper, TimeVarying, Unshaped
-    from tvist_lab.paper.published import MOTIONS, published
+    from tvist_lab.studies.paper.experiment import judge, run, table_1
+    from tvist_lab.studies.paper.methods import FixedShaper, TimeVarying, Unshaped
+    from tvist_lab.studies.paper.published import MOTIONS, published
     from tvist_shaping import residual, zv
 
 

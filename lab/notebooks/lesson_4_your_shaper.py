@@ -12,10 +12,13 @@ with app.setup:
     import numpy as np
 
     from tvist_controller.api import OwnShaper, load_calibration
-    from tvist_lab.evaluation.evaluate import MoveJob, judge
-    from tvist_lab.evaluation.moves import draw_moves
-    from tvist_lab.evaluation.recipes import Recipe
     from tvist_lab.figures.style import INK, SHAPED, THIRD, UNSHAPED, legend, panels
+    from tvist_lab.study.case import Case
+    from tvist_lab.study.catalogue import names
+    from tvist_lab.study.method import Named
+    from tvist_lab.study.moves import draw_moves
+    from tvist_lab.study.recipes import Recipe
+    from tvist_lab.study.work import Job, measure
     from tvist_plant.description import load
     from tvist_shaping import Impulses, ShapingError, residual, shaper, shaper_of
 
@@ -61,7 +64,7 @@ def _():
 
 @app.cell(hide_code=True)
 def _():
-    rival = mo.ui.dropdown(["zv", "mzv", "zvd", "ei", "ei2", "ei3"], value="zv", label="compare with")
+    rival = mo.ui.dropdown(names("lesson"), value="zv", label="compare with")
     rival
     return (rival,)
 
@@ -114,8 +117,8 @@ def _(calibration, moves, own, robot):
     def try_on_moves(name, frequency_error):
         """Each move unshaped and shaped, where the shaper is told a frequency that is too high by a share."""
         known = (OwnShaper("lesson_4_your_shaper.py", "mine", "", own),)
-        recipe = Recipe(name, calibration, frequency_error, own=known)
-        return [judge(MoveJob(robot, move, recipe)) for move in moves]
+        method = Named(Recipe(name, calibration, frequency_error, own=known), name)
+        return [measure(Job(Case(robot, move), (method,)))[0] for move in moves]
 
     return (try_on_moves,)
 
@@ -129,24 +132,24 @@ def _(error, rival, try_on_moves):
 @app.function
 def remaining(judged):
     """Median over the moves of the peak, shaped over unshaped; those that hardly ring count only if all do so."""
-    loud = [one for one in judged if one.counts] or judged
-    return float(np.median([one.shaped.peak / one.unshaped.peak for one in loud]))
+    loud = [row for row in judged if row["reduction_percent"] is not None] or judged
+    return float(np.median([row["shaped_peak_m_s2"] / row["unshaped_peak_m_s2"] for row in loud]))
 
 
 @app.function
 def delay(judged):
     """Median over the moves of the delay [ms]."""
-    return float(np.median([one.delay(one.shaped) for one in judged]))
+    return float(np.median([row["delay_ms"] for row in judged]))
 
 
 @app.cell(hide_code=True)
 def _(tried):
     _figure, (_panel,) = panels(1, 3.2)
-    _unshaped = [one.unshaped.peak for one in next(iter(tried.values()))]
+    _unshaped = [row["unshaped_peak_m_s2"] for row in next(iter(tried.values()))]
     _where = 1 + np.arange(len(_unshaped))
     _panel.bar(_where - 0.27, _unshaped, 0.25, color=UNSHAPED, label="unshaped")
     for (_name, _judged), _color, _beside in zip(tried.items(), (SHAPED, THIRD), (0.0, 0.27), strict=True):
-        _peaks = [one.shaped.peak for one in _judged]
+        _peaks = [row["shaped_peak_m_s2"] for row in _judged]
         _panel.bar(_where + _beside, _peaks, 0.25, color=_color, label=_name)
     _panel.set(xlabel="Move", ylabel="Largest acceleration\nafter it (m/s²)", xticks=_where)
     legend(_figure, _panel)

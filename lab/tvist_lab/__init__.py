@@ -1,1 +1,1 @@
-"""Experiments, written as clients: identification, the paper's experiment, metrics, figures, replays, benchmarks."""
+"""Experiments, written as clients: identification, the paper's experiment, metrics, figures, replays, speed."""

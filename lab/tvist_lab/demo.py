@@ -10,15 +10,15 @@ import numpy as np
 
 from tvist_lab.figures import FigureFiles
 from tvist_lab.metrics import NotMeasurableError
-from tvist_lab.paper.drawing import draw, overview
-from tvist_lab.paper.experiment import Experiment, judge, run, table_1
-from tvist_lab.paper.methods import TimeVarying, Unshaped
-from tvist_lab.paper.published import MOTIONS
-from tvist_lab.paper.report import as_dict
+from tvist_lab.paper_drawing import draw, overview
 from tvist_lab.recordings import Recording, RecordingError
 from tvist_lab.recordings.mcap_file import RecordingFile, read
 from tvist_lab.replay import replay_file
 from tvist_lab.served import served_robot
+from tvist_lab.studies.paper.experiment import Experiment, judge, run, table_1
+from tvist_lab.studies.paper.methods import TimeVarying, Unshaped
+from tvist_lab.studies.paper.published import MOTIONS
+from tvist_lab.studies.paper.report import as_dict
 
 ANSWERED = "Q1-Q3"
 """Motion of which the overview is drawn: on its way the arm's frequency doubles, and its vibration is seen to ring."""

@@ -1,14 +1,14 @@
 """Robots that move along curves, of which the wire has none yet."""
 
 import numpy as np
+from proof.search.draws import SHAPERS
+from proof.search.subject import Subject
 
 from tvist_controller.collision import CollisionModel
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
-from tvist_lab.safety.draws import SHAPERS
-from tvist_lab.safety.subject import Subject
 from tvist_protocol import commands as c
 
 from .curves import random_arc, tool_circle

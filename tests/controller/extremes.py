@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from proof.search.draws import postures
+from proof.search.subject import RigidArm
 
 from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.collision import CollisionModel
@@ -11,8 +13,6 @@ from tvist_controller.control.differentiator import central_differences
 from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.controller import Controller
 from tvist_controller.setup import Setup, body, paper_payload
-from tvist_lab.safety.draws import postures
-from tvist_lab.safety.subject import RigidArm
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from proof.search.subject import Subject
 
 from tvist_controller.setup import paper_payload
-from tvist_lab.safety.subject import Subject
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetTcp
 from tvist_protocol.motions import MovePath

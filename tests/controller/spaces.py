@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from proof.search.subject import Subject
 from scipy.spatial.transform import Rotation, Slerp
 
 from tvist_controller.setup import paper_payload
-from tvist_lab.safety.subject import Subject
 from tvist_plant.description import Payload
 from tvist_plant.model import FLANGE, rigid_model
 from tvist_protocol.io import SetTcp

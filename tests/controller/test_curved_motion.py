@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from proof.search.draws import SHAPERS
+from proof.search.subject import Subject, torques
 
 from tvist_controller.trajectory import Bends, JointLine, MotionLimits, quickest_motion
-from tvist_lab.safety.draws import SHAPERS
-from tvist_lab.safety.subject import Subject, torques
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done
 

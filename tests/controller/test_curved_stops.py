@@ -2,6 +2,11 @@
 
 import numpy as np
 import pytest
+from proof.search import draws, sequences
+from proof.search.draws import SHAPERS
+from proof.search.sequences import Sequence
+from proof.search.stops import KINDS, PAUSES
+from proof.search.subject import Subject, torques
 
 from tvist_controller.ahead import resting_after
 from tvist_controller.collision import CollisionModel
@@ -9,11 +14,6 @@ from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
-from tvist_lab.safety import draws, sequences
-from tvist_lab.safety.draws import SHAPERS
-from tvist_lab.safety.sequences import Sequence
-from tvist_lab.safety.stops import KINDS, PAUSES
-from tvist_lab.safety.subject import Subject, torques
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
 from tvist_protocol import values

@@ -19,7 +19,7 @@ SHAPERS = ("none", "zv", "zvd", "ei")
 LIMITS = UR5E.limits
 WAITS = (0, 1, 2, 5, 20, 60, 200)
 VELOCITY, ACCELERATION = 1.003, 1.01
-"""Largest shaped velocity and acceleration as shares of the joints' limits, as in `tvist search`."""
+"""Largest shaped velocity and acceleration as shares of the joints' limits, as in `python -m proof search`."""
 
 
 class Sequence:

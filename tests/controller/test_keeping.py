@@ -8,7 +8,7 @@ from tvist_controller.calibrations import load
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.keeping import keeping_motion, shaped_ahead
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
-from tvist_lab.evaluation.moves import draw_moves
+from tvist_lab.study.moves import draw_moves
 
 INDUSTRIAL = MotionLimits(3.0, 8.0, 2000.0)
 

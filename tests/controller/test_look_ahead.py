@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from proof.search import changes, streams
 
 from tvist_controller.about import info_of
 from tvist_controller.ahead import MAX_AHEAD, resting_after
@@ -11,7 +12,6 @@ from tvist_controller.collision import CLEARANCE, CollisionModel
 from tvist_controller.cycle import STILL
 from tvist_controller.outlook import Outlook
 from tvist_controller.trajectory import StuckError
-from tvist_lab.safety import changes, streams
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
 from tvist_protocol.motions import SpeedL, StopL

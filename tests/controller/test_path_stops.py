@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from proof.search.draws import SHAPERS
+from proof.search.stops import KINDS, PAUSES
+from proof.search.subject import torques
 
 from tvist_controller.ahead import resting_after
 from tvist_controller.collision import CLEARANCE, CollisionModel
 from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import body
-from tvist_lab.safety.draws import SHAPERS
-from tvist_lab.safety.stops import KINDS, PAUSES
-from tvist_lab.safety.subject import torques
 from tvist_protocol import commands as c
 from tvist_protocol.commands import MoveJ, Pause, Resume, SetPayload, Stop
 from tvist_protocol.motions import LineSegment, MoveL, MovePath

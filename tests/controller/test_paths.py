@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from proof.search.draws import SHAPERS
+from proof.search.subject import Subject
 from scipy.spatial.transform import Rotation
 from tests.plant.arms import chain
 
 from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.setup import paper_payload
-from tvist_lab.safety.draws import SHAPERS
-from tvist_lab.safety.subject import Subject
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetTcp
 from tvist_protocol.motions import (

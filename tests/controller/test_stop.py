@@ -4,9 +4,9 @@ import re
 
 import numpy as np
 import pytest
+from proof.search.stops import draw, judge
 
 from tvist_controller.trajectory import JointLine, JointStop, MotionLimits, PathStop, quickest_motion
-from tvist_lab.safety.stops import draw, judge
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
 from tvist_protocol.simulation import SimulationInject, SimulationReset

@@ -142,7 +142,7 @@ def check_command(words):
     program, *arguments = words
     match program.removeprefix(".venv/bin/"):
         case "tvist" | "marimo" | "dask" as name:
-            verbs = list(itertools.takewhile(lambda word: not word.startswith(("-", "lab/")), arguments))
+            verbs = list(itertools.takewhile(lambda word: re.fullmatch(r"[a-z][\w-]*,?", word), arguments))
             words = None if name == "marimo" else 1 + (verbs[:1] in (["log"], ["study"]))
             verbs = [word.rstrip(",") for word in verbs][:words]
             unknown = {word for word in arguments if word.startswith("--")} - options(name, *verbs)

@@ -6,9 +6,9 @@ import numpy as np
 import ruckig
 
 from tvist_controller.trajectory import MotionLimits
-from tvist_lab.evaluation.line import PAPER
-from tvist_lab.evaluation.moves import WITH_WRISTS
 from tvist_lab.recordings import Floats
+from tvist_lab.study.line import PAPER
+from tvist_lab.study.moves import WITH_WRISTS
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter

@@ -8,9 +8,9 @@ from tests.conformance.served import finished
 
 from tvist_controller.calibrations import available
 from tvist_controller.calibrations import load as load_calibration
-from tvist_lab.arms.about import about
-from tvist_lab.arms.measure import sag_error
-from tvist_lab.arms.page import robots_page
+from tvist_lab.studies.arms.about import about
+from tvist_lab.studies.arms.measure import sag_error
+from tvist_lab.studies.arms.page import robots_page
 from tvist_plant.description import load, robots
 from tvist_plant.fingerprint import fingerprint
 

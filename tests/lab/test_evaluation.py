@@ -11,18 +11,23 @@ from tvist_controller.collision import CollisionModel
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import body, paper_payload
-from tvist_lab.evaluation.baselines import EQUAL_DURATION, baselines
-from tvist_lab.evaluation.evaluate import WORTH, JudgedMove, Made, MoveJob, evaluate, interval, judge, report
-from tvist_lab.evaluation.line import (
+from tvist_lab.studies.evaluate import MEASURED, interval, methods, report
+from tvist_lab.study.case import Case
+from tvist_lab.study.catalogue import baselines
+from tvist_lab.study.engine import made
+from tvist_lab.study.line import (
     PAPER,
     ControlLine,
     lengthened,
     point_to_point,
     round_a_corner,
-    shape,
 )
-from tvist_lab.evaluation.moves import Move, MovesError, draw_moves, is_free, read_moves, write_moves
-from tvist_lab.evaluation.recipes import Mistaken, Recipe, RecipeError
+from tvist_lab.study.measures import WORTH
+from tvist_lab.study.method import Named, Task
+from tvist_lab.study.moves import Move, MovesError, draw_moves, is_free, read_moves, write_moves
+from tvist_lab.study.recipes import Mistaken, Recipe, RecipeError
+from tvist_lab.study.shaping import Running, shape
+from tvist_lab.study.work import Job, measure
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD
@@ -54,6 +59,15 @@ def written(tmp_path, ur5e):
         return read_moves(path, ur5e, lambda: 5.0)
 
     return read
+
+
+class Short:
+    """A shaper that does not go all the way."""
+
+    delay = 0.0
+
+    def step(self, q):
+        return 0.999 * q
 
 
 HOME = [0.0, -1.0, 1.0, -1.0, 0.0, 0.0]
@@ -155,10 +169,10 @@ class TestLine:
         tvist = recipe.make(ur5e, 5.0)
         tvist.reset(start)
         reference = point_to_point(start, target)
-        shaped, ended = shape(tvist.filter, reference)
-        assert ended
+        shaped = shape(Running(tvist), reference, watched=False)
+        assert shaped.ended
         line = ControlLine(ur5e, start, carried)
-        recording = line.follow(reference, shaped).simulate(FlexibleArm(ur5e, carried), 3)
+        recording = line.follow(reference, shaped.q).simulate(FlexibleArm(ur5e, carried), 3)
         np.testing.assert_array_equal(recording["truth_tool_acceleration"][4 : 4 + len(felt)], felt)
 
     def test_a_longer_double_S_takes_the_time_it_is_told(self, move):
@@ -176,7 +190,7 @@ class TestLine:
 
     def test_a_reference_that_is_not_followed_to_the_end_is_said_not_to_end(self):
         reference = point_to_point(np.zeros(2), np.ones(2))
-        assert not shape(lambda q: 0.999 * q, reference)[1]
+        assert not shape(Short(), reference, watched=False).ended
 
 
 class TestRecipes:
@@ -196,16 +210,23 @@ class TestRecipes:
             Recipe("zz", paper).make(ur5e, 5.0)
 
 
-class TestReport:
-    @staticmethod
-    def judged(unshaped, shaped):
-        before = Made(unshaped, 1.0, 1.2, 1.4, 1.0, 0.9, unshaped)
-        return JudgedMove(before, Made(shaped, 1.1, None, None, 1.01, 1.0, 0.5 * unshaped))
+def judged(unshaped, shaped):
+    """Rows of a move by a shaper and by waiting, by the peaks that they leave."""
+    counts = unshaped >= WORTH
+    row = {
+        "shaper": "zv", "payload_kg": 5.0, "unshaped_peak_m_s2": unshaped, "shaped_peak_m_s2": shaped,
+        "reduction_percent": 100.0 * (1.0 - shaped / unshaped) if counts else None,
+        "less_than_waiting_percent": 0.0 if counts else None, "delay_ms": 100.0, "unshaped_still_after_ms": 1200.0,
+        "shaped_still_after_ms": None, "still_after_unshaped_stop_ms": None, "quiet_after_unshaped_stop_ms": None,
+        "peak_acceleration_ratio": 1.01, "peak_velocity_ratio": 1.0,
+    }  # fmt: skip
+    return row, row | {"shaper": "waiting"}
 
-    def test_percentages_leave_out_what_did_not_vibrate_and_list_it(self, ur5e, paper, move):
+
+class TestReport:
+    def test_percentages_leave_out_what_did_not_vibrate_and_list_it(self):
         peaks = [(1.0, 0.1), (2.0, 0.5), (0.5 * WORTH, 0.1 * WORTH)]
-        judged = [self.judged(*pair) for pair in peaks]
-        told = report([MoveJob(ur5e, move, Recipe("zv", paper))] * 3, judged)
+        told = report([judged(*pair) for pair in peaks])
         assert [row["reduction_percent"] for row in told["moves"]] == [
             pytest.approx(90.0),
             pytest.approx(75.0),
@@ -219,8 +240,8 @@ class TestReport:
         assert told["never_still"] == 3
         assert told["peak_m_s2"] == pytest.approx({"median": 0.3, "p95": 0.48, "max": 0.5})
 
-    def test_nothing_but_moves_without_vibration_is_no_percentage(self, ur5e, paper, move):
-        told = report([MoveJob(ur5e, move, Recipe("zv", paper))], [self.judged(0.1, 0.05)])
+    def test_nothing_but_moves_without_vibration_is_no_percentage(self):
+        told = report([judged(0.1, 0.05)])
         assert told["reduction_percent"] == {"median": None, "p5": None, "min": None}
         assert told["reduction_percent_interval"] == {"median": None, "p5": None}
 
@@ -236,30 +257,29 @@ class TestMoves:
     @pytest.mark.slow
     def test_the_papers_motion_is_what_the_paper_page_says(self, ur5e, paper, move):
         recipe = Recipe("zv", paper)
-        job = MoveJob(ur5e, move, recipe, baselines(recipe, ur5e, (5.0, 5.0)))
-        one = judge(job)
-        assert one.counts
-        assert one.reduction(one.shaped) > 80.0
-        assert 28.0 <= one.delay(one.shaped) <= 38.0  # half a period at Q3, where the mode is at 15 Hz
-        assert set(one.baselines) == {
+        every = methods(Named(recipe, "zv"), baselines(recipe, ur5e, (5.0, 5.0)))
+        shaped, waiting, longer, *others = measure(Job(Case(ur5e, move), every, MEASURED))
+        assert shaped["reduction_percent"] > 80.0
+        assert 28.0 <= shaped["delay_ms"] <= 38.0  # half a period at Q3, where the mode is at 15 Hz
+        assert waiting["reduction_percent"] == waiting["delay_ms"] == 0.0
+        assert [longer["shaper"], *(row["shaper"] for row in others)] == [
             "equal_duration_double_s", "double_s_of_one_period", "zv_frozen_at_end", "mzv_for_payload",
             "ei_for_payload", "ei3_for_payload", "fixed_mzv", "fixed_ei2", "fixed_ei3",
-        }  # fmt: skip
-        longer = one.baselines[EQUAL_DURATION.name]
-        assert longer.duration == pytest.approx(one.shaped.duration, abs=1.5 * PERIOD)
-        assert longer.acceleration <= 1.0 + 1e-9
+        ]  # fmt: skip
+        assert longer["delay_ms"] == pytest.approx(shaped["delay_ms"], abs=1.5e3 * PERIOD)
+        assert longer["peak_acceleration_ratio"] <= 1.0 + 1e-9
 
     def test_baselines_for_frequencies_far_too_low_are_long_and_no_error(self, ur5e, paper, move):
-        recipe = Recipe("zv", paper, frequency_error=-0.9)
-        reference = point_to_point(np.array(move.start), np.array(move.target))
+        recipe, reference = Recipe("zv", paper, frequency_error=-0.9), Case(ur5e, move).point_to_point()
+        task = Task(ur5e, move, reference, as_served=True, ticks=len(reference) + 20)
         for baseline in baselines(recipe, ur5e, (5.0, 5.0)):
-            shaped = baseline.shaped(recipe, ur5e, move, reference, len(reference) + 20)
-            np.testing.assert_allclose(shaped[-1], move.target, atol=1e-9)
+            np.testing.assert_allclose(baseline.shaped(task).q[-1], move.target, atol=1e-9)
 
     @pytest.mark.slow
     def test_other_processes_give_the_same_figures(self, ur5e, paper):
+        zv = (Named(Recipe("zv", paper), "zv"),)
         jobs = [
-            MoveJob(ur5e, move, Recipe("zv", paper), seed=number)
-            for number, move in enumerate(draw_moves(ur5e, 9, 2, (5.0, 5.0)).moves)
+            Job(Case(ur5e, move, number), zv)
+            for number, move in enumerate(draw_moves(ur5e, 17, 2, (5.0, 5.0)).moves)
         ]
-        assert list(evaluate(jobs)) == [judge(job) for job in jobs]
+        assert list(made(jobs)) == [measure(job) for job in jobs]

@@ -10,7 +10,7 @@ import pytest
 
 from tvist_controller.api import load_calibration
 from tvist_lab.metrics import motions
-from tvist_lab.workspace_map import WorkspaceMap
+from tvist_lab.studies.workspace_map import WorkspaceMap
 from tvist_shaping import SHAPERS
 
 DOCS = Path(__file__).parents[2] / "docs"

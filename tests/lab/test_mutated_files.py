@@ -311,7 +311,7 @@ def _read_calibration(path):
 
 
 def _read_moves(path):
-    from tvist_lab.evaluation.moves import MovesError, read_moves
+    from tvist_lab.study.moves import MovesError, read_moves
     from tvist_plant.description import load
     from tvist_plant.user_file import UserFileError
 
@@ -337,7 +337,7 @@ def _read_state(path):
 
 
 def _read_sweep(path):
-    from tvist_lab.sweep.spec import read_spec
+    from tvist_lab.study.spec import read_spec
     from tvist_plant.user_file import UserFileError
 
     return read_spec, UserFileError

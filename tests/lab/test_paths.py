@@ -4,18 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from proof.search.subject import Subject
 from scipy.spatial.transform import Rotation
 
 from tvist_controller import calibrations
 from tvist_controller.setup import paper_payload
-from tvist_lab.evaluation.path_examples import circle, corner
-from tvist_lab.evaluation.path_report import COLUMNS, page, report, rows
-from tvist_lab.evaluation.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, planned, shaped
-from tvist_lab.evaluation.paths import PathJob, compare, draw
-from tvist_lab.evaluation.random_paths import KINDS, REGULAR
-from tvist_lab.evaluation.shaperbench import kinematics
-from tvist_lab.evaluation.tool_path import ToolPath, jacobian
-from tvist_lab.safety.subject import Subject
+from tvist_lab.studies.path_examples import circle, corner
+from tvist_lab.studies.path_report import COLUMNS, page_of, report, rows
+from tvist_lab.studies.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, planned, shaped
+from tvist_lab.studies.paths import PathJob, compare, draw
+from tvist_lab.studies.random_paths import KINDS, REGULAR
+from tvist_lab.studies.tool_path import ToolPath, jacobian
+from tvist_lab.study.measures import kinematics
 from tvist_plant.description import load
 from tvist_protocol.motions import MovePath
 from tvist_protocol.replies import Accepted
@@ -143,9 +143,9 @@ class TestComparison:
 
     def test_the_page_names_its_command(self, judged, ur5e, modal):
         told = {
-            "command": "tvist paths --random 2 --seed 5", "plant": "clean", "payload_kg": [0.0, 5.0],
+            "command": "tvist study paths --random 2 --seed 5", "plant": "clean", "payload_kg": [0.0, 5.0],
             "calibration": "ur5e_modal", "circle": circle(ur5e, modal), **report(judged),
         }  # fmt: skip
-        text = page(told)
-        assert "tvist paths --random 2 --seed 5" in text
+        text = page_of(told, told["command"])
+        assert "tvist study paths --random 2 --seed 5" in text
         assert "| auto | joint by joint |" in text

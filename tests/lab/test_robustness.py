@@ -1,16 +1,16 @@
 """Reduction on arms that differ from the calibration: right where nothing is wrong, and less where much is."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tvist_controller.calibrations import load as load_calibration
-from tvist_lab.evaluation.moves import Move
-from tvist_lab.evaluation.robustness import ERRORS, error_jobs, make, robustness_report, stiffer
-from tvist_lab.evaluation.robustness_page import robustness_page
-from tvist_lab.evaluation.standing import candidates
 from tvist_lab.figures import robustness_figure
+from tvist_lab.studies.pages import page
+from tvist_lab.studies.robustness import ERRORS, jobs, report, tables
+from tvist_lab.study.arms import stiffer
+from tvist_lab.study.catalogue import bench
+from tvist_lab.study.moves import Move
+from tvist_lab.study.work import measure
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm
 
@@ -22,13 +22,11 @@ def ur5e():
 
 @pytest.fixture(scope="module")
 def done(ur5e):
-    standing = candidates(
-        ur5e, load_calibration("ur5e_modal"), None, ["zv_3_modes_frozen_at_end", "elastic"]
-    )[1:]
+    methods = bench(ur5e, load_calibration("ur5e_modal"), None, ["zv_3_modes_frozen_at_end", "elastic"])[1:]
     start = np.array(ur5e.poses["Q1"])
     move = Move(tuple(start), tuple(start + np.array([0.3, 0.2, 0.3, 0.0, 0.0, 0.0])), 4.0)
-    jobs = [job for job in error_jobs(ur5e, standing, [move], 0) if abs(job.error) in {0.0, 0.3}]
-    return standing, jobs, [make(job) for job in jobs]
+    some = [job for job in jobs(ur5e, methods, [move], 0) if abs(job.case.axes["error"]) in {0.0, 0.3}]
+    return methods, [row for job in some for row in measure(job)]
 
 
 def test_stiffer_springs_raise_every_frequency(ur5e):
@@ -38,32 +36,31 @@ def test_stiffer_springs_raise_every_frequency(ur5e):
 
 
 def test_an_error_of_nothing_is_the_same_whatever_it_is_of_and_a_large_one_costs_reduction(done):
-    _, jobs, found = done
-    by_error = {(job.kind, job.error): one for job, one in zip(jobs, found, strict=True)}
-    assert by_error["stiffness", 0.0] == by_error["payload", 0.0]
-    right, soft = by_error["stiffness", 0.0].reduced, by_error["stiffness", -0.3].reduced
-    assert soft["elastic"].less < right["elastic"].less
-    for one in right.values():
-        assert one.beyond < one.less
-    assert right["elastic"].delay < right["zv_3_modes_frozen_at_end"].delay
+    methods, rows = done
+    entries = {one["name"]: one for one in report(methods, rows)}
+    for one in entries.values():
+        right = one["stiffness"]["+0 %"]
+        assert right == one["payload"]["+0 %"]
+        assert right["beyond_waiting_percent"]["median"] < right["reduction_percent"]["median"]
+    elastic = entries["elastic"]
+    less = [elastic["stiffness"][error]["reduction_percent"]["median"] for error in ("-30 %", "+0 %")]
+    assert less[0] < less[1]
+    assert elastic["delay_ms"] < entries["zv_3_modes_frozen_at_end"]["delay_ms"]
 
 
 def test_the_report_is_ordered_by_delay_and_names_what_does_not_count(done):
-    standing, jobs, found = done
-    rows = robustness_report(standing, jobs, found)
-    assert [row["name"] for row in rows] == ["elastic", "zv_3_modes_frozen_at_end"]
-    assert rows[0]["stiffness"]["-30 %"]["moves"] == 1
-    assert rows[0]["stiffness"]["+5 %"] == {
+    methods, rows = done
+    entries = report(methods, rows)
+    assert [one["name"] for one in entries] == ["elastic", "zv_3_modes_frozen_at_end"]
+    assert entries[0]["stiffness"]["-30 %"]["moves"] == 1
+    assert entries[0]["stiffness"]["+5 %"] == {
         "moves": 0,
         "reduction_percent": {"median": None, "p5": None},
         "beyond_waiting_percent": {"median": None, "p5": None},
     }
-    quiet = [replace(one, unshaped=0.1) for one in found]
-    assert robustness_report(standing, jobs, quiet)[0]["payload"]["+0 %"]["moves"] == 0
-    about = {"command": "tvist robustness", "moves": 1, "seed": 0, "shapers": rows}
-    assert all(
-        f"{100 * error:+.0f} %" in robustness_page(about, "a command")
-        for errors in ERRORS.values()
-        for error in errors
-    )
-    assert len(robustness_figure(rows).axes) == len(ERRORS)
+    quiet = [row | {"unshaped_peak_m_s2": 0.1} for row in rows]
+    assert report(methods, quiet)[0]["payload"]["+0 %"]["moves"] == 0
+    about = {"moves": 1, "seed": 0, "shapers": entries}
+    written = page("robustness", about, "a command", tables=tables())
+    assert all(f"{100 * error:+.0f} %" in written for errors in ERRORS.values() for error in errors)
+    assert len(robustness_figure(entries).axes) == len(ERRORS)

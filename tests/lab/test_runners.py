@@ -7,12 +7,15 @@ from pathlib import Path
 import pytest
 from tests.lab.runner_work import OddError, die, die_once, function_of, square, square_or_raise
 
-from tvist_lab.evaluation.evaluate import MoveJob, evaluate, judge
-from tvist_lab.evaluation.moves import draw_moves
-from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.runners import Failed, Processes, TaskError, in_order
 from tvist_lab.runners.cluster import Cluster
 from tvist_lab.runners.parcels import do, pack, unpack
+from tvist_lab.study.case import Case
+from tvist_lab.study.engine import made
+from tvist_lab.study.method import Named
+from tvist_lab.study.moves import draw_moves
+from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.work import Job, measure
 from tvist_plant.description import load
 
 ROOT = str(Path(__file__).parents[2])
@@ -40,8 +43,9 @@ class TestOrder:
     def test_evaluations_do_not_depend_on_what_runs_them(self):
         ur5e = load("ur5e")
         moves = draw_moves(ur5e, 2, 1, (0.0, 5.0)).moves
-        jobs = [MoveJob(ur5e, move, Recipe("none", None), seed=seed) for seed, move in enumerate(moves)]
-        assert list(evaluate(jobs, Backwards())) == [judge(job) for job in jobs]
+        none = (Named(Recipe("none", None), "none"),)
+        jobs = [Job(Case(ur5e, move, seed), none) for seed, move in enumerate(moves)]
+        assert list(made(jobs, Backwards())) == [measure(job) for job in jobs]
 
 
 class TestParcels:

@@ -11,22 +11,24 @@ import numpy as np
 import pytest
 
 from tvist_controller.calibrations import load as load_calibration
-from tvist_lab.evaluation.arms import ARMS
-from tvist_lab.evaluation.candidates import Candidate, Named, Task
-from tvist_lab.evaluation.causality import check_causal
-from tvist_lab.evaluation.curves import bends, path_error
-from tvist_lab.evaluation.foreign import CandidateError, FromFile, load_shaper
-from tvist_lab.evaluation.leaderboard import leaderboard
-from tvist_lab.evaluation.line import PAPER, ControlLine, point_to_point
-from tvist_lab.evaluation.markdown import page
-from tvist_lab.evaluation.moves import Move
-from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.running import run
-from tvist_lab.evaluation.shaperbench import BenchJob, draw, inspect, jobs, judge
-from tvist_lab.evaluation.sound import ShaperFaultError
-from tvist_lab.evaluation.standing import candidates
 from tvist_lab.metrics import best_tool_acceleration
 from tvist_lab.mujoco_arm import MujocoArm
+from tvist_lab.studies.bench_tables import ON_PAGE, best_in_bold, ranked
+from tvist_lab.studies.curves import bends, path_error
+from tvist_lab.studies.leaderboard import leaderboard
+from tvist_lab.studies.pages import page
+from tvist_lab.studies.shaperbench import MEASURED, draw, inspect, jobs
+from tvist_lab.study.arms import ARMS
+from tvist_lab.study.case import Case
+from tvist_lab.study.catalogue import ROWS, bench, names
+from tvist_lab.study.causality import check_causal
+from tvist_lab.study.foreign import CandidateError, FromFile, load_shaper
+from tvist_lab.study.line import PAPER, ControlLine, point_to_point
+from tvist_lab.study.method import Named, Stepping, Task
+from tvist_lab.study.moves import Move
+from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.shaping import ShaperFaultError, shape
+from tvist_lab.study.work import Job, measure, measure_each
 from tvist_plant.description import load
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
@@ -253,12 +255,12 @@ class TestDishonesty:
             own(text).shaped(task)
 
     def test_our_own_are_honest(self, ur5e, calibration, task):
-        for candidate in candidates(ur5e, calibration, None, None):
+        for candidate in bench(ur5e, calibration, None, None):
             assert inspect(candidate, ur5e, [task.move]) is None, candidate.name
             candidate.shaped(task)
 
     def test_who_is_told_the_target_is_said_and_may_know_nothing_else(self, ur5e, calibration, task):
-        told = {one.name for one in candidates(ur5e, calibration, None, None) if one.told_target}
+        told = {one.name for one in bench(ur5e, calibration, None, None) if one.told_target}
         frozen = {"zv_frozen_at_end", "zv_3_modes_frozen_at_end"}
         assert told == {"auto-target", *frozen, "double_s_as_zv", "double_s_as_auto"}
 
@@ -274,16 +276,19 @@ class TestDishonesty:
 class TestElastic:
     def test_the_drives_get_the_stage_with_its_tick_on_every_arm(self, ur5e, calibration, task):
         class Bare(Named):
-            elastic = Candidate.elastic
+            elastic = Stepping.elastic
 
-        recipe = Recipe("elastic", calibration)
-        job = BenchJob(ur5e, Named(recipe, "elastic", ""), task.move, 0.0, 0, (0, 7))
-        whole = judge(job)
-        bare = judge(replace(job, candidate=Bare(recipe, "elastic", "")))
-        assert whole.delay == pytest.approx(bare.delay + PERIOD)
-        for ours, theirs in zip(whole.scores, bare.scores, strict=True):
-            assert ours.residual < 0.5 * theirs.residual
-        assert judge(replace(job, arms=(7,))).scores == whole.scores[1:]  # nothing stays of the arm before
+        def made(kind, *arms):
+            case = Case(ur5e, task.move, arms=tuple(ARMS[place] for place in arms))
+            method = kind(Recipe("elastic", calibration), "elastic", "")
+            rows = measure(Job(case, (method,), MEASURED, as_served=False))
+            return [row | {"cost_us": None} for row in rows]
+
+        whole = made(Named, 0, 7)
+        for ours, theirs in zip(whole, made(Bare, 0, 7), strict=True):
+            assert ours["declared_delay_ms"] == pytest.approx(theirs["declared_delay_ms"] + 1e3 * PERIOD)
+            assert ours["residual_m_s2"] < 0.5 * theirs["residual_m_s2"]
+        assert made(Named, 7) == whole[1:]  # nothing stays of the arm before
 
 
 class TestOwn:
@@ -297,7 +302,7 @@ class TestOwn:
             assert stepper.delay == there.delay
 
     def test_the_held_product_keeps_the_limits_and_its_mean_delay(self, ur5e, calibration):
-        (product,) = (one for one in candidates(ur5e, calibration, None, None) if one.name == "product")
+        (product,) = (one for one in bench(ur5e, calibration, None, None) if one.name == "product")
         for move in draw(ur5e, 3, 5):
             reference = point_to_point(np.array(move.start), np.array(move.target))
             # With a tenth more declared than is rated: the most that the bench does.
@@ -306,6 +311,13 @@ class TestOwn:
             assert qd <= (1.0 + 1e-6) * PAPER.velocity
             assert qdd <= 1.005 * PAPER.acceleration
             assert 0.08 < shaped.delay < 0.15
+
+    def test_a_shaper_of_the_library_without_a_row_stands_in_the_menus_of_shapers(self, monkeypatch):
+        monkeypatch.setattr("tvist_lab.study.catalogue.ROWS", tuple(row for row in ROWS if row.name != "zvd"))
+        assert [menu for menu in ("bench", "paths", "lesson", "baselines") if "zvd" in names(menu)] == [
+            "bench", "paths", "lesson"
+        ]  # fmt: skip
+        assert len({row.name for row in ROWS}) == len(ROWS)
 
 
 def imperfect(description, **imperfections):
@@ -402,33 +414,36 @@ class TestScores:
             def step(self, q):
                 return q
 
-        shaped = run(Passes(), task.reference)
+        shaped = shape(Passes(), task.reference, watched=True)
         assert shaped.delay == 0.0
 
     @pytest.mark.slow
     def test_a_leaderboard_ranks_and_says_why_it_does_not(self, ur5e, calibration, own):
         candidate = own("def step(q_ref, info):\n    return q_ref[:5]")
-        standing = [*candidates(ur5e, calibration, None, ["zv", "double_s_as_zv"]), candidate]
+        standing = [*bench(ur5e, calibration, None, ["zv", "double_s_as_zv"]), candidate]
         moves = draw(ur5e, 1, 0)
-        todo = [replace(job, arms=(0,)) for job in jobs(ur5e, standing, moves, 0, quick=True)]
-        done = [judge(job) for job in todo]
-        board = leaderboard(standing, [None] * len(standing), todo, done, [])
-        ranked = {row["name"]: row for row in board["shapers"]}
+        todo = [
+            replace(job, case=replace(job.case, arms=ARMS[:1]))
+            for job in jobs(ur5e, standing, moves, 0, quick=True)
+        ]
+        done = [row for job in todo for row in measure_each(job)]
+        board = leaderboard(standing, [None] * len(standing), done, [])
+        found = {row["name"]: row for row in board["shapers"]}
         assert [row["ranked"] for row in board["shapers"]] == [True, True, True, False]
-        assert "tick 0" in ranked["file"]["fault"]
-        assert ranked["none"]["reduction_percent"]["median"] in {None, 0.0}
-        assert ranked["zv"]["residual_m_s2"]["median"] < ranked["none"]["residual_m_s2"]["median"]
+        assert "tick 0" in found["file"]["fault"]
+        assert found["none"]["reduction_percent"]["median"] in {None, 0.0}
+        assert found["zv"]["residual_m_s2"]["median"] < found["none"]["residual_m_s2"]["median"]
         assert [row["place"] for row in board["shapers"][:3]] == [1, 2, 3]
         assert any(row["pareto"] for row in board["shapers"][:3])
         about = {
-            "command": "",
             "date": "2026-11-23",
             "moves": 1,
             "seed": 0,
             "calibration": "",
             "arms": {ARMS[0].name: ARMS[0].label},
         }
-        written = page(about | board, "a command")
+        more = {"ranked": ranked(board), "columns": ON_PAGE, "best_in_bold": best_in_bold}
+        written = page("shaperbench", about | board, "a command", **more)
         assert all(row["name"] in written for row in board["shapers"])
         assert "Measured on 2026-11-23" in written
 
@@ -436,12 +451,12 @@ class TestScores:
         reference = Path(__file__).parents[2] / "docs" / "reference"
         published = json.loads((reference / "leaderboard.json").read_text(encoding="utf-8"))
         _, first, *_ = (reference / "shaperbench.md").read_text(encoding="utf-8").split("\n\n")
-        now = [one.name for one in candidates(ur5e, calibration, None, None)] + [arm.name for arm in ARMS]
+        now = [one.name for one in bench(ur5e, calibration, None, None)] + [arm.name for arm in ARMS]
         there = [row["name"] for row in published["shapers"]] + list(published["arms"])
         assert first.startswith("Measured on 20")
         assert set(re.findall(r"`(\w+(?:-\w+)*)`", first)) == set(now) - set(there)
 
     def test_curved_paths_are_run_by_all_that_shape_references(self, ur5e, calibration):
-        standing = candidates(ur5e, calibration, None, ["zv", "double_s_as_zv"])
+        standing = bench(ur5e, calibration, None, ["zv", "double_s_as_zv"])
         moves = draw(ur5e, 2, 0)
-        assert {job.candidate.name for job in bends(ur5e, standing, moves)} == {"none", "zv"}
+        assert {job.method.name for job in bends(ur5e, standing, moves)} == {"none", "zv"}

@@ -11,19 +11,23 @@ import pytest
 from polars.testing import assert_frame_equal
 
 from tvist_controller import calibrations
-from tvist_lab.evaluation.conditions import Conditions
-from tvist_lab.evaluation.evaluate import MoveJob, arm_seed, judge
-from tvist_lab.evaluation.moves import draw_moves
-from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.runners import Failed, TaskError
+from tvist_lab.figures import study_figure
+from tvist_lab.runners import Failed, Processes, TaskError
 from tvist_lab.runners.cluster import Cluster
-from tvist_lab.sweep.columns import COLUMNS, SCHEMA, frame
-from tvist_lab.sweep.spec import Spec, SpecError, read_spec
-from tvist_lab.sweep.store import Store, StoreError
-from tvist_lab.sweep.study import Effort, run
-from tvist_lab.sweep.summary import setting_name, summary
-from tvist_lab.sweep.tasks import SweepTasks, SweptRobot
-from tvist_lab.sweep.work import TaskRows, failed, measure
+from tvist_lab.study.arms import scattered
+from tvist_lab.study.axes import Axes, SweptRobot
+from tvist_lab.study.case import Case, arm_seed
+from tvist_lab.study.columns import COLUMNS, SCHEMA, frame
+from tvist_lab.study.engine import Done, Effort
+from tvist_lab.study.engine import run as run_plan
+from tvist_lab.study.method import Named
+from tvist_lab.study.moves import draw_moves
+from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.spec import Spec, SpecError, read_spec
+from tvist_lab.study.store import Store, StoreError
+from tvist_lab.study.study import StudyError, read_study
+from tvist_lab.study.summary import setting_name, summary
+from tvist_lab.study.work import Job, failed, measure, measure_each
 from tvist_plant.description import load
 
 SPEC = """
@@ -41,7 +45,7 @@ def tasks_of(folder, text=SPEC):
     path.write_text(text, encoding="utf-8")
     spec, ur5e = read_spec(path), load("ur5e")
     known = calibrations.load("ur5e_5kg")
-    return SweepTasks(spec, [SweptRobot("ur5e", ur5e, tuple(Recipe(name, known) for name in spec.shapers))])
+    return Axes(spec, [SweptRobot("ur5e", ur5e, tuple(Recipe(name, known) for name in spec.shapers))])
 
 
 class Quick:
@@ -60,15 +64,19 @@ class Quick:
         for count, place in enumerate(self.order(range(len(tasks)))):
             if count == self.stop:
                 raise KeyboardInterrupt
-            task = tasks[place]
-            self.asked.append(task.position)
-            if task.position in self.fail:
+            position = tasks.places[place]
+            self.asked.append(position)
+            if position in self.fail:
                 yield place, Failed(TaskError("it cannot be pickled: a lock"))
             else:
-                rows = failed(task, "measured", "")
-                for row in rows:
-                    row |= {"error": None, "delay_ms": 0.1 * row["row"], "reduction_percent": 50.0}
-                yield place, TaskRows(tuple(rows), "a", 0.0, 1.0)
+                rows = failed(tasks[place], "measured", "")
+                for number, row in enumerate(rows, position * len(rows)):
+                    row |= {"error": None, "delay_ms": 0.1 * number, "reduction_percent": 50.0}
+                yield place, Done(rows, "a", 0.0, 1.0)
+
+
+def run(axes, *others):
+    return run_plan(axes.plan(), *others)
 
 
 def quietly(_):
@@ -125,39 +133,36 @@ class TestTasks:
         task = tasks[11]
         ur5e = load("ur5e")
         move = draw_moves(ur5e, 3, 4, (0.0, ur5e.limits.payload)).moves[2]
-        assert (task.payload, task.mistakes.stiffness, task.number, task.move) == ("uniform", 15.0, 3, move)
-        none, zv = measure(task).rows
+        said = [task.case.axes[name] for name in ("payload", "stiffness_error_percent", "move")]
+        assert (*said, task.case.move) == ("uniform", 15.0, 3, move)
+        none, zv = measure_each(task)
         recipe = Recipe("zv", calibrations.load("ur5e_5kg"), frequency_error=-0.05)
-        conditions = Conditions(payload_error=0.2, stiffness_error=0.15)
-        one = judge(MoveJob(ur5e, move, recipe, seed=arm_seed(4, 2), conditions=conditions))
-        assert zv["unshaped_peak_m_s2"] == none["shaped_peak_m_s2"] == one.unshaped.peak
-        assert zv["shaped_peak_m_s2"] == one.shaped.peak
-        assert zv["delay_ms"] == one.delay(one.shaped)
-        assert zv["peak_acceleration_ratio"] == one.shaped.acceleration
-        assert zv["reduction_percent"] == (one.reduction(one.shaped) if one.counts else None)
-        assert (none["row"], zv["row"]) == (22, 23)
+        case = Case(ur5e, move, arm_seed(4, 2), (scattered(0.15),), payload_error=0.2)
+        (one,) = measure(Job(case, (Named(recipe, "zv"),)))
+        assert {name: zv[name] for name in one} == one
+        assert zv["unshaped_peak_m_s2"] == none["shaped_peak_m_s2"]
 
     def test_a_position_has_the_same_bits_whatever_was_done_before(self, tmp_path, tasks):
         again = tasks_of(tmp_path)
-        later = [measure(again[place]).rows for place in (5, 2)]
-        assert [measure(tasks[place]).rows for place in (2, 5)] == later[::-1]
+        later = [measure_each(again[place]) for place in (5, 2)]
+        assert [measure_each(tasks[place]) for place in (2, 5)] == later[::-1]
 
     def test_moves_and_arms_are_the_same_for_all_payloads_and_errors(self, tasks):
         same = [tasks[place] for place in range(1, len(tasks), 3)]
-        assert len({(task.move.start, task.move.target, task.seed) for task in same}) == 1
-        assert [task.payload for task in same] == ["1.5", "1.5", "uniform", "uniform"]
+        assert len({(one.case.move.start, one.case.move.target, one.case.seed) for one in same}) == 1
+        assert [one.case.axes["payload"] for one in same] == ["1.5", "1.5", "uniform", "uniform"]
 
     def test_a_shaper_that_fails_costs_its_own_row(self, tasks):
         task = tasks[0]
         broken = Recipe("zv", None)
-        none, zv = measure(replace(task, recipes=(task.recipes[0], broken))).rows
+        none, zv = measure_each(replace(task, methods=(task.methods[0], Named(broken, "zv"))))
         assert (none["status"], none.get("error")) == ("measured", None)
         assert zv["status"] == "failed"
         assert "needs a calibration" in zv["error"]
 
     def test_a_move_for_which_the_drives_are_too_weak_says_so(self, tmp_path):
         text = SPEC.replace("1.5", "60").replace("moves = 3", "moves = 1") + "limits = 'industrial'"
-        rows = measure(tasks_of(tmp_path, text)[0]).rows
+        rows = measure_each(tasks_of(tmp_path, text)[0])
         assert {row["status"] for row in rows} == {"too weak"}
         assert all("of a drive's torque" in row["error"] for row in rows)
 
@@ -177,7 +182,7 @@ class TestResuming:
         assert_frame_equal(pl.read_parquet(tmp_path / "x" / "sweep.parquet"), whole)
 
     def test_a_part_at_each_so_many_tasks_survives_a_kill(self, tmp_path, tasks, whole, monkeypatch):
-        monkeypatch.setattr("tvist_lab.sweep.study.PART", 2)
+        monkeypatch.setattr("tvist_lab.study.engine.PART", 2)
         with pytest.raises(KeyboardInterrupt):
             run(tasks, tmp_path / "x", Quick(stop=7), quietly)
         (tmp_path / "x" / "parts" / "000004.parquet").unlink()  # written because it was no kill
@@ -218,7 +223,7 @@ class TestResuming:
         robot = tasks.robots[0]
         other = SweptRobot(robot.name, robot.description.clean(), robot.recipes)
         with pytest.raises(StoreError, match="other contents of robots"):
-            run(SweepTasks(tasks.spec, [other]), tmp_path / "whole", Quick(), quietly)
+            run(Axes(tasks.spec, [other]), tmp_path / "whole", Quick(), quietly)
 
 
 class TestFolder:
@@ -231,21 +236,21 @@ class TestFolder:
 
     def test_two_sweeps_cannot_write_one_folder(self, tmp_path):
         with (
-            Store(tmp_path / "x", {}),
-            pytest.raises(StoreError, match=r"another tvist sweep is writing .*x"),
+            Store(tmp_path / "x", {}, SCHEMA),
+            pytest.raises(StoreError, match=r"another study is writing .*x"),
         ):
-            Store(tmp_path / "x", {})
-        with Store(tmp_path / "x", {}) as store:
+            Store(tmp_path / "x", {}, SCHEMA)
+        with Store(tmp_path / "x", {}, SCHEMA) as store:
             assert store.rows().is_empty()
 
     def test_a_sweep_that_kept_nothing_does_not_reserve_its_folder(self, tmp_path):
-        with Store(tmp_path / "x", {"moves": 1}):
+        with Store(tmp_path / "x", {"moves": 1}, SCHEMA):
             pass
-        with Store(tmp_path / "x", {"moves": 2}) as store:
+        with Store(tmp_path / "x", {"moves": 2}, SCHEMA) as store:
             assert store.rows().is_empty()
 
     def test_a_full_disk_is_a_sentence_and_leaves_whole_files(self, tmp_path, tasks, whole, monkeypatch):
-        monkeypatch.setattr("tvist_lab.sweep.study.PART", 2)
+        monkeypatch.setattr("tvist_lab.study.engine.PART", 2)
         room = iter(range(4))  # manifest and three parts
 
         def fsync(_):
@@ -262,8 +267,8 @@ class TestFolder:
         assert_frame_equal(run(tasks, tmp_path / "x", Quick(), quietly).rows, whole)
 
     def test_a_damaged_part_is_named(self, tmp_path, tasks):
-        with Store(tmp_path / "x", {}) as store:
-            store.keep(failed(tasks[0], "failed", "x"))
+        with Store(tmp_path / "x", {}, SCHEMA) as store:
+            store.keep(frame(failed(tasks[0], "failed", "x"), SCHEMA))
             (tmp_path / "x" / "parts" / "000001.parquet").write_bytes(b"PAR1")
             with pytest.raises(
                 StoreError, match=r"000001\.parquet cannot be read as rows of a sweep: remove it"
@@ -275,7 +280,7 @@ class TestFigures:
     def test_the_overhead_is_what_workers_wait_between_their_tasks(self):
         effort = Effort()
         for worker, began, ended in (("a", 1.0, 2.0), ("b", 50.0, 53.0), ("a", 2.5, 3.5)):
-            effort.add(TaskRows((), worker, began, ended))
+            effort.add(Done((), worker, began, ended))
         assert (effort.tasks, effort.workers, effort.task_s) == (3, 2, 5.0)
         assert effort.overhead_percent == pytest.approx(10.0)
 
@@ -290,7 +295,7 @@ class TestFigures:
         assert names[3] == "ur5e, uniform, payload +20 %, stiffness ±15 %, frequency -5 %"
 
     def test_rows_that_measure_nothing_have_empty_cells(self, tasks):
-        found = frame(failed(tasks[0], "failed", "why"))
+        found = frame(failed(tasks[0], "failed", "why"), SCHEMA)
         assert found.schema == pl.Schema(SCHEMA)
         assert found["shaped_peak_m_s2"].to_list() == [None, None]
         (entry, _) = summary(found)
@@ -312,14 +317,52 @@ def test_the_page_has_an_example_and_names_every_key(tmp_path):
     assert sorted(keys) == sorted(Spec.__struct_fields__)
 
 
-class Locked(SweepTasks):
+def of_the_page():
+    """The study that the page shows."""
+    shown = re.findall(r"```python\n(.*?)```", HOW_TO.read_text(encoding="utf-8"), re.DOTALL)
+    return next(text for text in shown if "STUDY" in text)
+
+
+def test_the_study_of_the_page_is_made_kept_and_summarized(tmp_path):
+    text = of_the_page()
+    (tmp_path / "speeds.py").write_text(text.replace("20, seed", "1, seed"), encoding="utf-8")
+    study = read_study(tmp_path / "speeds.py")
+    ran = run_plan(study.plan(), tmp_path / "x", Processes(few=9), quietly)
+    assert run_plan(study.plan(), tmp_path / "x", Quick(), quietly).resumed == 3
+    entries = study.summary(ran.rows)
+    assert [(one["speed"], one["shaper"]) for one in entries] == [
+        (speed, name) for speed in (0.5, 1.0, 1.5) for name in ("zv", "auto")
+    ]
+    for one in entries:
+        assert one["shaped_peak_m_s2"]["median"] < one["unshaped_peak_m_s2"]["median"]
+    assert len(study_figure(entries, study.by, study.show).axes) == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("STUDY =", "study ="), "contains no STUDY"),
+        (('by=("speed",)', 'by=("pace",)'), "'pace': the axes are speed, move"),
+        (('"shaped_peak_m_s2")', '"peak")'), "'peak' is no measure"),
+        (('"zv", "auto"', '"zvv"'), "KeyError: 'zvv'"),
+    ],
+)
+def test_what_is_wrong_with_a_study_is_a_sentence(tmp_path, change, words):
+    text = of_the_page()
+    (tmp_path / "speeds.py").write_text(text.replace(*change), encoding="utf-8")
+    with pytest.raises(StudyError, match=words):
+        read_study(tmp_path / "speeds.py")
+
+
+class Locked(Axes):
     """Tasks of which one cannot be pickled, and one fails."""
 
     def __getitem__(self, position):
         task = super().__getitem__(position)
         if position == 1:
-            return replace(task, stream=threading.Lock())
-        return replace(task, move=replace(task.move, start=())) if position == 2 else task
+            return replace(task, as_served=threading.Lock())
+        short = replace(task.case, move=replace(task.case.move, start=()))
+        return replace(task, case=short) if position == 2 else task
 
 
 @pytest.mark.slow
@@ -332,4 +375,5 @@ def test_a_task_that_cannot_be_pickled_and_one_that_fails_name_their_moves_and_t
     assert bad["error"][2].startswith(("ValueError", "IndexError"))
     good = run(tasks, tmp_path / "x", Cluster(processes=2), quietly)
     assert good.resumed == 2
-    assert_frame_equal(good.rows, frame([row for task in tasks for row in measure(task).rows]))
+    rows = [{"row": place} | row for place, task in enumerate(tasks) for row in measure_each(task)]
+    assert_frame_equal(good.rows, frame(rows, SCHEMA))

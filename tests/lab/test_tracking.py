@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from proof.search.subject import RigidArm
 
-from tvist_lab.safety.subject import RigidArm
-from tvist_lab.tracking.following import BEFORE, LOOKAHEAD, TrackingError, follow
-from tvist_lab.tracking.report import columns, page, report, rows
-from tvist_lab.tracking.study import UNSHAPED, Tracked, TrackingJob, compare, refusal, speed_at, track
-from tvist_lab.tracking.ways import CONSTANT, RAMP, WAYS, jump, level_end, ramp, turn
+from tvist_lab.studies.tracking.following import BEFORE, LOOKAHEAD, TrackingError, follow
+from tvist_lab.studies.tracking.report import columns, page_of, report, rows
+from tvist_lab.studies.tracking.study import UNSHAPED, Tracked, TrackingJob, compare, refusal, speed_at, track
+from tvist_lab.studies.tracking.ways import CONSTANT, RAMP, WAYS, jump, level_end, ramp, turn
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 
@@ -152,7 +152,7 @@ class TestReport:
             for speed in (1.0, 2.0)
         ]
         result = {
-            "command": "tvist tracking --shapers zv --speeds 1 2", "payload_kg": 0.0, "tolerance_rad": 0.2,
+            "command": "tvist study tracking --shapers zv --speeds 1 2", "payload_kg": 0.0, "tolerance_rad": 0.2,
             "speeds_rad_s": [1.0, 2.0], "lookahead_s": 0.03, "gain": 2000.0, "step_s": PERIOD,
             "refused": {"um_zv": "zeta_max is too large"}, "shapers": report(made, 0.2),
         }  # fmt: skip
@@ -163,8 +163,8 @@ class TestReport:
         ]
         assert found["ramp"][1] == ["zv", "0.0", "34.0", "0.120", "**0.240**", "1.67 rad/s"]
         assert {len(row) for row in found["ramp"]} == {len(columns(result, "ramp"))}
-        text = page(result)
-        assert "tvist tracking --shapers zv --speeds 1 2" in text
+        text = page_of(result)
+        assert "tvist study tracking --shapers zv --speeds 1 2" in text
         assert "`um_zv`: zeta_max is too large" in text
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tvist_controller.api import ControlCycle, body, load_calibration, paper_payload
-from tvist_lab.evaluation.line import PAPER, REST, ControlLine, point_to_point, shape
-from tvist_lab.evaluation.moves import draw_moves
-from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.sound import Sound
+from tvist_lab.study.line import PAPER, REST, ControlLine, point_to_point
+from tvist_lab.study.moves import draw_moves
+from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.shaping import Running, shape
 from tvist_plant.description import load
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
@@ -49,10 +49,10 @@ def in_one_go(description, recipe, move, seed):
     tvist.reset(start)
     for _ in range(RESTING):  # some filters go on at rest
         tvist.filter(start)
-    shaped, ended = shape(Sound(tvist), reference)
-    assert ended
+    shaped = shape(Running(tvist), reference, watched=False)
+    assert shaped.ended
     line, arm = ControlLine(description, start, carried), FlexibleArm(description, carried)
-    following = line.follow(reference, shaped, elastic=recipe.elastic(description, tvist))
+    following = line.follow(reference, shaped.q, elastic=recipe.elastic(description, tvist))
     return following.simulate(arm, seed)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_lab.evaluation.moves import MovesError, draw_moves
+from tvist_lab.study.moves import MovesError, draw_moves
 from tvist_lab.workspace import WORKSPACE, identified, ranges, workspace
 from tvist_plant.description import load
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.api import body, estimator_of, load_calibration, paper_payload
-from tvist_lab.workspace_map import QUANTITIES, MapError, workspace_map
+from tvist_lab.studies.workspace_map import QUANTITIES, MapError, workspace_map
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_shaping import SHAPERS

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from tvist_lab.in_process import free_setup, robot_in_process
-from tvist_lab.paper.experiment import Experiment, experiment
+from tvist_lab.studies.paper.experiment import Experiment, experiment
 
 
 def run(runs: int, seed: int, *, baselines: bool) -> Experiment:

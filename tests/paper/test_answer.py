@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 from tests.docs.test_docs import check_command
 
-from tvist_lab.paper.answer import answer, checks, terms
+from tvist_lab.studies.paper.answer import answer, checks, terms
 
 
 def method(peak, still, delay=0.0):

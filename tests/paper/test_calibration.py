@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.calibrations import estimator_of, fits, load
-from tvist_lab.paper.published import published
+from tvist_lab.studies.paper.published import published
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_server.config import ServeConfig

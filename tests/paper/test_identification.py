@@ -10,7 +10,7 @@ from tvist_controller.calibrations import estimator_of
 from tvist_lab.identification.fit import FitError, fit_polynomials
 from tvist_lab.identification.identify import MeasurementPlan, identify
 from tvist_lab.in_process import free_setup, robot_in_process
-from tvist_lab.paper.published import pose
+from tvist_lab.studies.paper.published import pose
 from tvist_protocol.calibration import calibration_from_json, calibration_to_json
 
 

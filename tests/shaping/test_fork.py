@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_lab.evaluation.recipes import Mistaken
+from tvist_lab.study.recipes import Mistaken
 from tvist_shaping import DelayLine, Fade, Fixed, Polynomial, TvistFilter, shaper
 from tvist_shaping.aimed import AimedFilter
 from tvist_shaping.estimators.drivetrain import Drivetrain

@@ -492,36 +492,24 @@ def test_the_paper_in_one_run_prints_its_tables(tmp_path):
     assert (said["seed"], said["runs"], said["shaper"]) == (0, 1, "zv")
 
 
-@pytest.mark.nightly
-def test_the_bench_gives_its_figures():
-    said = tvist("bench", "--seconds", 0, "--json").assert_done().json
-    assert {"plant_us_per_tick", "filter_us_per_tick", "format", "machine", "figures"} <= said.keys()
-    assert {"cycle_us_per_tick", "line_us_per_tick", "realtime_factor"} <= said.keys()
-    assert all(said[name] > 0.0 for name in ("plant_us_per_tick", "realtime_factor"))
+@pytest.mark.slow
+def test_the_bench_tells_how_fast_a_robot_is_computed():
+    said = tvist("bench", "--seconds", 0, "--shaper", "EI", "--json").assert_done().json
+    assert (said["seconds"], said["shaper"]) == (0, "ei")
+    assert 0.0 < said["plant_us_per_tick"] < said["cycle_us_per_tick"]
+    assert said["realtime_factor"] == pytest.approx(2000.0 / said["line_us_per_tick"])
+    assert said["machine"]["cores"] >= 1
 
 
 @pytest.mark.nightly
 @pytest.mark.timeout(1800)
-def test_the_bench_gives_the_figures_of_served_robots():
+def test_the_bench_tells_how_many_robots_are_served_and_how_late_they_are():
     said = tvist("bench", "--seconds", 3, "--json", timeout=1700).assert_done().json
-    assert {"cpu_share", "start_s", "end_s", "rss_mb", "robots_at_500_hz"} <= said.keys()
-    assert said["tick"].keys() == {
-        "seconds", "missed", "states_received", "late_p50_us", "late_p99_us", "late_max_us",
-    }  # fmt: skip
+    assert {"cpu_share", "start_s", "end_s", "rss_mb"} <= said.keys()
+    assert said["tick"]["late_p50_us"] <= said["tick"]["late_p99_us"] <= said["tick"]["late_max_us"]
     for what in ("setpoint_to_state_ms", "command_ms"):
         assert 0.0 < said[what]["p50"] <= said[what]["p99"]
     assert said["robots_at_500_hz"] >= 0
-
-
-@pytest.mark.nightly
-def test_a_short_soak_loses_nothing_and_says_what_it_saw():
-    said = tvist("bench", "--soak", 0.1, "--json").assert_done().json
-    assert said["samples_lost"] == 0
-    assert said["states_recorded"] >= said["ticks"] > 0
-    assert said["observers"] == 5
-    assert said["states_observed"] + said["states_lost_by_observers"] >= 5 * said["ticks"]
-    assert 0 < said["setpoints_sent"] <= 3001
-    assert {"missed_percent", "late_p99_us", "memory_growth_percent"} <= said.keys()
 
 
 @pytest.mark.slow

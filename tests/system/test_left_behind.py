@@ -17,9 +17,8 @@ from tvist_cli.main import main
 from tvist_server.ending import ending_signals
 
 STUDIES = {
-    "search": ["search", "--stops", "100000"],
     "evaluate": ["evaluate", "--random", "400"],
-    "sweep": ["sweep", "spec.toml", "--output", "out"],
+    "sweep": ["study", "spec.toml", "--output", "out"],
 }
 """Each takes much longer than it is waited for."""
 SPEC = 'shapers = ["none"]\nmoves = 4000\npayloads = [1]\nrobots = ["one-joint"]\n'
@@ -86,7 +85,7 @@ def begun(study, folder):
     [
         *((study, signal.SIGTERM, os.kill) for study in STUDIES),
         *((study, signal.SIGTERM, os.killpg) for study in STUDIES),  # as a supervisor does
-        ("search", signal.SIGHUP, os.kill),  # as a terminal does that is closed
+        ("evaluate", signal.SIGHUP, os.kill),  # as a terminal does that is closed
     ],
 )
 def test_a_signal_ends_a_study_with_its_processes_in_order(study, number, to, temporary, tmp_path):

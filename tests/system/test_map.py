@@ -1,4 +1,4 @@
-"""`tvist map` and `tvist shapers --sensitivity`: what they write for people, for programs and for papers."""
+"""`tvist study map` and `tvist shapers --sensitivity`: what they write for people, for programs and for papers."""
 
 import json
 
@@ -10,8 +10,8 @@ from .test_command_line import tvist
 def test_a_map_is_one_object_and_a_figure_of_each_quantity(tmp_path):
     board = tmp_path / "map.json"
     ended = tvist(
-        "map", "--points", 5, "--payload", 1, "--calibration", "ur5e_modal", "--shaper", "zvd", "--figures", tmp_path,
-        "--format", "svg", "--columns", 1, "--output", board, "--json",
+        "study", "map", "--points", 5, "--payload", 1, "--calibration", "ur5e_modal", "--shaper", "zvd",
+        "--figures", tmp_path, "--format", "svg", "--columns", 1, "--output", board, "--json",
     ).assert_done()  # fmt: skip
     assert (ended.json["robot"], ended.json["payload_kg"], ended.json["shaper"]) == ("ur5e", 1.0, "zvd")
     assert json.loads(board.read_text(encoding="utf-8")) == ended.json
@@ -36,6 +36,6 @@ def test_sensitivity_has_a_curve_of_each_shaper_and_its_band(tmp_path):
 
 def test_people_get_tables():
     assert "5 % from" in tvist("shapers", "--sensitivity").assert_done().out
-    said = tvist("map", "--points", 3, "--robot", "one-joint").assert_done().out
+    said = tvist("study", "map", "--points", 3, "--robot", "one-joint").assert_done().out
     assert "f_d Hz" in said
     assert "error % median" in said

@@ -19,12 +19,12 @@ from tests.places import own_address
 
 from tvist_lab.metrics import Runs, measure, motions, table_2
 from tvist_lab.metrics.motion import JUMP
-from tvist_lab.paper.experiment import run
-from tvist_lab.paper.methods import TimeVarying, Unshaped
-from tvist_lab.paper.published import MOTIONS
 from tvist_lab.recordings import Recording
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.served import served
+from tvist_lab.studies.paper.experiment import run
+from tvist_lab.studies.paper.methods import TimeVarying, Unshaped
+from tvist_lab.studies.paper.published import MOTIONS
 
 EXAMPLE = Path(__file__).parents[2] / "clients/examples/02_realtime_log.py"
 TICK, BOOTED = 0.002, 40.0

@@ -36,7 +36,7 @@ def command(spec, folder, *options):
         sys.executable,
         "-m",
         "tvist_cli",
-        "sweep",
+        "study",
         str(spec),
         "--output",
         str(folder),

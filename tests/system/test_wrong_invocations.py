@@ -91,7 +91,6 @@ MISUSE = [
     (("move",), ["target is missing"]),
     (("log", "analyze"), ["file is missing"]),
     (("keys",), ["folder is missing"]),
-    (("bench", "--lateness", "0"), ["lateness is 0", "more than 0"]),
     (("serve", "--processor", "-1"), ["processor", "0"]),
     (("serve", "--compile", "0"), ["compile is 0", "at least 1"]),
     (("move", "Q1", "Q2"), ["'Q2'"]),
@@ -108,13 +107,8 @@ MISUSE = [
     (("shapers", "--zeta", "2"), ["zeta is 2", "less than 1"]),
     (("paper", "--runs", "0"), ["runs is 0", "at least 1"]),
     (("paper", "--runs", "1.5"), ["--runs is '1.5'", "a whole number"]),
-    (("search", "--stops", "-1"), ["stops is -1", "0 to 1000000"]),
-    (("search", "--stops", "0", "--streams", "0", "--changes", "0", "--sequences", "0"), ["nothing to search"]),
     (("bench", "--seconds", "-1"), ["seconds is -1", "at least 0"]),
-    (("bench", "--soak", "0"), ["soak is 0"]),
-    (("bench", "--only", "lines"), ["--only is 'lines'", "line, motion"]),
-    (("bench", "--only", "ur", "--seconds", "0"), ["only names ur", "more than 0"]),
-    (("bench", "--soak", "1", "--against", "x.json"), ["--against does nothing with --soak"]),
+    (("bench", "--shaper", "zzz"), ["no shaper zzz", "tvist shapers"]),
     (("watch", "--seconds", "0"), ["seconds is 0", "more than 0"]),
     (("log", "record", "x.mcap", "--seconds", "-3"), ["seconds is -3"]),
     (("log", "record", "x.mcap", "--keep", "10"), ["keep is '10'", "90s, 10min or 2h"]),
@@ -126,20 +120,20 @@ MISUSE = [
     (("evaluate", "--random", "0"), ["random is 0"]),
     (("evaluate", "--random", "2", "--modes", "9"), ["modes is 9", "1 to 6"]),
     (("evaluate", "--random", "2", "--payload", "heavy"), ["payload is 'heavy'", "0 to 100 kg"]),
-    (("sweep",), ["spec is missing"]),
-    (("sweep", "x.toml", "--processes", "0"), ["processes is 0", "1 to 1024"]),
-    (("sweep", "x.toml", "--scheduler", "localhost"), ["scheduler is 'localhost'", "tcp://HOST:8786"]),
-    (("sweep", "x.toml", "--processes", "2", "--scheduler", "x"), ["either --processes or --scheduler"]),
-    (("paths", "--random", "0"), ["random is 0", "1 to 100000"]),
-    (("paths", "--kind", "spiral"), ["--kind is 'spiral'", "line, arc, blends"]),
-    (("paths", "--shapers", "zzz"), ["'zzz'", "zvd"]),
-    (("tracking", "--speeds", "0"), ["speeds has 0", "at most 3.1"]),
-    (("tracking", "--tolerance", "0"), ["tolerance is 0", "more than 0"]),
-    (("tracking", "--payload", "9"), ["payload is 9", "0 to 5"]),
-    (("tracking", "--shapers", "zzz"), ["'zzz'", "zvd"]),
-    (("map", "--points", "2"), ["points is 2", "3 to 501"]),
-    (("map", "--shaper", "auto"), ["shaper is 'auto'", "zvd"]),
-    (("map", "--robot", "one-joint", "--calibration", "ur5e_5kg"), ["ur5e_5kg is for a UR5e"]),
+    (("study", "sweep"), ["spec is missing"]),
+    (("study", "sweep", "x.toml", "--processes", "0"), ["processes is 0", "1 to 1024"]),
+    (("study", "sweep", "x.toml", "--scheduler", "localhost"), ["scheduler is 'localhost'", "tcp://HOST:8786"]),
+    (("study", "sweep", "x.toml", "--processes", "2", "--scheduler", "x"), ["either --processes or --scheduler"]),
+    (("study", "paths", "--random", "0"), ["random is 0", "1 to 100000"]),
+    (("study", "paths", "--kind", "spiral"), ["--kind is 'spiral'", "line, arc, blends"]),
+    (("study", "paths", "--shapers", "zzz"), ["'zzz'", "zvd"]),
+    (("study", "tracking", "--speeds", "0"), ["speeds has 0", "at most 3.1"]),
+    (("study", "tracking", "--tolerance", "0"), ["tolerance is 0", "more than 0"]),
+    (("study", "tracking", "--payload", "9"), ["payload is 9", "0 to 5"]),
+    (("study", "tracking", "--shapers", "zzz"), ["'zzz'", "zvd"]),
+    (("study", "map", "--points", "2"), ["points is 2", "3 to 501"]),
+    (("study", "map", "--shaper", "auto"), ["shaper is 'auto'", "zvd"]),
+    (("study", "map", "--robot", "one-joint", "--calibration", "ur5e_5kg"), ["ur5e_5kg is for a UR5e"]),
     (("shapers", "--sensitivity", "zzz"), ["shaper is 'zzz'", "zvd"]),
     (("shapers", "--sensitivity", "--errors", "5", "1"), ["errors is 5 1", "-90 to 900"]),
     (("shapers", "--sensitivity", "--zeta", "2"), ["zeta is 2", "less than 1"]),
@@ -288,12 +282,12 @@ SWEEPS = [
 @pytest.mark.parametrize(("content", "words"), SWEEPS)
 def test_a_wrong_sweep_is_a_sentence_with_file_and_line_or_key(tvist, tmp_path, content, words):
     (tmp_path / "x.toml").write_text(content, encoding="utf-8")
-    assert_said(tvist("sweep", "x.toml"), 1, ["x.toml", *words])
+    assert_said(tvist("study", "x.toml"), 1, ["x.toml", *words])
     assert not (tmp_path / "x").exists()
 
 
 def test_a_sweep_without_a_file_is_a_sentence(tvist):
-    assert_said(tvist("sweep", "x.toml"), 1, ["x.toml", "No such file"])
+    assert_said(tvist("study", "x.toml"), 1, ["x.toml", "No such file"])
 
 
 @pytest.mark.parametrize(

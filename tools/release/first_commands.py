@@ -63,7 +63,9 @@ def first_command(page: str, shown: list[tuple[str, str]], table: dict[str, Any]
     needs = table["pages"].get(page, {})
     if ours or "command" in needs:
         needs = {"command": next(iter(ours), ""), **needs}
-        first = First(page, **{**table["commands"].get(needs["command"].split()[1], {}), **needs})
+        _, *words = needs["command"].split()
+        known = table["commands"].get(" ".join(words[:2]), table["commands"].get(words[0], {}))
+        first = First(page, **{**known, **needs})
     elif any(kind == "sh" for kind, _ in shown):
         first = First(
             page, lines[0].partition("  #")[0], skip=f"shows commands of {lines[0].split()[0]} alone"

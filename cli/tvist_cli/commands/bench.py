@@ -1,118 +1,67 @@
-"""`tvist bench`: measure how fast tvist runs on this machine."""
+"""`tvist bench`: how many robots this machine runs, how late these are, and how fast it computes one."""
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
+from typing import Any
 
 from tvist_cli.failure import Failure, interrupted, told
-from tvist_cli.output import err, print_json
-from tvist_lab.benchmark.names import PartName
+from tvist_cli.output import err, out, print_json, table, words
 
-Study = Callable[[], None]
+TERMS = {
+    "late": "how much later than planned ticks began: half of them, all but one in a hundred, and the worst",
+    "set-point, command": "time until the first state with it has come back, until it is answered",
+    "robots": "at 500 Hz in one process on one core, of which none misses more than one tick in a thousand",
+}
 
 
-def bench(
-    *,
-    seconds: float = 10.0,
-    only: Annotated[list[PartName] | None, Parameter(consume_multiple=True)] = None,
-    shapers: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
-    against: Path | None = None,
-    soak: float | None = None,
-    hostile: int | None = None,
-    lateness: float | None = None,
-    json: bool = False,
-) -> None:
-    """Measure how fast tvist runs, every figure beside a reference that is measured in turn in the same run.
+def bench(*, seconds: float = 10.0, shaper: str = "zv", json: bool = False) -> None:
+    """Measure how many robots this machine runs in real time, how late they are, and how fast it computes one.
 
-    The references are the same arm in MuJoCo, Python's compiler, a bare send() and the line of one robot. Figures of
-    served robots that have none are printed below.
+    The figures hold under the machine's current load. A served robot has a recorder and a client that reads every
+    state; of several robots, a client on another core reads every state.
 
     Args:
-        seconds: Seconds of each measurement of a robot in real time; 0 skips what serves robots.
-        only: Parts to measure [all].
-        shapers: Further shapers with which the line is measured, besides zv and auto.
-        against: File with what tvist bench --json printed before, to compare with: prints for each figure the change of
-            its ratio to its reference, and whether it is beyond chance.
-        soak: Serve a robot under load for this many minutes instead, and report whether memory and timing stay stable.
-        hostile: Instead, compare how late a served robot's ticks are with and without 100 messages a second of every
-            type and size, valid and invalid, in this many pairs of runs of --seconds each.
-        lateness: Instead, compare the ticks that a served robot misses with those that a bare thread misses which
-            sleeps to the same deadlines, in turn: for this many minutes alone, as many with ten clients, and as many
-            with ten clients, real-time priority and locked memory.
+        seconds: Seconds of each measurement of a served robot; 0 serves none, and tells how fast a tick is computed.
+        shaper: Shaper of the robots, by its name.
         json: Print one JSON object.
     """
-    from tvist_cli import bench_studies as run
+    from tvist_lab.bench.speed import speed
+    from tvist_server.config import ConfigError
+    from tvist_shaping import BUILT_IN
 
-    _check(
-        seconds,
-        {"soak": soak, "lateness": lateness},
-        {"hostile": hostile},
-    )
-    studies: dict[str, tuple[float | None, Study]] = {
-        "hostile": (hostile, lambda: run.hostile(hostile or 0, seconds, json)),
-        "lateness": (lateness, lambda: run.lateness(lateness or 0.0, json)),
-        "soak": (soak, lambda: run.soak(soak or 0.0, json)),
-    }
-    asked = [name for name, (value, _) in studies.items() if value is not None]
-    _check_together(asked, {"only": only, "shapers": shapers, "against": against})
-    try:
-        if asked:
-            studies[asked[0]][1]()
-        else:
-            _all(seconds, only, shapers or (), against, json)
-    except KeyboardInterrupt:
-        raise interrupted("the measurements so far are lost; the served robots have stopped") from None
-
-
-def _check(seconds: float, durations: dict[str, float | None], runs: dict[str, int | None]) -> None:
     if seconds < 0.0:
         raise Failure(f"seconds is {seconds:g}: must be at least 0", code=2)
-    for name, duration in durations.items():
-        if duration is not None and not duration > 0.0:
-            raise Failure(f"{name} is {duration:g}: must be more than 0", code=2)
-    for name, pairs in runs.items():
-        if pairs is not None and not (pairs >= 2 and seconds > 0.0):
-            raise Failure(
-                f"{name} is {pairs}: must be at least 2 pairs of runs, of more than 0 seconds", code=2
-            )
-
-
-def _check_together(asked: Sequence[str], given: dict[str, object]) -> None:
-    """Refuse options that would do nothing."""
-    if len(asked) > 1:
-        raise Failure(
-            f"--{asked[0]} and --{asked[1]} each run instead of the other: give one of them", code=2
-        )
-    for name, value in given.items():
-        if asked and value is not None:
-            raise Failure(f"--{name} does nothing with --{asked[0]}: leave it out", code=2)
-
-
-def _all(
-    seconds: float, only: Sequence[PartName] | None, shapers: Sequence[str], against: Path | None, json: bool
-) -> None:
-    from tvist_cli.bench_tables import print_changes, print_run
-    from tvist_lab.bench import PARTS
-    from tvist_lab.bench import bench as run
-    from tvist_lab.benchmark.saved_run import as_json, changes, changes_as_json, load_run
-    from tvist_server.config import ConfigError
-
-    if only is not None and seconds == 0.0 and (served := [name for name in only if PARTS[name].serves]):
-        raise Failure(f"only names {served[0]}, which needs seconds of more than 0", code=2)
-    if only is not None and shapers and "line" not in only:
-        raise Failure("--shapers is about the part line: add it to --only, or leave --shapers out", code=2)
-    saved = None
-    if against is not None:
-        with told(OSError):
-            saved = load_run(against)
-    with told(ConfigError, code=2):
-        result = run(seconds, lambda what: err.print(f"measuring {what} ..."), only, shapers)
-    found = [] if saved is None else changes(saved, result)
+    if (shaper := shaper.lower()) not in BUILT_IN.names():
+        raise Failure(f"there is no shaper {shaper}: see tvist shapers", code=2)
+    try:
+        with told(ConfigError, code=2):
+            result = speed(seconds, shaper, lambda what: err.print(f"measuring {what} ..."))
+    except KeyboardInterrupt:
+        raise interrupted("the measurements so far are lost; the served robots have stopped") from None
     if json:
-        print_json(as_json(result) | ({} if saved is None else {"against": changes_as_json(found)}))
+        print_json(result)
         return
-    print_run(result)
-    if saved is not None:
-        print_changes(saved, result, found)
+    machine = result["machine"]
+    rows = [
+        (
+            f"a tick with {shaper}",
+            f"{result['line_us_per_tick']:.0f} µs: {result['realtime_factor']:.0f} times real time",
+        )
+    ]
+    if seconds:
+        rows = [*_served(result), *rows]
+    table(f"{machine['cpu']}, {machine['cores']} cores", ("what", "here"), rows)
+    words(TERMS if seconds else {})
+    out.print("The repository's `make bench` compares each part with a reference of the same run.")
+
+
+def _served(result: dict[str, Any]) -> list[tuple[str, str]]:
+    tick, setpoint, command = result["tick"], result["setpoint_to_state_ms"], result["command_ms"]
+    return [
+        ("robots", str(result["robots_at_500_hz"])),
+        ("late", "{late_p50_us:.0f}, {late_p99_us:.0f}, {late_max_us:.0f} µs".format(**tick)),
+        ("missed", f"{tick['missed']:.0f} ticks in {tick['seconds']:g} s"),
+        ("set-point, median and 99 %", f"{setpoint['p50']:.2f}, {setpoint['p99']:.2f} ms"),
+        ("command, median and 99 %", f"{command['p50']:.2f}, {command['p99']:.2f} ms"),
+        ("processor", f"{100 * result['cpu_share']:.0f} % of a core"),
+        ("memory", f"{result['rss_mb']:.0f} MB"),
+        ("start and end", f"{result['start_s']:.1f} s, {result['end_s']:.2f} s"),
+    ]

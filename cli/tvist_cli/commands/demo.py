@@ -34,8 +34,8 @@ def demo(
     """
     files = look.into(output)
     from tvist_lab.demo import ANSWERED, DemoError, run_demo
-    from tvist_lab.paper.answer import answer, checks, terms
-    from tvist_lab.paper.experiment import count
+    from tvist_lab.studies.paper.answer import answer, checks, terms
+    from tvist_lab.studies.paper.experiment import count
 
     compile_if_new()
     with (

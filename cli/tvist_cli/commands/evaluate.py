@@ -17,10 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tvist_controller.own_shapers import OwnShaper
-    from tvist_lab.evaluation.conditions import Conditions
-    from tvist_lab.evaluation.evaluate import JudgedMove, MoveJob
-    from tvist_lab.evaluation.moves import Move
     from tvist_lab.figures import FigureFiles
+    from tvist_lab.studies.evaluate import Rows
+    from tvist_lab.study.case import Case
+    from tvist_lab.study.method import Method
+    from tvist_lab.study.moves import Move
+    from tvist_lab.study.work import Job
     from tvist_plant.description import RobotDescription
     from tvist_protocol.calibration import Calibration
 
@@ -89,15 +91,17 @@ def evaluate(
         report: File to write a web page with the verdict, the tables and the figures to.
         json: Print one JSON object.
     """
-    from tvist_lab.evaluation.evaluate import MoveJob, arm_seed
-    from tvist_lab.evaluation.evaluate import evaluate as run
-    from tvist_lab.evaluation.evaluate import report as summary
-    from tvist_lab.evaluation.sound import ShaperFaultError
+    from tvist_lab.studies.evaluate import MEASURED, methods
+    from tvist_lab.studies.evaluate import notes as notes_of
+    from tvist_lab.studies.evaluate import report as summary
+    from tvist_lab.study.case import arm_seed
+    from tvist_lab.study.moves import collisions, write_moves
+    from tvist_lab.study.work import Job
     from tvist_plant.description import DescriptionError, load
 
     look.check(figures)
     _check(moves, random, seed, modes, frequency_error, wrists=wrists)
-    conditions = _conditions(limits, payload_error, stiffness_error)
+    _check_conditions(limits, payload_error, stiffness_error)
     length = _stroke(stroke, moves)
     if streams and save_moves is not None:
         raise Failure("--save-moves writes moves, but --streams follows streams: leave one out", code=2)
@@ -107,32 +111,26 @@ def evaluate(
     shaper, own = loaded(shaper)
     known = calibration_for(calibration, shaper, own, modes, description)
     chosen, share = _moves(moves, random, seed, masses, description, length, wrists=wrists)
-    wanted, chosen = len(chosen), chosen if streams else _feasible(chosen, description, conditions)
     plant, kept = disturbed(description, disturbances, clean=clean)
-    recipe, others = _recipe(shaper, own, modes, known, plant, frequency_error, masses, baselines=baselines)
+    wanted = len(chosen)
+    if not streams:
+        chosen = _feasible(chosen, description, limits)
+    mine, others = _methods(shaper, own, modes, known, plant, frequency_error, masses, baselines=baselines)
     if streams:  # the end of a stream is not known
-        others = tuple(one for one in others if not one.told_target)
+        others = [one for one in others if not one.told_target]
+    conditions = (limits, payload_error, stiffness_error)
     jobs = [
-        MoveJob(
-            plant, move, recipe, others, seed=arm_seed(seed, place), conditions=conditions, stream=streams
+        Job(
+            _case(plant, move, arm_seed(seed, place), *conditions, stream=streams),
+            methods(mine, others),
+            MEASURED,
         )
         for place, move in enumerate(chosen)
     ]
-    judged: list[JudgedMove] = []
     with told(OSError):
         if save_moves is not None:
-            from tvist_lab.evaluation.moves import write_moves
-
             write_moves(save_moves, chosen)
-        with progress(sum(job.motions for job in jobs), "motions") as bar:
-            try:
-                for job, one in zip(jobs, run(jobs), strict=True):
-                    judged.append(one)
-                    bar(job.motions, None)
-            except ShaperFaultError as fault:
-                raise Failure(f"shaper {shaper} {fault}") from fault
-    from tvist_lab.evaluation.moves import collisions
-
+        judged = _judged(jobs, shaper)
     met = collisions(description, chosen) if moves is not None and not streams else []
     result = {
         "shaper": shaper,
@@ -145,13 +143,9 @@ def evaluate(
         "payload_error_percent": payload_error,
         "stiffness_error_percent": stiffness_error,
         "free_of_collision": share,
-        **summary(jobs, judged),
+        **summary(judged),
     }
-    result["notes"] = _notes(result, met, known, chosen, share)
-    if len(chosen) < wanted:
-        result["notes"].append(
-            f"{wanted - len(chosen)} of {wanted} moves were left out: the drives are too weak"
-        )
+    result["notes"] = notes_of(result, met, known, chosen, share, wanted)
     if baselines and not others:
         result["notes"].append("there are no baselines: they need a calibration of this arm")
     if figures is not None or report is not None:
@@ -160,6 +154,26 @@ def evaluate(
         print_json(result)
     else:
         print_evaluation(result)
+
+
+def _judged(jobs: list["Job"], shaper: str) -> "list[Rows]":
+    """The rows of each move.
+
+    Raises:
+        Failure: The shaper's function fails.
+    """
+    from tvist_lab.study.engine import made
+    from tvist_lab.study.shaping import ShaperFaultError
+
+    judged: list[Rows] = []
+    with progress(sum(job.motions for job in jobs), "motions") as bar:
+        try:
+            for rows in made(jobs):
+                judged.append(rows)
+                bar(len(rows), None)
+        except ShaperFaultError as fault:
+            raise Failure(f"shaper {shaper} {fault}") from fault
+    return judged
 
 
 def _check(
@@ -179,8 +193,8 @@ def _check(
         raise Failure(f"frequency-error is {frequency_error:g} %: must be -90 to 900 %", code=2)
 
 
-def _conditions(limits: str, payload_error: float, stiffness_error: float) -> "Conditions":
-    from tvist_lab.evaluation.conditions import LIMITS, Conditions
+def _check_conditions(limits: str, payload_error: float, stiffness_error: float) -> None:
+    from tvist_lab.study.case import LIMITS
 
     if limits not in LIMITS:
         raise Failure(f"limits is {limits!r}: must be {' or '.join(LIMITS)}", code=2)
@@ -188,11 +202,27 @@ def _conditions(limits: str, payload_error: float, stiffness_error: float) -> "C
         raise Failure(f"payload-error is {payload_error:g} %: must be -100 to 900 %", code=2)
     if not 0.0 <= stiffness_error <= 90.0:
         raise Failure(f"stiffness-error is {stiffness_error:g} %: must be 0 to 90 %", code=2)
-    return Conditions(LIMITS[limits], 0.01 * payload_error, 0.01 * stiffness_error)
+
+
+def _case(
+    plant: "RobotDescription",
+    move: "Move",
+    seed: int,
+    limits: str,
+    payload_error: float,
+    stiffness_error: float,
+    *,
+    stream: bool,
+) -> "Case":
+    from tvist_lab.study.arms import scattered
+    from tvist_lab.study.case import LIMITS, Case
+
+    arms, axes = (scattered(0.01 * stiffness_error),), {"payload_kg": move.mass}
+    return Case(plant, move, seed, arms, LIMITS[limits], 0.01 * payload_error, stream, axes)
 
 
 def _stroke(stroke: tuple[float, float] | None, moves: Path | None) -> tuple[float, float]:
-    from tvist_lab.evaluation.moves import STROKE
+    from tvist_lab.study.moves import STROKE
 
     if stroke is None:
         return STROKE
@@ -204,15 +234,15 @@ def _stroke(stroke: tuple[float, float] | None, moves: Path | None) -> tuple[flo
     return stroke
 
 
-def _feasible(moves: list["Move"], description: "RobotDescription", conditions: "Conditions") -> list["Move"]:
+def _feasible(moves: list["Move"], description: "RobotDescription", limits: str) -> list["Move"]:
     """Return the moves for which the drives are strong enough.
 
     Raises:
         Failure: There are none.
     """
-    from tvist_lab.evaluation.conditions import torque_share
+    from tvist_lab.study.case import LIMITS, Case
 
-    found = [move for move in moves if torque_share(description, move, conditions.limits) <= 1.0]
+    found = [move for move in moves if Case(description, move, limits=LIMITS[limits]).torque_share <= 1.0]
     if not found:
         raise Failure("the drives are too weak for all of these moves at these limits", code=2)
     return found
@@ -231,7 +261,7 @@ def _moves(
     """The moves, and the share of draws that were free of collision."""
     import numpy as np
 
-    from tvist_lab.evaluation.moves import MovesError, draw_moves, read_moves
+    from tvist_lab.study.moves import MovesError, draw_moves, read_moves
 
     with told(MovesError, code=2):
         if path is not None:
@@ -242,7 +272,7 @@ def _moves(
     return drawn.moves, drawn.share
 
 
-def _recipe(
+def _methods(
     shaper: str,
     own: "tuple[OwnShaper, ...]",
     modes: int,
@@ -252,18 +282,20 @@ def _recipe(
     masses: tuple[float, float],
     *,
     baselines: bool,
-) -> tuple[Any, Any]:
-    """The recipe, tried out, and the baselines."""
+) -> "tuple[Method, list[Method]]":
+    """The shaper, tried out, and the baselines."""
     from tvist_controller.refusal import RefusalError
-    from tvist_lab.evaluation.baselines import baselines as every
-    from tvist_lab.evaluation.recipes import Recipe, RecipeError
+    from tvist_lab.study.catalogue import baselines as every
+    from tvist_lab.study.method import Named
+    from tvist_lab.study.recipes import Recipe, RecipeError
     from tvist_shaping.errors import ShapingError
 
     recipe = Recipe(shaper, known, 0.01 * frequency_error, modes, own)
     with told(RecipeError, RefusalError, ShapingError, code=2):
         recipe.elastic(description, recipe.make(description, masses[1]))
         # Without a calibration of the arm, no baseline can be designed for it.
-        return recipe, every(recipe, description, masses) if baselines and known is not None else ()
+        others = every(recipe, description, masses) if baselines and known is not None else []
+        return Named(recipe, shaper), others
 
 
 def _show(
@@ -282,59 +314,16 @@ def _show(
             write_report(report, evaluation_page(result, pictures, typed()))
 
 
-def _drawn(jobs: list["MoveJob"], judged: list["JudgedMove"]) -> dict[str, tuple["Figure", str]]:
+def _drawn(jobs: list["Job"], judged: list["Rows"]) -> dict[str, tuple["Figure", str]]:
     """Figures by the names of their files, each with a caption."""
-    from tvist_lab.evaluation.evaluate import record
     from tvist_lab.figures import residual_by_move_figure, vibration_figure
+    from tvist_lab.studies.evaluate import example
+    from tvist_lab.study.work import record
 
-    middle = _example(judged)
+    middle = example(judged)
+    every = residual_by_move_figure([rows[0] for rows in judged])
     one = vibration_figure(*record(jobs[middle]), middle + 1)
     return {
-        "moves": (residual_by_move_figure(judged), "Vibration after each move, unshaped and shaped."),
+        "moves": (every, "Vibration after each move, unshaped and shaped."),
         "one_move": (one, f"Move {middle + 1}, which vibrates like the median of all moves."),
     }
-
-
-def _example(judged: list["JudgedMove"]) -> int:
-    """Place of the move that is drawn: the middle one by unshaped vibration, of those that count if any do."""
-    counted = [place for place, one in enumerate(judged) if one.counts] or list(range(len(judged)))
-    return sorted(counted, key=lambda place: judged[place].unshaped.peak)[len(counted) // 2]
-
-
-def _notes(
-    result: dict[str, Any],
-    met: list[str | None],
-    known: "Calibration | None",
-    chosen: list["Move"],
-    share: float | None,
-) -> list[str]:
-    from tvist_lab.evaluation.evaluate import WORTH
-
-    notes = []
-    if share is not None:
-        notes.append(
-            f"{100.0 * share:.0f} % of the drawn moves were free of collisions; the others were replaced"
-        )
-    if result["left_out"]:
-        notes.append(
-            f"{len(result['left_out'])} of {len(chosen)} moves have an unshaped peak below {WORTH:g} m/s²: the "
-            "percentages leave them out"
-        )
-    notes += [
-        f"move {place}: a robot would refuse it because {words}; it was evaluated anyway"
-        for place, words in enumerate(met, 1)
-        if words is not None
-    ]
-    if known is not None and known.modal is None and result["shaper"] != "none":
-        off = sum(
-            abs(move.mass - known.payload.mass) > 0.02 * max(known.payload.mass, 1.0) for move in chosen
-        )
-        if off:
-            notes.append(
-                f"calibration {known.name} was made with {known.payload.mass:g} kg; {off} moves carry something else"
-            )
-    if result["never_still"]:
-        notes.append(
-            f"{result['never_still']} shaped moves were still above 0.1 m/s² at the end of the simulation"
-        )
-    return notes

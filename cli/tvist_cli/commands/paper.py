@@ -13,7 +13,7 @@ from tvist_cli.serving import compile_if_new
 from tvist_cli.tables import print_paper
 
 if TYPE_CHECKING:
-    from tvist_lab.paper.experiment import Experiment
+    from tvist_lab.studies.paper.experiment import Experiment
 
 
 def paper(
@@ -43,8 +43,8 @@ def paper(
     if runs < 1:
         raise Failure(f"runs is {runs}: must be at least 1", code=2)
     from tvist_lab.in_process import free_setup, robot_in_process
-    from tvist_lab.paper.experiment import count, experiment
-    from tvist_lab.paper.report import as_dict
+    from tvist_lab.studies.paper.experiment import count, experiment
+    from tvist_lab.studies.paper.report import as_dict
     from tvist_server.config import ConfigError
 
     with told(ConfigError, code=2):
@@ -62,14 +62,14 @@ def paper(
 
         done = asyncio.run(run())
     if figures is not None:
-        from tvist_lab.paper.drawing import draw
+        from tvist_lab.paper_drawing import draw
 
         write(look.into(figures), draw(done, all_figures=True))
     result = as_dict(done)
     if markdown is not None:
-        from tvist_lab.paper.markdown import page
+        from tvist_lab.studies.paper.markdown import page_of
 
-        markdown.write_text(page(result, typed()), encoding="utf-8")
+        markdown.write_text(page_of(result, typed()), encoding="utf-8")
     if json:
         print_json(result)
     else:

@@ -8,7 +8,7 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.output import number, out, print_json, progress, table, typed, words
 
 if TYPE_CHECKING:
-    from tvist_lab.arms.measure import Measured
+    from tvist_lab.studies.arms.measure import Measured
     from tvist_plant.description import RobotDescription
 
 VARIED = 50.0
@@ -39,7 +39,7 @@ def robots(
         markdown: File to write a page with the tables to.
         json: Print one JSON object.
     """
-    from tvist_lab.arms.about import about
+    from tvist_lab.studies.arms.about import about
     from tvist_plant.description import DescriptionError, load
     from tvist_plant.description import robots as shipped
 
@@ -57,7 +57,7 @@ def robots(
     for one in listed if measure else ():
         one["measured"] = _measured(one["name"], arms[one["name"]], one, random, vary, seed)
     if markdown is not None:
-        from tvist_lab.arms.page import robots_page
+        from tvist_lab.studies.arms.page import robots_page
 
         with told(OSError):
             markdown.write_text(robots_page(listed, typed()), encoding="utf-8")
@@ -72,8 +72,8 @@ def _measured(
 ) -> list[dict[str, Any]]:
     """Measure an arm as its file describes it, and stiffer and softer; empty if it has too few joints for auto."""
     from tvist_controller.calibrations import load
-    from tvist_lab.arms.measure import ALONE, measure
     from tvist_lab.identification.identify import IdentificationError
+    from tvist_lab.studies.arms.measure import ALONE, measure
 
     if description.joints < ALONE:
         return []

@@ -8,13 +8,14 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import number, out, print_json, progress, say, table, typed, write_json
+from tvist_cli.output import out, print_json, progress, say, table, typed, write_json
 from tvist_cli.report_file import write_report
 from tvist_cli.shapers_of import load_given
 
 if TYPE_CHECKING:
     from tvist_controller.own_shapers import OwnShaper
-    from tvist_lab.evaluation.candidates import Candidate
+    from tvist_lab.study.method import Method
+    from tvist_lab.study.work import Row
     from tvist_protocol.calibration import Calibration
 
 MOVES = 100
@@ -61,9 +62,9 @@ def shaperbench(
         report: File to write a web page with the verdict, the tables and the figures to.
         json: Print one JSON object.
     """
-    from tvist_lab.evaluation import curves, leaderboard
-    from tvist_lab.evaluation import shaperbench as bench
-    from tvist_lab.evaluation.arms import ARMS
+    from tvist_lab.studies import curves, leaderboard
+    from tvist_lab.studies import shaperbench as bench
+    from tvist_lab.study.arms import ARMS
     from tvist_plant.description import load
 
     look.check(figures)
@@ -76,18 +77,19 @@ def shaperbench(
     known = modal_calibration(calibration)
     against = None if against is None else [name.lower() for name in against]
     mine = None if shaper is None else _mine(shaper)
-    standing = candidates_of(mine, against, known)
+    methods = methods_of(mine, against, known)
     drawn = bench.draw(description, count, seed)
-    faults = [bench.inspect(one, description, drawn) for one in standing]
-    sound = [one for one, fault in zip(standing, faults, strict=True) if fault is None]
+    faults = [bench.inspect(one, description, drawn) for one in methods]
+    sound = [one for one, fault in zip(methods, faults, strict=True) if fault is None]
     jobs, bends = (
         bench.jobs(description, sound, drawn, seed, quick=quick),
         curves.bends(description, sound, drawn),
     )
-    done, bent = [], []
+    done: list[Row] = []
+    bent = []
     with progress(len(jobs) + len(bends), "motions") as bar:
-        for scores in bench.play(jobs):
-            done.append(scores)
+        for rows in bench.play(jobs):
+            done += rows
             bar(1, None)
         for path in bends:
             bent.append((path, curves.bend(path)))
@@ -100,7 +102,7 @@ def shaperbench(
         "payload_errors": list(bench.PAYLOAD_ERRORS),
         "arms": {arm.name: arm.label for arm in ARMS},
         "calibration": known.name,
-        **leaderboard.leaderboard(standing, faults, jobs, done, bent),
+        **leaderboard.leaderboard(methods, faults, done, bent),
     }
     _write(result, output, markdown)
     _show(result, figures, look, report)
@@ -136,31 +138,31 @@ def _mine(shaper: str) -> "str | OwnShaper":
     """Check the user's own shaper: the path of a file with a method or function step, or FILE.py:NAME."""
     if ".py:" in shaper:
         return load_given(shaper)
-    from tvist_lab.evaluation.foreign import CandidateError, load_shaper
+    from tvist_lab.study.foreign import CandidateError, load_shaper
 
     with told(CandidateError, code=2):
         load_shaper(Path(shaper))
     return shaper
 
 
-def candidates_of(
+def methods_of(
     mine: "str | OwnShaper | None", against: list[str] | None, known: "Calibration"
-) -> "list[Candidate]":
-    """Return waiting and the shapers to compare; see `tvist_lab.evaluation.standing.candidates`.
+) -> "list[Method]":
+    """Return waiting and the methods to compare; see `tvist_lab.study.catalogue.bench`.
 
     Raises:
         Failure: There is no shaper of a name.
     """
-    from tvist_lab.evaluation.recipes import RecipeError
-    from tvist_lab.evaluation.standing import candidates
+    from tvist_lab.study.catalogue import UNSHAPED, bench, names
+    from tvist_lab.study.recipes import RecipeError
     from tvist_plant.description import load
 
+    every = {UNSHAPED, *names("bench")}
+    for name in against or []:
+        if name not in every:
+            raise Failure(f"against is {name!r}: must be one of {', '.join(sorted(every))}", code=2)
     with told(RecipeError, code=2):
-        every = {one.name for one in candidates(load("ur5e"), known, None, None)}
-        for name in against or []:
-            if name not in every:
-                raise Failure(f"against is {name!r}: must be one of {', '.join(sorted(every))}", code=2)
-        return candidates(load("ur5e"), known, mine, against)
+        return bench(load("ur5e"), known, mine, against)
 
 
 def _command(
@@ -189,9 +191,11 @@ def _write(
         if output is not None:
             write_json(output, result)
         if markdown is not None:
-            from tvist_lab.evaluation.markdown import page
+            from tvist_lab.studies.bench_tables import ON_PAGE, best_in_bold, ranked
+            from tvist_lab.studies.pages import page
 
-            markdown.write_text(page(result, typed()), encoding="utf-8")
+            more = {"ranked": ranked(result), "columns": ON_PAGE, "best_in_bold": best_in_bold}
+            markdown.write_text(page("shaperbench", result, typed(), **more), encoding="utf-8")
 
 
 def _show(result: dict[str, Any], figures: Path | None, look: FigureOptions, report: Path | None) -> None:
@@ -212,16 +216,16 @@ def _show(result: dict[str, Any], figures: Path | None, look: FigureOptions, rep
 
 
 def _print(result: dict[str, Any]) -> None:
+    from tvist_lab.studies.bench_tables import ON_TERMINAL, ranked
+    from tvist_lab.study.tables import cells, titles
+
     errors = len(result["payload_errors"])
     table(
         f"{result['moves']} moves on {len(result['arms'])} arms with {errors} payload errors; "
         "* keeps the limits, and no other shaper that keeps them is better in both still and ring",
-        (
-            "shaper", "still ms", "p90", "ring m/s²", "less %", "p5", "worst arm", "delay ms", "moving", "q̈/limit",
-            "q̇/limit", "bend mrad", "µs",
-        ),
-        [_row(row) for row in result["shapers"] if row["ranked"]],
-    )  # fmt: skip
+        titles(ON_TERMINAL),
+        cells(ranked(result), ON_TERMINAL),
+    )
     out.print(
         "still: last time |α| exceeds 0.1 m/s², from the stop of the unshaped reference, median and p90;\n"
         "ring: envelope within 3 to 60 Hz after the shaper's own stop; less: reduction compared with waiting;\n"
@@ -236,19 +240,3 @@ def _print(result: dict[str, Any]) -> None:
     for row in result["shapers"]:
         if not row["ranked"]:
             say(f"{row['name']} ({row['label']}) is not ranked: it {row['fault']}")
-
-
-def _worst(worst: dict[str, Any] | None) -> str:
-    return "–" if worst is None else f"{worst['name']} {worst['reduction_percent']['median']:.1f}"
-
-
-def _row(row: dict[str, Any]) -> tuple[str, ...]:
-    still, less = row["time_until_still_ms"], row["reduction_percent"]
-    return (
-        row["name"] + (" *" if row["pareto"] else ""), number(still["median"], 0), number(still["p90"], 0),
-        number(row["residual_m_s2"]["median"]), number(less["median"], 1), number(less["p5"], 1),
-        _worst(row["worst_arm"]),
-        number(row["delay_ms"]["median"], 0), number(row["in_motion_ratio"], 2),
-        number(row["peak_acceleration_ratio"]["max"]), number(row["peak_velocity_ratio"]["max"]),
-        number(row["path_error_mrad"], 1), number(row["cost_us"], 0),
-    )  # fmt: skip

@@ -21,6 +21,7 @@ from tvist_lab.figures.ring_down import ring_down_figure
 from tvist_lab.figures.robustness import robustness_figure
 from tvist_lab.figures.sensitivity import figure_4
 from tvist_lab.figures.settling_times import figure_15
+from tvist_lab.figures.study import study_figure
 from tvist_lab.figures.sweep import sweep_figure
 from tvist_lab.figures.workspace_map import workspace_map_figure
 
@@ -53,6 +54,7 @@ __all__ = [
     "sensitivity_figure",
     "settling_against_delay_figure",
     "settling_figure",
+    "study_figure",
     "sweep_figure",
     "vibration_figure",
     "workspace_map_figure",

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvist_lab.evaluation.evaluate import WORTH, JudgedMove
 from tvist_lab.figures.style import (
     FAINT,
     MUTED,
@@ -21,14 +20,16 @@ from tvist_lab.figures.style import (
 )
 from tvist_lab.metrics import amplitude, best_tool_acceleration, motions
 from tvist_lab.recordings import Recording
+from tvist_lab.study.measures import WORTH
+from tvist_lab.study.work import Row
 
 FLOOR = 1e-4
 """Smaller peaks are drawn at this value [m/s²]."""
 
 
-def residual_by_move_figure(judged: Sequence[JudgedMove]) -> Figure:
-    """Peak |α| after the stop, shaped against unshaped, one point per move; and the distribution of the reductions."""
-    reductions = np.sort([one.reduction(one.shaped) for one in judged if one.counts])
+def residual_by_move_figure(rows: Sequence[Row]) -> Figure:
+    """Peak |α| after the stop, shaped against unshaped, one point per row; and the distribution of the reductions."""
+    reductions = np.sort([row["reduction_percent"] for row in rows if row["reduction_percent"] is not None])
     several = reductions.size > 1
     figure, (above, *rest) = panels(
         2 if several else 1,
@@ -41,9 +42,9 @@ def residual_by_move_figure(judged: Sequence[JudgedMove]) -> Figure:
         (True, SHAPED, "o", "Move"),
         (False, FAINT, "x", f"Below {WORTH:g} m/s² unshaped, not counted"),
     ):
-        chosen = [one for one in judged if one.counts is counts]
+        chosen = [row for row in rows if (row["reduction_percent"] is not None) is counts]
         before, after = ([max(peak, FLOOR) for peak in peaks] for peaks in (
-            [one.unshaped.peak for one in chosen], [one.shaped.peak for one in chosen]
+            [row["unshaped_peak_m_s2"] for row in chosen], [row["shaped_peak_m_s2"] for row in chosen]
         ))  # fmt: skip
         if chosen:
             above.plot(before, after, marker, color=color, markersize=3.0, label=label)

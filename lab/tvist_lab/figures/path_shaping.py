@@ -7,9 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tvist_lab.evaluation.evaluate import WORTH
-from tvist_lab.evaluation.path_examples import BLEND, CORNER_SHAPER, CORNER_SPEED, Corner
-from tvist_lab.evaluation.path_shaping import ALONG, JOINTS, WAYS
 from tvist_lab.figures.style import (
     FAINT,
     LIMIT,
@@ -22,6 +19,9 @@ from tvist_lab.figures.style import (
     tint,
     title,
 )
+from tvist_lab.studies.path_examples import BLEND, CORNER_SHAPER, CORNER_SPEED, Corner
+from tvist_lab.studies.path_shaping import ALONG, JOINTS, WAYS
+from tvist_lab.study.measures import WORTH
 from tvist_plant.plant import PERIOD
 
 SHOWN = {ALONG: OF_SHAPED, JOINTS: OF_UNSHAPED}
@@ -62,7 +62,7 @@ def path_shaping_figure(paths: Sequence[dict[str, Any]]) -> Figure:
     """Draw boxes of the vibration after the stop and during the motion, and of the distance from the path.
 
     Args:
-        paths: The paths of a report, see `tvist_lab.evaluation.path_report.report`.
+        paths: The paths of a report, see `tvist_lab.studies.path_report.report`.
     """
     figure, panes = panels(3, 8.4)
     counted = [one for one in paths if one["unshaped_peak_m_s2"] >= WORTH]

@@ -5,8 +5,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from tvist_lab.evaluation.robustness import ERRORS
 from tvist_lab.figures.style import SERIES, panels, title
+from tvist_lab.studies.robustness import ERRORS
 
 
 def robustness_figure(rows: Sequence[dict[str, Any]]) -> Figure:

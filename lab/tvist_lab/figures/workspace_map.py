@@ -8,7 +8,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from tvist_lab.figures.style import INK, explain, note, panels, title
 from tvist_lab.recordings import Floats
-from tvist_lab.workspace_map import WorkspaceMap
+from tvist_lab.studies.workspace_map import WorkspaceMap
 
 LABELS = {
     "f_d_hz": ("$f_d$", "damped frequency of the lowest mode", "Hz"),

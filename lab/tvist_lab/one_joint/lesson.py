@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from tvist_controller.api import body, default_calibration, estimator_of, load_calibration, paper_payload
-from tvist_lab.evaluation.evaluate import measured
-from tvist_lab.evaluation.line import ControlLine, point_to_point, shape
-from tvist_lab.evaluation.sound import Sound
+from tvist_lab.metrics import motions, peak_after_stop
 from tvist_lab.one_joint.closed_form import FlexibleShoulder
 from tvist_lab.one_joint.plucked import pluck
 from tvist_lab.recordings import Floats, Recording
+from tvist_lab.study.line import ControlLine, point_to_point
+from tvist_lab.study.shaping import Running, shape
 from tvist_plant.description import RobotDescription, load
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_shaping import Estimator, Fixed, TvistFilter, shaper
@@ -155,9 +155,10 @@ def _pose_result(description: RobotDescription, name: str, progress: Callable[[]
         # Both joints turn the same way, so that their torques about the shoulder add.
         start = target - np.array([np.copysign(turn, bend), bend])
         for way in WAYS:
-            made = measured(_recorded(description, way, start, target, seed=number))
-            peaks[way].append(made.peak)
-            durations[way].append(made.duration)
+            recording = _recorded(description, way, start, target, seed=number)
+            motion = motions(recording)[0]
+            peaks[way].append(peak_after_stop(recording, motion))
+            durations[way].append(motion.shaped_duration(recording))
             progress()
     usual = np.array(durations["unshaped"])
     return PoseResult(
@@ -174,7 +175,7 @@ def _recorded(description: RobotDescription, way: str, start: Floats, target: Fl
     if way != "unshaped":
         tvist = TvistFilter(shaper("zv"), _estimator(description, way), joints=description.joints)
         tvist.reset(start)
-        shaped = shape(Sound(tvist), reference)[0]
+        shaped = shape(Running(tvist), reference, watched=False).q
     line = ControlLine(description, start, description.payload)
     return line.follow(reference, shaped).simulate(FlexibleArm(description, description.payload), seed)
 

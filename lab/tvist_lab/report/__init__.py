@@ -1,7 +1,7 @@
 """Reports: one self-contained web page each, with a verdict in a sentence, tables, figures and provenance."""
 
 from tvist_lab.report.of_recordings import recordings_page, recordings_verdict
-from tvist_lab.report.of_studies import evaluation_page, shaperbench_page
+from tvist_lab.report.of_studies import evaluation_page, shaperbench_page, study_page
 from tvist_lab.report.page import Page, PageTable, Picture, Section, render
 
 __all__ = [
@@ -14,4 +14,5 @@ __all__ = [
     "recordings_verdict",
     "render",
     "shaperbench_page",
+    "study_page",
 ]

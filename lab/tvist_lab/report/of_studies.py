@@ -6,10 +6,27 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from tvist_lab.report.page import Page, PageTable, Section, picture
+from tvist_lab.studies.bench_tables import IN_REPORT, ranked
+from tvist_lab.study.measures import MEASURES
+from tvist_lab.study.study import Study
+from tvist_lab.study.tables import Shown, cells, titles
 from tvist_lab.words import counted
 
 LISTED = 200
 """Largest number of moves that are listed one by one."""
+WAYS = (
+    Shown("", "name"), Shown("less, median", "reduction_percent.median", 1, " %"),
+    Shown("p5", "reduction_percent.p5", 1, " %"), Shown("least", "reduction_percent.min", 1, " %"),
+    Shown("less than waiting", "less_than_waiting_percent.median", 1, " %"), Shown("delay ms", "delay_ms.median", 0),
+    Shown("still ms", "still_after_unshaped_stop_ms.median", 0),
+    Shown("largest q̈ / limit", "peak_acceleration_ratio.max", 3),
+)  # fmt: skip
+MOVES = (
+    Shown("move", "place"), Shown("payload kg", "payload_kg", 2), Shown("unshaped m/s²", "unshaped_peak_m_s2", 3),
+    Shown("shaped m/s²", "shaped_peak_m_s2", 3), Shown("less", "reduction_percent", 1, " %"),
+    Shown("delay ms", "delay_ms", 0), Shown("still ms", "still_after_ms.shaped", 0),
+    Shown("q̈ / limit", "peak_acceleration_ratio", 3),
+)  # fmt: skip
 
 
 def evaluation_page(result: Mapping[str, Any], figures: Mapping[str, Figure], command: str) -> Page:
@@ -21,28 +38,8 @@ def evaluation_page(result: Mapping[str, Any], figures: Mapping[str, Figure], co
         command: The command that makes the report, for its provenance.
     """
     ways = {result["shaper"]: result, **result["baselines"]}
-    columns = (
-        "",
-        "less, median",
-        "p5",
-        "least",
-        "less than waiting",
-        "delay ms",
-        "still ms",
-        "largest q̈ / limit",
-    )
-    rows = [
-        (
-            name,
-            *(_text(way["reduction_percent"][key], 1, " %") for key in ("median", "p5", "min")),
-            _text(way["less_than_waiting_percent"]["median"], 1, " %"),
-            _text(way["delay_ms"]["median"], 0),
-            _text(way["still_after_unshaped_stop_ms"]["median"], 0),
-            _text(way["peak_acceleration_ratio"]["max"], 3),
-        )
-        for name, way in ways.items()
-    ]
-    sections = [Section("Shapers", tables=[PageTable(columns, rows)]), _drawn(figures)]
+    rows = cells([{"name": name, **way} for name, way in ways.items()], WAYS)
+    sections = [Section("Shapers", tables=[PageTable(titles(WAYS), rows)]), _drawn(figures)]
     sections.append(Section("Moves", tables=[_moves(result["moves"])]))
     if result["notes"]:
         sections.append(Section("Notes", points=result["notes"]))
@@ -91,31 +88,9 @@ def _verdict_on_evaluation(result: Mapping[str, Any]) -> list[str]:
 
 
 def _moves(moves: Sequence[Mapping[str, Any]]) -> PageTable:
-    columns = (
-        "move",
-        "payload kg",
-        "unshaped m/s²",
-        "shaped m/s²",
-        "less",
-        "delay ms",
-        "still ms",
-        "q̈ / limit",
-    )
-    rows = [
-        (
-            str(place),
-            _text(move["payload_kg"], 2),
-            _text(move["unshaped_peak_m_s2"], 3),
-            _text(move["shaped_peak_m_s2"], 3),
-            _text(move["reduction_percent"], 1, " %"),
-            _text(move["delay_ms"], 0),
-            _text(move["still_after_ms"]["shaped"], 0),
-            _text(move["peak_acceleration_ratio"], 3),
-        )
-        for place, move in enumerate(moves[:LISTED], 1)
-    ]
+    numbered = [{"place": place, **move} for place, move in enumerate(moves[:LISTED], 1)]
     more = f"The first {LISTED} of {len(moves)} moves" if len(moves) > LISTED else ""
-    return PageTable(columns, rows, more)
+    return PageTable(titles(MOVES), cells(numbered, MOVES), more)
 
 
 def shaperbench_page(result: Mapping[str, Any], figures: Mapping[str, Figure]) -> Page:
@@ -125,32 +100,10 @@ def shaperbench_page(result: Mapping[str, Any], figures: Mapping[str, Figure]) -
         result: What `tvist shaperbench --json` prints.
         figures: Caption to figure.
     """
-    ranked = [row for row in result["shapers"] if row["ranked"]]
-    columns = (
-        "shaper",
-        "still ms",
-        "p90",
-        "vibration m/s²",
-        "less than waiting",
-        "p5",
-        "delay ms",
-        "largest q̈ / limit",
-    )
-    rows = [
-        (
-            row["name"] + (" *" if row["pareto"] else ""),
-            _text(row["time_until_still_ms"]["median"], 0),
-            _text(row["time_until_still_ms"]["p90"], 0),
-            _text(row["residual_m_s2"]["median"], 3),
-            _text(row["reduction_percent"]["median"], 1, " %"),
-            _text(row["reduction_percent"]["p5"], 1, " %"),
-            _text(row["delay_ms"]["median"], 0),
-            _text(row["peak_acceleration_ratio"]["max"], 3),
-        )
-        for row in ranked
-    ]
+    entries = ranked(result)
     caption = "* keeps the limits, and no other shaper that keeps them is better in both still and vibration"
-    sections = [Section("Shapers", tables=[PageTable(columns, rows, caption)]), _drawn(figures)]
+    shown = PageTable(titles(IN_REPORT), cells(entries, IN_REPORT), caption)
+    sections = [Section("Shapers", tables=[shown]), _drawn(figures)]
     if others := [f"{row['name']}: it {row['fault']}" for row in result["shapers"] if not row["ranked"]]:
         sections.append(Section("Not ranked", points=others))
     sections.append(Section("Arms", facts=result["arms"]))
@@ -163,7 +116,7 @@ def shaperbench_page(result: Mapping[str, Any], figures: Mapping[str, Figure]) -
     }
     sections.append(Section("Provenance", facts=facts))
     return Page(
-        f"Ranking of {len(ranked)} shapers", _verdict_on_ranking(ranked, len(result["arms"])), sections
+        f"Ranking of {len(entries)} shapers", _verdict_on_ranking(entries, len(result["arms"])), sections
     )
 
 
@@ -185,9 +138,28 @@ def _verdict_on_ranking(ranked: Sequence[Mapping[str, Any]], arms: int) -> list[
     return [lead, f"{quiet['name']} leaves the least vibration: {quiet['residual_m_s2']['median']:.3f} m/s²."]
 
 
+def study_page(study: Study, result: Mapping[str, Any], figure: Figure, command: str) -> Page:
+    """Build the report of a study of one's own.
+
+    Args:
+        study: The study.
+        result: What `tvist study FILE --json` prints.
+        figure: Its figure.
+        command: The command that makes the report, for its provenance.
+    """
+    columns = study.shown(result["summary"])
+    words = {
+        name: f"{MEASURES[name].meaning}{f' [{MEASURES[name].unit}]' if MEASURES[name].unit else ''}"
+        for name in study.show
+    }
+    sections = [
+        Section("Results", tables=[PageTable(titles(columns), cells(result["summary"], columns))]),
+        _drawn({"Medians, and bands from the 5th to the 95th percentile.": figure}),
+        Section("What the words mean", facts=words),
+        Section("Provenance", facts={"Command": command, "Rows": str(result["rows"])}),
+    ]
+    return Page(study.title, [study.notes or f"{counted(result['rows'], 'row')} were measured."], sections)
+
+
 def _drawn(figures: Mapping[str, Figure]) -> Section:
     return Section("Figures", pictures=[picture(figure, caption) for caption, figure in figures.items()])
-
-
-def _text(value: float | None, digits: int, unit: str = "") -> str:
-    return "–" if value is None else f"{value:.{digits}f}{unit}"

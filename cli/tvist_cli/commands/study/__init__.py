@@ -1,0 +1,1 @@
+"""The commands of `tvist study`, one module each."""

@@ -1,0 +1,104 @@
+"""`tvist study FILE`: run a study of one's own, a TOML file of a sweep or a Python file."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tvist_cli import studying
+from tvist_cli.failure import Failure, told
+from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.output import print_json, say, table, typed
+from tvist_cli.report_file import write_report
+from tvist_cli.study_names import STUDY
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tvist_lab.study.study import Study
+
+
+def file(
+    file: Path,
+    *,
+    output: Path | None = None,
+    processes: int | None = None,
+    scheduler: str | None = None,
+    look: FigureOptions = AS_USUAL,
+    markdown: Path | None = None,
+    report: Path | None = None,
+    json: bool = False,
+) -> None:
+    """Run a study: one that comes with the package, by its name, or one of your own, from a file.
+
+    A TOML file is a sweep, as for tvist study sweep. A Python file contains STUDY = Study(...): every method makes
+    every case. Rows are kept in a folder as they come, so that the same command continues where it was interrupted; it
+    repeats what had failed. At the end sweep.parquet in that folder holds all rows, and study.png shows them.
+
+    Args:
+        file: TOML or Python file.
+        output: Folder for the rows [that of the file, with its name but without the suffix].
+        processes: Number of processes on this machine [one for each core].
+        scheduler: Address of a Dask scheduler whose workers to use instead, such as tcp://HOST:8786.
+        look: How to write the figure.
+        markdown: File to write a page with the table to; for Python files.
+        report: File to write a web page with table and figure to; for Python files.
+        json: Print one JSON object.
+    """
+    if not file.suffix and not file.exists():
+        raise Failure(f"there is no study {file}: give a file, or one of {', '.join(STUDY)}", code=2)
+    if file.suffix != ".py":
+        from tvist_cli.commands.study.sweep import sweep
+
+        if markdown is not None or report is not None:
+            raise Failure("--markdown and --report are for a study in a Python file", code=2)
+        sweep(file, output=output, processes=processes, scheduler=scheduler, look=look, json=json)
+        return
+    from tvist_lab.figures import study_figure
+    from tvist_lab.study.study import StudyError, read_study
+
+    folder = studying.folder_of(file, output, processes, scheduler, look)
+    with told(StudyError, OSError):
+        study = read_study(file)
+    ran, elapsed = studying.run(study.plan(), folder, processes, scheduler)
+    result = {
+        "study": str(file),
+        "title": study.title,
+        "notes": study.notes,
+        **studying.about(ran, elapsed, folder),
+        "summary": study.summary(ran.rows),
+    }
+    figure = study_figure(result["summary"], study.by, study.show)
+    with told(OSError):
+        result["figure"] = str(look.into(folder).write(figure, "study"))
+        _write(study, result, figure, markdown, report)
+    if json:
+        print_json(result)
+    else:
+        _print(study, result)
+    studying.tell_failed(result, folder)
+
+
+def _write(
+    study: "Study", result: dict[str, Any], figure: "Figure", markdown: Path | None, report: Path | None
+) -> None:
+    from tvist_lab.studies.pages import page
+    from tvist_lab.study.measures import MEASURES
+
+    columns = study.shown(result["summary"])
+    if markdown is not None:
+        measures = [MEASURES[name] for name in study.show]
+        text = page("study", result, typed(), columns=columns, measures=measures, left=len(study.by) + 1)
+        markdown.write_text(text, encoding="utf-8")
+    if report is not None:
+        from tvist_lab.report import study_page
+
+        write_report(report, study_page(study, result, figure, typed()))
+
+
+def _print(study: "Study", result: dict[str, Any]) -> None:
+    from tvist_lab.study.tables import cells, titles
+
+    columns = study.shown(result["summary"])
+    done = f"{result['rows']} rows in {result['rows_file']}; {result['tasks_done_before']} moves were done before"
+    table(f"{study.title}: {done}", titles(columns), cells(result["summary"], columns))
+    studying.say_effort(result)
+    say(f"{result['figure']} shows the table")

@@ -1,0 +1,116 @@
+"""`tvist study map`: maps of the first mode and of a shaper's delay over the workspace."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.output import number, out, print_json, table, write_json
+from tvist_cli.shapers_of import of_impulses
+from tvist_cli.simulated_arm import masses_of
+
+if TYPE_CHECKING:
+    from tvist_protocol.calibration import Calibration
+
+
+def map(  # noqa: A001  the command's name
+    *,
+    robot: str = "ur5e",
+    payload: float | None = None,
+    calibration: str | None = None,
+    shaper: str = "zv",
+    points: int = 41,
+    output: Path | None = None,
+    figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
+    json: bool = False,
+) -> None:
+    """Map frequency and damping of the lowest mode and a shaper's delay over the workspace, identified against true.
+
+    The map is over the first two joints that change the modes, which for a six-joint arm are shoulder and elbow; the
+    other joints are in the middle of the workspace. Configurations in which the arm would touch itself or the floor
+    are left out. The truth is that of the simulated arm.
+
+    Args:
+        robot: Name of a robot that comes with the package, or path of a robot file.
+        payload: Mass of the disc on the flange in kg, both carried and declared [that of the robot file].
+        calibration: Name of a calibration that comes with the package, or path of a calibration file; its modal model
+            is used if it has one [the one that comes with the package for this robot].
+        shaper: Name of a shaper whose delay is mapped, as tvist shapers lists it, or FILE.py:NAME.
+        points: Number of angles of each joint.
+        output: JSON file to write the maps to.
+        figures: Folder to write a figure of each map to.
+        look: How to write the figures.
+        json: Print one JSON object.
+    """
+    from tvist_lab.studies.workspace_map import QUANTITIES, MapError, workspace_map
+    from tvist_plant.description import DescriptionError, load
+    from tvist_shaping import ShapingError
+
+    look.check(figures)
+    if not 3 <= points <= 501:
+        raise Failure(f"points is {points}: must be 3 to 501", code=2)
+    with told(DescriptionError, code=2):
+        description = load(robot)
+    mass = masses_of(None if payload is None else str(payload), description)[0]
+    known = _calibration(calibration, description.robot.model)
+    chosen = of_impulses(shaper)
+    with told(MapError, ShapingError, code=2):
+        found = workspace_map(description, known, chosen, mass, points)
+    words = f"{description.robot.name}, {mass:g} kg, calibration {known.name}, shaper {chosen.name}"
+    result: dict[str, Any] = {
+        "robot": description.robot.name,
+        "payload_kg": mass,
+        "calibration": known.name,
+        "shaper": chosen.name,
+        **found.as_dict(),
+    }
+    if result["left_out"] == points**2:
+        raise Failure(f"robot {robot} touches itself or the floor in each of the {points**2} configurations")
+    with told(OSError):
+        if output is not None:
+            write_json(output, result)
+        if figures is not None:
+            from tvist_lab.figures import workspace_map_figure
+
+            files = look.into(figures)
+            write(
+                files,
+                {
+                    f"map_{name}": workspace_map_figure(found, key, words, files.columns)
+                    for key, name in QUANTITIES.items()
+                },
+            )
+    if json:
+        print_json(result)
+        return
+    free = points**2 - result["left_out"]
+    table(
+        f"{words}: {free} of {points**2} configurations of {found.names[0]} and {found.names[1]}",
+        ("map", "identified from", "to", "true from", "to", "error % median", "p95", "max"),
+        [_row(key, result) for key in QUANTITIES],
+    )
+    out.print("error: size of the deviation of what is identified from what is true, in percent")
+
+
+def _calibration(name: str | None, model: str) -> "Calibration":
+    from tvist_controller.calibrations import default_for, load
+    from tvist_protocol.calibration import CalibrationError
+
+    if name is None:
+        name = default_for(model)
+    if name is None:
+        raise Failure(f"the package has no calibration of a {model}: give --calibration FILE", code=2)
+    with told(CalibrationError, code=2):
+        return load(name)
+
+
+def _row(key: str, result: dict[str, Any]) -> tuple[str, ...]:
+    maps, errors = result["maps"][key], result["errors"][key]
+    digits = 3 if key == "zeta" else 1
+    ends = []
+    for kind in ("identified", "true"):
+        values = [value for row in maps[kind] for value in row if value is not None]
+        ends += [number(min(values), digits), number(max(values), digits)]
+    sizes = (number(errors[name], 1) for name in ("median_percent", "p95_percent", "max_percent"))
+    return (key.replace("_hz", " Hz").replace("_ms", " ms"), *ends, *sizes)

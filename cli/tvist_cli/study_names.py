@@ -1,0 +1,10 @@
+"""The studies that come with the package, which are commands of `tvist study`."""
+
+STUDY = {
+    "sweep": "Compare shapers over payloads, errors, moves and robots, on all cores or a cluster.",
+    "robustness": "Compare shapers on arms that are stiffer, softer or loaded otherwise than they are told.",
+    "paths": "Compare paths shaped along the path with the same paths shaped joint by joint.",
+    "tracking": "Measure how closely the arm follows positions sent to servoj, with every shaper.",
+    "map": "Map frequency, damping and a shaper's delay over the workspace, identified against true.",
+}
+"""Names with their one-line help."""

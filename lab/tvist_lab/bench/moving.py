@@ -1,0 +1,134 @@
+"""Processor time of a tick of a robot in this process, and of its parts, while the arm moves."""
+
+import gc
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tvist_controller.api import (
+    ControlCycle,
+    InverseDynamics,
+    JointLine,
+    LoopbackHost,
+    MotionLimits,
+    Setup,
+    body,
+    quickest_motion,
+)
+from tvist_lab.in_process import free_setup
+from tvist_lab.studies.paper.published import pose
+from tvist_plant.drives import DriveCommand
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.plant import PERIOD
+from tvist_protocol.codec import decode_reply, encode
+from tvist_protocol.commands import Command, MoveJ, TakeControl
+from tvist_protocol.replies import Refused
+from tvist_protocol.simulation import SimulationReset, SimulationStep
+from tvist_shaping import TvistFilter, shaper
+
+TICKS = 500
+"""Number of ticks of a run: the first second of the motion from Q1 to Q3, which lasts longer with every filter."""
+LIMITS = MotionLimits(1.5, 2.0, 100.0)
+
+Floats = NDArray[np.float64]
+Run = Callable[[], float]
+"""Measures something once, and returns the result, here the processor time of a tick [µs]."""
+
+
+class Arm(Protocol):
+    """An arm that drives move."""
+
+    def reset(self, command: DriveCommand) -> object:
+        """Put it to rest at a position."""
+
+    def step(self, command: DriveCommand) -> object:
+        """Move it for a period."""
+
+
+def line_tick(shaper: str) -> Run:
+    """Return what measures a tick of the whole line, from messages to encoded states, with a shaper by its name.
+
+    Raises:
+        ConfigError: There is no such shaper.
+    """
+    host = LoopbackHost(free_setup(truth=False, shaper=shaper))
+    host.subscribe("state", len)
+    host.request("bench", encode(TakeControl(client="bench")))
+    lease = host.controller.session.lease
+    token = lease.token if lease else ""
+
+    def send(command: Command) -> None:
+        reply = decode_reply(host.request("bench", encode(command)))
+        assert not isinstance(reply, Refused), reply.why
+
+    def run() -> float:
+        send(SimulationReset(token=token, q=pose("Q1")))
+        send(MoveJ(token=token, q=pose("Q3")))
+        return us_per_tick(lambda: send(SimulationStep(token=token, ticks=TICKS)))
+
+    return run
+
+
+def plant_tick() -> Run:
+    """Return what measures a tick of our plant."""
+    setup = free_setup(truth=False)
+    return arm_tick(FlexibleArm(setup.description, body(setup.payload)))
+
+
+def arm_tick(arm: Arm) -> Run:
+    """Return what measures a tick of an arm that makes the motion."""
+    setup = free_setup(truth=False)
+    dynamics = InverseDynamics(setup.description, body(setup.payload))
+    commands = [DriveCommand(q, np.zeros_like(q), dynamics.gravity(q)) for q in motion()]
+
+    def go() -> None:
+        for command in commands:
+            arm.step(command)
+
+    def run() -> float:
+        arm.reset(commands[0])
+        return us_per_tick(go)
+
+    return run
+
+
+def cycle_tick() -> Run:
+    """Return what measures a tick of Figure 6 with `zv`, without what is around it."""
+    setup = free_setup(truth=False)
+    payload, start, target = body(setup.payload), np.array(pose("Q1")), np.array(pose("Q3"))
+    cycle = ControlCycle(
+        setup.description, line_filter(setup), q=start, declared=payload, carried=payload, seed=0
+    )
+
+    def go() -> None:
+        for _ in range(TICKS):
+            cycle.step()
+
+    def run() -> float:
+        cycle.reset(start)
+        cycle.start(cycle.plan(target, LIMITS))
+        return us_per_tick(go)
+
+    return run
+
+
+def line_filter(setup: Setup) -> TvistFilter:
+    """Return the filter of a setup with its estimator."""
+    return TvistFilter(shaper(setup.shaper), setup.estimator(), joints=setup.description.joints)
+
+
+def motion() -> list[Floats]:
+    """References of a run, each of shape (n,) [rad]."""
+    trajectory = quickest_motion(JointLine(np.array(pose("Q1")), np.array(pose("Q3"))), LIMITS, PERIOD)
+    return [trajectory.next() for _ in range(TICKS)]
+
+
+def us_per_tick(go: Callable[[], Any]) -> float:
+    """Return the processor time of a tick of a run [µs]."""
+    gc.collect()
+    began = time.thread_time()
+    go()
+    return 1e6 * (time.thread_time() - began) / TICKS

@@ -1,0 +1,128 @@
+"""One served robot: punctuality, response times, and use of resources."""
+
+import asyncio
+import random
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tvist_client.arm import Arm
+from tvist_client.robot import Robot
+from tvist_lab.bench.lateness import missed_share, over_all
+from tvist_lab.bench.process import cpu_seconds, rss_mb
+from tvist_lab.served import Served, served
+from tvist_plant.plant import PERIOD
+from tvist_protocol.stream import State, Telemetry
+
+SWING = 0.05
+"""Amplitude of the streamed sine [rad]."""
+COMMANDS = 200
+"""Number of commands whose response time is measured."""
+
+
+async def one_robot(
+    seconds: float, tell: Callable[[str], None], options: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Measure a robot served by another process, with a recorder and a client that reads every state.
+
+    Args:
+        seconds: How long to measure its ticks, and how long to stream set-points [s].
+        tell: Called with a description of each measurement before it starts.
+        options: Further options of `tvist serve`.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        async with served(["--record", str(Path(folder) / "bench.mcap"), *options]) as server:
+            await server.robot.state()
+            start_s = server.took
+            tell(f"a served robot for {seconds:g} s")
+            tick, share = await punctuality(server, seconds)
+            async with server.robot.control("bench") as arm:
+                tell(f"set-points at 500 Hz for {seconds:g} s")
+                setpoints = await _setpoints(server.robot, arm, seconds)
+                tell("commands")
+                commands = await _commands(arm)
+            memory = rss_mb(server.pid)
+            ending = time.monotonic()
+        end_s = time.monotonic() - ending
+    return {
+        "tick": tick,
+        "setpoint_to_state_ms": _percentiles(setpoints),
+        "command_ms": _percentiles(commands),
+        "cpu_share": share,
+        "start_s": start_s,
+        "end_s": end_s,
+        "rss_mb": memory,
+    }
+
+
+async def punctuality(server: Served, seconds: float) -> tuple[dict[str, float], float]:
+    """Return the lateness of its ticks, and the share of a core that it uses."""
+    robot = server.robot
+    heard: list[Telemetry] = []
+    states = 0
+
+    def count(_: State) -> None:
+        nonlocal states
+        states += 1
+
+    missed_before = (await robot.state()).missed_ticks
+    forget = robot.on_state(count), robot.on_telemetry(heard.append)
+    used, began = cpu_seconds(server.pid), time.monotonic()
+    await robot.advance(round(seconds / PERIOD))
+    share = (cpu_seconds(server.pid) - used) / (time.monotonic() - began)
+    missed = (await robot.state()).missed_ticks - missed_before
+    for function in forget:
+        function()
+    return {
+        "seconds": seconds,
+        "missed": missed,
+        "states_received": states,
+        "missed_percent": 100.0 * missed_share(heard),
+        **over_all(heard),
+    }, share
+
+
+async def _setpoints(robot: Robot, arm: Arm, seconds: float) -> list[float]:
+    """Times from sending each set-point to the arrival of the first state with this or a newer one [s]."""
+    middle = np.array((await robot.state()).target_q)
+    sent: list[float] = []
+    took: list[float] = []
+
+    def on_state(state: State) -> None:
+        now = time.monotonic()
+        if state.setpoint_sequence is not None:
+            took.extend(now - put for put in sent[len(took) : state.setpoint_sequence + 1])
+
+    forget = robot.on_state(on_state)
+    async with arm.servo(period=PERIOD) as servo:
+        # Slightly slower than the robot ticks, so that the set-points are sent at all moments within its period.
+        pace = PERIOD * (1.0 + PERIOD / seconds)
+        began = time.monotonic()
+        for number in range(round(seconds / PERIOD)):
+            q = middle + SWING * np.sin(np.pi * number * PERIOD) ** 2
+            sent.append(time.monotonic())
+            servo.set(q.tolist())
+            await asyncio.sleep(began + (number + 1) * pace - time.monotonic())
+        await robot.advance(10)
+    forget()
+    return took
+
+
+async def _commands(arm: Arm) -> list[float]:
+    """Round trips of commands, each sent at a random moment within a period [s]."""
+    chance, took = random.Random(0), []  # noqa: S311  no secret
+    for _ in range(COMMANDS):
+        await asyncio.sleep(chance.uniform(0.0, 2.0 * PERIOD))
+        began = time.monotonic()
+        await arm.keep_alive()
+        took.append(time.monotonic() - began)
+    return took
+
+
+def _percentiles(seconds: Iterable[float]) -> dict[str, float]:
+    p50, p99 = np.percentile(1e3 * np.array(list(seconds)), (50, 99))
+    return {"p50": float(p50), "p99": float(p99)}

@@ -1,0 +1,1 @@
+"""The studies, each a preset of `tvist_lab.study`."""

@@ -1,0 +1,161 @@
+"""How well an arm is identified and its vibration suppressed: the same measurement for every arm."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_controller.api import Setup, body, modal_estimator, paper_payload
+from tvist_lab.identification.modal import identify_modal
+from tvist_lab.identification.modal_plan import ModalPlan, free_configurations, jog_of
+from tvist_lab.in_process import robot_in_process
+from tvist_lab.studies.evaluate import MEASURED, methods, report
+from tvist_lab.study.arms import stiffer
+from tvist_lab.study.case import Case, arm_seed
+from tvist_lab.study.engine import made
+from tvist_lab.study.method import Named
+from tvist_lab.study.moves import draw_moves
+from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.work import Job
+from tvist_plant.description import RobotDescription
+from tvist_plant.drives import DriveCommand
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.model import rigid_model
+from tvist_protocol.calibration import Calibration
+
+PLACES = 40
+"""Number of random configurations at which modes and sag are compared."""
+MODES = 3
+"""Number of modes that are compared."""
+ALONE = 4
+"""Least number of joints of an arm that auto can shape: it suppresses four modes."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """An arm with one calibration."""
+
+    stiffness: float
+    """Stiffness of gears and links relative to the robot file's [-]."""
+    calibration: str
+    """Name of the calibration; "identified" if it was made for this measurement."""
+    f_d_error_percent: list[float]
+    """Median error of each mode's damped frequency [%]."""
+    moves: int
+    """Number of moves that were made."""
+    too_weak: int
+    """Number of drawn moves that were left out since the drives are too weak."""
+    counted: int
+    """Number of moves with enough vibration for a percentage."""
+    reduction_percent: dict[str, float | None]
+    """Reduction of the peak by `auto`, over moves [%]."""
+    delay_ms: float
+    """Median delay [ms]."""
+    sag_error_percent: float
+    """Largest difference of a gear's twist at rest from g/K, relative to the largest twist in that pose [%]."""
+
+
+def measure(
+    description: RobotDescription,
+    calibration: Calibration | None,
+    *,
+    stiffness: float = 1.0,
+    moves: int,
+    seed: int,
+    progress: Callable[[int], None] = lambda _: None,
+) -> Measured:
+    """Measure an arm whose springs are stiffer by a factor.
+
+    Args:
+        description: The arm as its file describes it.
+        calibration: Calibration of this arm; None to identify the arm first.
+        stiffness: Factor of the stiffness of gears and links [-].
+        moves: Number of random moves with the rated payload.
+        seed: Seed of moves, identification and gear errors.
+        progress: Called with the number of moves that were made.
+    """
+    arm = description if stiffness == 1.0 else stiffer(description, stiffness)
+    known = asyncio.run(_identified(arm, seed)) if calibration is None else calibration
+    mass = arm.payload.mass
+    drawn = draw_moves(arm, moves, seed, (mass, mass)).moves
+    feasible = [move for move in drawn if Case(arm, move).torque_share <= 1.0]
+    auto = methods(Named(Recipe("auto", known), "auto"), ())
+    jobs = [
+        Job(Case(arm, move, arm_seed(seed, place), axes={"payload_kg": move.mass}), auto, MEASURED)
+        for place, move in enumerate(feasible)
+    ]
+    judged = []
+    for rows in made(jobs):
+        judged.append(rows)
+        progress(1)
+    progress(len(drawn) - len(feasible))
+    summary = report(judged)
+    return Measured(
+        stiffness=stiffness,
+        calibration="identified" if calibration is None else known.name,
+        f_d_error_percent=_mode_errors(arm, known, seed),
+        moves=len(feasible),
+        too_weak=len(drawn) - len(feasible),
+        counted=summary["counted"],
+        reduction_percent={key: summary["reduction_percent"][key] for key in ("median", "p5", "min")},
+        delay_ms=summary["delay_ms"]["median"],
+        sag_error_percent=sag_error(arm, seed),
+    )
+
+
+async def _identified(arm: RobotDescription, seed: int) -> Calibration:
+    """Identify an arm in this process, as `tvist identify --model modal` does by default."""
+    carried = tuple(paper_payload(arm, mass) for mass in (0.0, arm.payload.mass))
+    start = next(iter(arm.poses.values()))
+    setup = Setup(
+        description=arm,
+        q=start,
+        payload=paper_payload(arm),
+        calibration=None,
+        seed=seed,
+        clock="free",
+        truth=False,
+    )
+    plan = ModalPlan(payloads=carried, seed=seed, jog=jog_of(arm))
+    async with robot_in_process(setup) as robot, robot.control("robots") as control:
+        found = await identify_modal(
+            robot, control, arm, plan, name="identified", command="tvist robots", progress=lambda: None
+        )
+    return found.calibration
+
+
+def _mode_errors(arm: RobotDescription, calibration: Calibration, seed: int) -> list[float]:
+    """Median error of the frequency of each mode at random configurations with the rated payload [%]."""
+    payload = paper_payload(arm)
+    estimator = modal_estimator(calibration, arm, payload, MODES)
+    plant = FlexibleArm(arm, body(payload))
+    errors = []
+    for q in free_configurations(arm, (payload,), PLACES, ModalPlan(seed=seed)):
+        f_d, _ = estimator.estimate(q)
+        errors.append(np.abs(f_d / plant.modes(q).f_d[:MODES] - 1.0))
+    return [100.0 * float(value) for value in np.median(errors, axis=0)]
+
+
+def sag_error(arm: RobotDescription, seed: int) -> float:
+    """Compare the twist of the gears of an arm at rest with g(q)/K at random configurations.
+
+    Returns:
+        Largest difference, relative to the largest twist in its pose [%]; 0 if gravity loads no joint.
+    """
+    plant, rigid = FlexibleArm(arm.clean(), arm.payload), rigid_model(arm, arm.payload)
+    data, stiffness = rigid.createData(), np.array(arm.drives.gear_stiffness)
+    zero, worst = np.zeros(arm.joints), 0.0
+    for q in free_configurations(arm, (paper_payload(arm),), PLACES, ModalPlan(seed=seed)):
+        plant.reset(DriveCommand(q, zero, zero), seed=0)
+        expected = -pin.computeGeneralizedGravity(rigid, data, q) / stiffness
+        largest = float(np.abs(expected).max())
+        if largest > TWIST:
+            twist = plant.truth().gear_deflection
+            worst = max(worst, float(np.abs(twist - expected).max()) / largest)
+    return 100.0 * worst
+
+
+TWIST = 1e-7
+"""Twist below which gravity loads no gear [rad]."""

@@ -1,0 +1,184 @@
+"""The three motions by several methods, with repetitions, as a client."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tvist_client.arm import Arm
+from tvist_client.robot import Robot
+from tvist_lab.collect import collect
+from tvist_lab.metrics import (
+    MotionResult,
+    Runs,
+    measure,
+    motions,
+    peak_acceleration,
+    peak_after_stop,
+    still_after,
+)
+from tvist_lab.recordings import Recording
+from tvist_lab.robust import robust_over
+from tvist_lab.studies.paper.methods import (
+    EqualDuration,
+    FixedShaper,
+    FrozenAtEnd,
+    Method,
+    TimeVarying,
+    Unshaped,
+)
+from tvist_lab.studies.paper.published import MOTIONS, pose
+from tvist_protocol.info import Info
+
+BEFORE = 0.1
+"""Time recorded before a motion [s]."""
+AFTER = 1.9
+"""Time recorded after the motion's end [s]; the slow part of the drives' loops needs it to settle within 0.03 mm."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class JudgedRun:
+    """One run of one motion."""
+
+    result: MotionResult
+    """The paper's metrics."""
+    peak: float | None
+    """Largest true |α| later than 10 ms after the reference stops [m/s²]; None if the robot does not publish the
+    truth.
+    """
+    still_after: float | None
+    """Time until still, from the start of the unshaped reference [s]; None if never still."""
+    acceleration: float
+    """Largest |q̈*| [rad/s²]."""
+
+
+@dataclass
+class Experiment:
+    """Results of all runs."""
+
+    info: Info
+    seed: int
+    runs: int
+    table_1: dict[str, dict[str, float]]
+    """Pose to its lowest mode: as estimated, and the truth if the robot publishes it."""
+    judged: dict[tuple[str, str], list[JudgedRun]] = field(default_factory=dict)
+    """(motion, method) to the results of its runs."""
+    labels: dict[str, str] = field(default_factory=dict)
+    """Method to its name for people."""
+    first: dict[tuple[str, str], Recording] = field(default_factory=dict)
+    """(motion, method) to the recording of its first run, for the figures."""
+
+    def of_table_2(self) -> dict[str, Runs]:
+        """Return the unshaped and shaped runs of each motion, for Table 2."""
+        return {
+            motion: Runs(
+                [judged.result for judged in self.judged[motion, "unshaped"]],
+                [judged.result for judged in self.judged[motion, "shaped"]],
+            )
+            for motion in MOTIONS
+        }
+
+    def delay(self, motion: str) -> float:
+        """Return the mean delay of the shaped motion [s]."""
+        return 1e-3 * float(np.mean([judged.result.delay_ms for judged in self.judged[motion, "shaped"]]))
+
+
+def judge(recording: Recording) -> JudgedRun:
+    """Measure the one motion of a recording."""
+    motion = motions(recording)[0]
+    has_truth = "truth_tool_acceleration" in recording
+    result = measure(recording, motion)
+    return JudgedRun(
+        result=result,
+        peak=peak_after_stop(recording, motion) if has_truth else None,
+        still_after=still_after(recording, motion) if result.still_after_ms is not None else None,
+        acceleration=peak_acceleration(recording, motion),
+    )
+
+
+async def table_1(robot: Robot, arm: Arm) -> dict[str, dict[str, float]]:
+    """Return frequency and damping of the lowest mode at the paper's three poses."""
+    table = {}
+    await arm.set_estimator("polynomial")
+    for name in ("Q1", "Q2", "Q3"):
+        reset = await arm.reset(q=pose(name)) or 0
+        with collect(robot) as collected:
+            await robot.advance(5)
+            state = await robot.until(reset + 5)
+        table[name] = {"f_d_hz": state.estimated_f_d[0], "zeta": state.estimated_zeta[0]}
+        if collected.truths:
+            truth = collected.truths[-1]
+            table[name] |= {"true_f_d_hz": truth.f_d[0], "true_zeta": truth.zeta[0]}
+    return table
+
+
+async def run(robot: Robot, arm: Arm, motion: str, method: Method, seed: int) -> Recording:
+    """Record one motion from rest to rest, and the time after it."""
+    start, end = (pose(name) for name in MOTIONS[motion])
+    period = 1.0 / (await robot.info()).rate_hz
+    await arm.reset(q=start, seed=seed)
+    await robot.advance(1)
+    jerk = await method.prepare(robot, arm, end)
+    reset = await arm.reset(q=start, seed=seed) or 0
+    await robot.advance(1)
+    await robot.until(reset + 1)  # an answer may overtake earlier states
+    with collect(robot) as collected:
+        await robot.advance(round(BEFORE / period))
+        await arm.move_j(end, jerk=jerk)
+        await robot.advance(round(AFTER / period))
+    return collected.recording()
+
+
+async def experiment(
+    robot: Robot, arm: Arm, *, runs: int, seed: int, baselines: bool, progress: Progress
+) -> Experiment:
+    """Run every motion with every method.
+
+    Args:
+        robot: The robot.
+        arm: Control of the robot.
+        runs: Number of repetitions, each with its own noise and gear errors.
+        seed: Seed of the first repetition.
+        baselines: Whether to run the baselines, too.
+        progress: Called after each run.
+    """
+    done = Experiment(info=await robot.info(), seed=seed, runs=runs, table_1=await table_1(robot, arm))
+    for motion in MOTIONS:
+        methods: list[Method] = [Unshaped(), TimeVarying()]
+        for method in methods:
+            await _repeat(robot, arm, done, motion, method, runs, progress)
+        if baselines:
+            for method in fixed_baselines(done.info, done.delay(motion)):
+                await _repeat(robot, arm, done, motion, method, runs, progress)
+    return done
+
+
+def fixed_baselines(info: Info, delay: float) -> Sequence[Method]:
+    """Return the baselines that the paper's method has to be compared with."""
+    if info.calibration is None:
+        return [EqualDuration(delay)]
+    f_d, zeta = info.calibration.f_d_range, info.calibration.zeta_range
+    robust = [
+        FixedShaper(name, *robust_over(name, f_d, zeta), name=f"fixed_{name}", label=f"fixed {name.upper()}")
+        for name in ("mzv", "ei2", "ei3")
+    ]
+    return [EqualDuration(delay), FrozenAtEnd(), *robust]
+
+
+def count(runs: int, *, baselines: bool) -> int:
+    """Return the total number of runs."""
+    return len(MOTIONS) * runs * (7 if baselines else 2)
+
+
+async def _repeat(
+    robot: Robot, arm: Arm, done: Experiment, motion: str, method: Method, runs: int, progress: Progress
+) -> None:
+    key = (motion, method.name)
+    done.labels[method.name] = method.label
+    for number in range(runs):
+        recording = await run(robot, arm, motion, method, seed=1000 * done.seed + number)
+        done.first.setdefault(key, recording)
+        done.judged.setdefault(key, []).append(judge(recording))
+        progress(f"{motion} {method.label}")

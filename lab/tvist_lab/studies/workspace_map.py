@@ -1,0 +1,143 @@
+"""The first mode over the workspace: as a calibration tells it, and as the simulated arm has it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tvist_controller.api import CollisionModel, ModeSource, body, paper_payload
+from tvist_lab.recordings import Floats
+from tvist_lab.workspace import identified, ranges, workspace
+from tvist_plant.description import RobotDescription
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_protocol.calibration import Calibration
+from tvist_shaping import Shaper
+
+QUANTITIES = {"f_d_hz": "f_d", "zeta": "zeta", "delay_ms": "delay"}
+"""Keys of the maps, with the words in the names of their files."""
+
+
+class MapError(ValueError):
+    """There is no map of this arm; the message says why."""
+
+
+@dataclass(frozen=True)
+class WorkspaceMap:
+    """Values on a grid over two joints; NaN where the arm would touch itself or the floor."""
+
+    joints: tuple[int, int]
+    """Indices of the joints along the grid's rows and columns."""
+    names: tuple[str, str]
+    """Their names."""
+    angles: tuple[Floats, Floats]
+    """Their angles [rad], shapes (R,) and (C,)."""
+    rest: tuple[float, ...]
+    """Configuration of the other joints; those of the grid are zero in it [rad]."""
+    identified: dict[str, Floats]
+    """Key of `QUANTITIES` to what the calibration tells, shape (R, C)."""
+    true: dict[str, Floats]
+    """The same of the simulated arm."""
+
+    def error(self, key: str) -> Floats:
+        """Deviation of what is identified from what is true [%], shape (R, C)."""
+        return np.asarray(100.0 * (self.identified[key] / self.true[key] - 1.0))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the content of `tvist study map --json`; null stands for configurations that collide."""
+        rows, columns = self.names
+        return {
+            "rows": {"joint": rows, "angles_rad": self.angles[0].tolist()},
+            "columns": {"joint": columns, "angles_rad": self.angles[1].tolist()},
+            "other_joints_rad": list(self.rest),
+            "left_out": int(np.count_nonzero(np.isnan(self.true["f_d_hz"]))),
+            "maps": {
+                key: {
+                    "identified": _plain(self.identified[key]),
+                    "true": _plain(self.true[key]),
+                    "error_percent": _plain(self.error(key)),
+                }
+                for key in QUANTITIES
+            },
+            "errors": {key: _spread(self.error(key)) for key in QUANTITIES},
+        }
+
+
+def workspace_map(
+    description: RobotDescription, calibration: Calibration, shaper: Shaper, mass: float, points: int
+) -> WorkspaceMap:
+    """Compute f_d and ζ of the lowest mode and the delay of a shaper on a grid over two joints.
+
+    The grid is over the first two joints that change the modes: for a six-joint arm, shoulder and elbow. The other
+    joints are in the middle of the workspace. The payload is both carried and declared.
+
+    Args:
+        description: The robot.
+        calibration: Its calibration; a modal model is used if there is one, else the polynomials.
+        shaper: Shaper whose last impulse is the delay.
+        mass: Mass of the disc on the flange [kg].
+        points: Number of angles of each joint.
+
+    Raises:
+        MapError: The calibration belongs to another arm, or the arm has fewer than two joints.
+        EstimatorError: The calibration does not fit the arm.
+    """
+    if calibration.robot != description.robot.model:
+        raise MapError(
+            f"calibration {calibration.name} is for a {calibration.robot}, but this arm is a {description.robot.model}"
+        )
+    if description.joints < 2:
+        raise MapError(f"robot {description.robot.name} has one joint: a map is over two")
+    limits = ranges(description)
+    changing, whole = identified(limits), workspace(limits)
+    count = min(len(whole.low), description.joints)
+    moved = [joint for joint in range(count) if changing.high[joint] > changing.low[joint]]
+    first, second = sorted([*moved, *(joint for joint in range(count) if joint not in moved)][:2])
+    middle = np.zeros(description.joints)
+    middle[:count] = [0.5 * (low + high) for low, high in zip(changing.low, changing.high, strict=True)][
+        :count
+    ]
+    middle[[first, second]] = 0.0
+    angles = tuple(np.linspace(whole.low[joint], whole.high[joint], points) for joint in (first, second))
+
+    payload = paper_payload(description, mass)
+    source = ModeSource("polynomial" if calibration.modal is None else "modal", description, calibration)
+    estimator = source.estimator(1, payload)
+    arm = FlexibleArm(description, body(payload))
+    collision = CollisionModel(description, body(payload))
+    told, true = ({key: np.full((points, points), np.nan) for key in QUANTITIES} for _ in range(2))
+    for row, column in np.ndindex(points, points):
+        q = middle.copy()
+        q[first], q[second] = angles[0][row], angles[1][column]
+        if collision.meeting(q) is not None:
+            continue
+        f_d, zeta = estimator.settle(q)
+        modes = arm.modes(q)
+        for maps, mode in ((told, (f_d[0], zeta[0])), (true, (modes.f_d[0], modes.zeta[0]))):
+            values = (*mode, 1e3 * shaper.impulses(float(mode[0]), float(mode[1])).duration)
+            for key, value in zip(QUANTITIES, values, strict=True):
+                maps[key][row, column] = value
+    joints = description.robot.joints
+    return WorkspaceMap(
+        joints=(first, second),
+        names=(joints[first], joints[second]),
+        angles=(angles[0], angles[1]),
+        rest=tuple(middle.tolist()),
+        identified=told,
+        true=true,
+    )
+
+
+def _plain(grid: Floats) -> list[list[float | None]]:
+    return [[None if np.isnan(value) else float(value) for value in row] for row in grid]
+
+
+def _spread(error: Floats) -> dict[str, float | None]:
+    """Median, 95th percentile and largest of the error's size [%]."""
+    size = np.abs(error[~np.isnan(error)])
+    if not size.size:
+        return {"median_percent": None, "p95_percent": None, "max_percent": None}
+    return {
+        "median_percent": float(np.median(size)),
+        "p95_percent": float(np.percentile(size, 95)),
+        "max_percent": float(size.max()),
+    }

@@ -1,0 +1,96 @@
+"""A case of a study: an arm, what it does, and what its controller has wrong."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from tvist_controller.api import InverseDynamics, MotionLimits, body, central_differences, paper_payload
+from tvist_lab.recordings import Floats
+from tvist_lab.study.arms import AS_DESCRIBED, ArmVariant
+from tvist_lab.study.line import PAPER, ControlLine, point_to_point
+from tvist_lab.study.moves import Move
+from tvist_lab.study.streams import stopped_stream
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.plant import PERIOD, Plant
+
+LIMITS = {"gentle": PAPER, "industrial": MotionLimits(velocity=3.0, acceleration=8.0, jerk=2000.0)}
+"""Limits of moves by name: the paper's, and those of quick handling."""
+
+
+def arm_seed(seed: int, place: int) -> int:
+    """Return the seed of gear errors for the move at a place, so that each move has its own."""
+    return (1_000_003 * seed + place) % 2**63
+
+
+@dataclass(frozen=True)
+class Case:
+    """A move or a stream; it can be sent to another process."""
+
+    description: RobotDescription
+    """The controller's model of the arm."""
+    move: Move
+    """The move, with the carried mass."""
+    seed: int = 0
+    """Seed of gear errors, and of the arm's deviations."""
+    arms: tuple[ArmVariant, ...] = (AS_DESCRIBED,)
+    """The arms that make it."""
+    limits: MotionLimits = PAPER
+    """Limits of every joint."""
+    payload_error: float = 0.0
+    """Error of the declared mass, relative to the carried one [-]."""
+    stream: bool = False
+    """Whether to follow a stream from the move's start that is stopped somewhere, instead of making the move."""
+    axes: Mapping[str, Any] = field(default_factory=dict)
+    """What distinguishes it from the other cases of its study: cells of its rows, by the names of their columns."""
+
+    @property
+    def declared(self) -> Move:
+        """The move as the controller knows it."""
+        return Move(self.move.start, self.move.target, self.move.mass * (1.0 + self.payload_error))
+
+    @property
+    def torque_share(self) -> float:
+        """Largest torque that a rigid arm needs for the move, relative to its drive's limit [-]."""
+        description = self.description
+        dynamics = InverseDynamics(description, body(paper_payload(description, self.move.mass)))
+        q, qd, qdd = central_differences(self.point_to_point(), PERIOD)
+        torque = dynamics.torques(q, qd, qdd) + np.array(description.drives.rotor_inertia) * qdd
+        return float((np.abs(torque).max(axis=0) / np.array(description.limits.torque)).max())
+
+    def point_to_point(self) -> Floats:
+        """Return the reference of the move, shape (T, n) [rad]."""
+        return point_to_point(np.array(self.move.start), np.array(self.move.target), self.limits)
+
+
+class World:
+    """What makes the motions of a case: its reference, the control line, and the arms, each of which starts anew.
+
+    Args:
+        case: The case.
+    """
+
+    def __init__(self, case: Case) -> None:
+        self._case = case
+        start = np.array(case.move.start)
+        self.reference = (
+            stopped_stream(case.description, start, case.seed, case.limits)
+            if case.stream
+            else case.point_to_point()
+        )
+        """The unshaped reference, shape (T, n) [rad]."""
+        self.line = ControlLine(case.description, start, self._body(case.declared.mass))
+
+    @cached_property
+    def arms(self) -> Mapping[str, Plant]:
+        """The arms by their names."""
+        carried, case = self._body(self._case.move.mass), self._case
+        return MappingProxyType(
+            {arm.name: arm.make(case.description, carried, case.seed) for arm in case.arms}
+        )
+
+    def _body(self, mass: float) -> Payload:
+        return body(paper_payload(self._case.description, mass))

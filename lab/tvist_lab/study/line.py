@@ -1,0 +1,180 @@
+"""The control line without a server: a reference, its shaping, and the response of an arm.
+
+A shaper sees only the reference, so its output can be computed first and then be applied to any number of arms. The
+result equals that of the tick-by-tick line to the last bit.
+"""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from tvist_controller.api import (
+    Driven,
+    DrivenLine,
+    ElasticFeedForward,
+    JointLine,
+    MotionLimits,
+    Trajectory,
+    quickest_motion,
+    respond,
+)
+from tvist_lab.recordings import Floats, Recording
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.plant import PERIOD, Plant
+from tvist_shaping.catalogue import shaper
+from tvist_shaping.estimators.fixed import Fixed
+from tvist_shaping.filter import TvistFilter
+
+PAPER = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
+"""The paper's limits, which are also the defaults of `move_j`."""
+REST = 0.7
+"""Time simulated after the end of the shaped reference [s]."""
+
+RESTING = 4
+"""Ticks at rest before the motion."""
+
+
+class Unchanged(TvistFilter):
+    """Returns its input, for trajectories that are shaped already."""
+
+    def __init__(self, joints: int) -> None:
+        super().__init__(shaper("none"), Fixed([10.0], [0.1]), joints=joints)
+
+    def filter(self, q_ref: npt.ArrayLike) -> Floats:
+        """Return the sample."""
+        return np.asarray(q_ref)
+
+
+def point_to_point(start: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
+    """Reference of a double S, from the first sample that may move to the one at the target, shape (T, n) [rad]."""
+    return samples_of(quickest_motion(JointLine(start, target), limits, PERIOD))
+
+
+def samples_of(trajectory: Trajectory) -> Floats:
+    """Samples of a trajectory from the first that may move to the last, shape (T, n) [rad]."""
+    samples = []
+    while not trajectory.finished:
+        samples.append(trajectory.next())
+    return np.array(samples)
+
+
+def round_a_corner(start: Floats, corner: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
+    """A curved path: two double S, of which the second begins when a quarter of the first's time is left.
+
+    Returns:
+        Samples, shape (T, n) [rad]. While both move, velocity and acceleration are sums.
+    """
+    first, second = point_to_point(start, corner, limits), point_to_point(corner, target, limits)
+    joined = (3 * len(first)) // 4
+    length = max(joined + len(second), len(first))
+    path = np.tile(first[-1], (length, 1))
+    path[: len(first)] = first
+    late = np.tile(second[-1], (length - joined, 1))
+    late[: len(second)] = second
+    path[joined:] += late - corner
+    return path
+
+
+def lengthened(start: Floats, target: Floats, ticks: int, limits: MotionLimits = PAPER) -> Floats:
+    """Reference of a double S with reduced jerk that takes as long as another motion; it uses no shaper and no model.
+
+    Args:
+        start: Joint angles at the start, shape (n,) [rad].
+        target: Joint angles at the end, shape (n,) [rad].
+        ticks: Requested duration.
+        limits: Limits of the motion.
+
+    Returns:
+        Samples, shape (T, n) [rad]; T differs from the request by at most a tick.
+    """
+    low, high = np.log(1e-2 * limits.jerk), np.log(limits.jerk)
+    for _ in range(30):  # the duration increases as the jerk decreases
+        middle = 0.5 * (low + high)
+        slower = MotionLimits(limits.velocity, limits.acceleration, float(np.exp(middle)))
+        if quickest_motion(JointLine(start, target), slower, PERIOD).duration > ticks * PERIOD:
+            low = middle
+        else:
+            high = middle
+    return point_to_point(
+        start, target, MotionLimits(limits.velocity, limits.acceleration, float(np.exp(high)))
+    )
+
+
+class ControlLine:
+    """The control line from shaped reference to drives, without a shaper, of one controller.
+
+    Args:
+        description: The controller's model of the arm.
+        start: Joint angles at which the arm rests, shape (n,) [rad].
+        declared: Declared payload.
+    """
+
+    def __init__(self, description: RobotDescription, start: Floats, declared: Payload) -> None:
+        self._start = start
+        self._line = DrivenLine(description, Unchanged(description.joints), start, declared)
+
+    def follow(
+        self,
+        reference: Floats,
+        shaped: Floats,
+        delay: float = 0.0,
+        elastic: ElasticFeedForward | None = None,
+    ) -> "Following":
+        """Return what any arm's drives get while they follow a shaped reference from rest, and rest for a while.
+
+        Args:
+            reference: The unshaped reference, which everything is compared with, shape (T, n) [rad].
+            shaped: The reference that the arm follows, shape (T', n) [rad].
+            delay: Delay that the shaper declares [s].
+            elastic: Elastic feed-forward for the drives; None for that of the paper's controller.
+        """
+        ticks = RESTING + max(len(shaped), len(reference)) + round(REST / PERIOD)
+        driven = self._line.drive(self._start, shaped, ticks, RESTING, elastic)
+        return Following(self._start, reference, driven, delay)
+
+
+class Following:
+    """A shaped reference, and what the drives of any arm get while they follow it.
+
+    Args:
+        start: Joint angles at which the arm rests, shape (n,) [rad].
+        reference: The unshaped reference, shape (T, n) [rad].
+        driven: What the drives get.
+        delay: Delay that the shaper declares [s].
+    """
+
+    def __init__(self, start: Floats, reference: Floats, driven: Driven, delay: float) -> None:
+        ticks, n = len(driven.targets), len(start)
+        late = round(driven.delay / PERIOD)
+        targets = driven.targets.copy()
+        targets[late:] = driven.targets[: ticks - late]
+        q = np.empty((ticks, n))
+        q[:RESTING], q[RESTING:] = start, reference[-1]
+        q[RESTING : RESTING + len(reference)] = reference
+        tick_of = np.arange(ticks, dtype=float)
+        self._driven = driven
+        self._columns = {
+            "tick": tick_of, "timestamp": PERIOD * tick_of,
+            "reference_q": q, "target_q": targets[:, 0], "target_qd": targets[:, 1], "target_qdd": targets[:, 2],
+            "shaper_delay": np.full(ticks, delay + driven.delay),
+        }  # fmt: skip
+
+    def simulate(self, plant: Plant, seed: int) -> Recording:
+        """Let a plant follow the reference.
+
+        Args:
+            plant: The plant.
+            seed: Seed of sensor noise and gear errors.
+
+        Returns:
+            Columns for the metrics on a common clock, from a tick before the motion on. Targets are those that the
+            drives receive, so that ticks in which a feed-forward differentiates count as delay.
+
+        Raises:
+            ValueError: The plant does not provide the truth.
+        """
+        response = respond(plant, self._driven, seed)
+        pose = np.zeros((len(response.specific_force), 6))
+        pose[:, 3:] = Rotation.from_matrix(response.flange_rotation).as_rotvec()
+        felt = {"truth_tool_acceleration": response.specific_force, "truth_flange_pose": pose}
+        return Recording({**self._columns, **felt})

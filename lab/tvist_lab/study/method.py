@@ -1,0 +1,254 @@
+"""Methods: what shapes, plans or replaces a motion, each with a name in JSON and a label for people."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tvist_controller.api import ElasticFeedForward, MotionLimits
+from tvist_lab.recordings import Floats
+from tvist_lab.study.line import PAPER, lengthened, point_to_point
+from tvist_lab.study.moves import Move
+from tvist_lab.study.own_moves import own_move
+from tvist_lab.study.ranges import robust
+from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.shaping import Running, RunningShaper, Shaped, shape
+from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD
+from tvist_shaping.base import Filter
+from tvist_shaping.catalogue import shaper
+from tvist_shaping.estimators.fixed import Fixed
+from tvist_shaping.filter import TvistFilter
+from tvist_shaping.named import AIMED
+from tvist_shaping.steady import ProductDesign, SteadyFilter
+
+
+@dataclass(frozen=True)
+class Task:
+    """A reference to be shaped, with all that a controller knows of it."""
+
+    description: RobotDescription
+    """The controller's model of the arm."""
+    move: Move
+    """The move; its mass is the declared one."""
+    reference: Floats
+    """Reference, shape (T, n) [rad]."""
+    limits: MotionLimits = PAPER
+    """Limits of the motion."""
+    as_served: bool = False
+    """Whether to do as a robot does: plan moves for the filter, and take what comes. Otherwise the filter gets the
+    reference itself, and is watched for tails.
+    """
+    stream: bool = False
+    """Whether the reference is a stream, whose end is not known."""
+    ticks: int | None = None
+    """Duration of the motion that this one is compared with; None if there is none."""
+
+
+class Method(ABC):
+    """A way to make a motion; it can be sent to another process."""
+
+    name: str
+    """Name in JSON."""
+    label: str
+    """Name for people."""
+
+    @property
+    def told_target(self) -> bool:
+        """Whether it is given the end of a motion before the motion begins, and therefore cannot shape a stream."""
+        return False
+
+    @property
+    def shapes(self) -> bool:
+        """Whether it shapes any reference, instead of planning the motion."""
+        return True
+
+    @abstractmethod
+    def shaped(self, task: Task) -> Shaped:
+        """Return the whole motion.
+
+        Raises:
+            ShaperFaultError: The output is not a position; or it is watched, and does not come to rest or moves on.
+        """
+
+
+class Waiting(Method):
+    """The unshaped motion: all that it takes is time."""
+
+    name, label = "waiting", "waiting, unshaped"
+
+    def shaped(self, task: Task) -> Shaped:
+        """Return the reference."""
+        return Shaped(task.reference)
+
+
+class Stepping(Method):
+    """A method that shapes a reference sample by sample."""
+
+    @abstractmethod
+    def stepper(self, task: Task) -> RunningShaper:
+        """Return the shaper, at rest at the start."""
+
+    def elastic(self, task: Task) -> ElasticFeedForward | None:  # noqa: ARG002  most do without
+        """Return the elastic feed-forward that the drives need; None for that of the paper's controller."""
+        return None
+
+    def shaped(self, task: Task) -> Shaped:
+        """Shape the reference."""
+        found = shape(self.stepper(task), task.reference, watched=not task.as_served)
+        return replace(found, elastic=self.elastic(task))
+
+
+@dataclass(frozen=True)
+class Named(Stepping):
+    """A filter by name, created as the server creates it."""
+
+    recipe: Recipe
+    name: str
+    label: str = ""
+
+    @property
+    def told_target(self) -> bool:
+        """Whether the filter uses the target, which one of them does."""
+        return self.recipe.shaper == AIMED
+
+    def stepper(self, task: Task) -> Running:
+        """Return the filter, reset and given the target."""
+        return _from_rest(self.recipe.make(task.description, task.move.mass), task)
+
+    def elastic(self, task: Task) -> ElasticFeedForward | None:
+        """Return what the filter needs."""
+        return self.recipe.elastic(task.description, self.recipe.make(task.description, task.move.mass))
+
+    def shaped(self, task: Task) -> Shaped:
+        """Shape the reference, or a motion that is planned for the filter as a robot plans it."""
+        if not task.as_served or task.stream:
+            return super().shaped(task)
+        tvist, own = own_move(self.recipe, task.description, task.move, task.limits)
+        return replace(
+            shape(Running(tvist), own, watched=False), elastic=self.recipe.elastic(task.description, tvist)
+        )
+
+
+@dataclass(frozen=True)
+class Constant(Stepping):
+    """A shaper of the catalogue with constant modes: those of the move's target, or some for a whole range."""
+
+    recipe: Recipe
+    """Source of the estimates."""
+    name: str
+    label: str
+    shaper: str
+    """Shaper of the catalogue."""
+    modes: int = 1
+    """Number of lowest modes at the move's target, each of which gets a shaper."""
+    f_d: float | None = None
+    """Design frequency [Hz]; None for the estimate."""
+    zeta: float | None = None
+    """Design damping ratio [-]; None for the estimate."""
+    for_payload: bool = False
+    """Whether it is designed for the lowest mode over the workspace with the declared payload."""
+
+    @property
+    def told_target(self) -> bool:
+        """Whether it is designed for the end of each move."""
+        return self.f_d is None and not self.for_payload
+
+    def stepper(self, task: Task) -> Running:
+        """Return the fixed filter, reset; it knows the target if it is designed for it."""
+        made, description, mass = shaper(self.shaper), task.description, task.move.mass
+        designed = (self.f_d, self.zeta)
+        if self.for_payload:
+            designed = robust(self.shaper, self.recipe, description, (mass, mass))
+        if designed[0] is None or designed[1] is None:
+            modes = self.recipe.estimator(description, mass, self.modes).estimate(np.array(task.move.target))
+            f_d, zeta = (values.tolist() for values in modes)
+        else:
+            f_d, zeta = [designed[0]], [designed[1]]
+        # Sufficient even if the estimate is too low.
+        longest = max(1.0, 1.01 * sum(made.duration_periods / f for f in f_d))
+        return _from_rest(
+            TvistFilter(made, Fixed(f_d, zeta), joints=description.joints, max_delay=longest), task
+        )
+
+
+@dataclass(frozen=True)
+class Held(Stepping):
+    """The modes' zero-vibration shapers in series, delayed to a constant mean delay."""
+
+    recipe: Recipe
+    """Source of the estimates."""
+    mean_delay: float
+    """The constant mean delay [s]."""
+    modes: int
+    """Number of modes."""
+    name: str
+    label: str
+
+    def stepper(self, task: Task) -> Running:
+        """Return the filter, reset."""
+        description = task.description
+        estimator = self.recipe.estimator(description, task.move.mass, self.modes)
+        design = ProductDesign(self.mean_delay, modes=self.modes)
+        return _from_rest(SteadyFilter(design, estimator, joints=description.joints), task)
+
+
+class Planned(Method):
+    """A method that plans the motion and shapes no reference."""
+
+    @property
+    def told_target(self) -> bool:
+        """True, since it plans the motion."""
+        return True
+
+    @property
+    def shapes(self) -> bool:
+        """False: a stream or a curved path is no motion that it could plan."""
+        return False
+
+
+@dataclass(frozen=True)
+class Longer(Planned):
+    """A double S with less jerk that takes as long as another motion, and uses no model."""
+
+    name: str
+    label: str
+    like: Method | None = None
+    """The method whose motion it is as long as; None for the one that the task is compared with."""
+
+    def shaped(self, task: Task) -> Shaped:
+        """Return a double S with less jerk."""
+        delay = 0.0
+        if self.like is None:
+            assert task.ticks is not None, "the task is compared with a motion"
+            ticks = task.ticks
+        else:
+            delay = self.like.shaped(task).delay
+            ticks = len(task.reference) + round(delay / PERIOD)
+        start, target = np.array(task.move.start), np.array(task.move.target)
+        return Shaped(lengthened(start, target, ticks, task.limits), delay)
+
+
+@dataclass(frozen=True)
+class PeriodOfJerk(Planned):
+    """A double S whose jerk lasts a period of the lowest mode at the target, which then is not excited."""
+
+    recipe: Recipe
+    """Source of the estimate."""
+    name: str
+    label: str
+
+    def shaped(self, task: Task) -> Shaped:
+        """Return a double S with that jerk."""
+        start, target = np.array(task.move.start), np.array(task.move.target)
+        f_d = float(self.recipe.estimator(task.description, task.move.mass, 1).estimate(target)[0][0])
+        return Shaped(
+            point_to_point(start, target, replace(task.limits, jerk=task.limits.acceleration * f_d))
+        )
+
+
+def _from_rest(tvist: Filter, task: Task) -> Running:
+    """Return a filter at rest at the start of a move, which is given the target as the robot does it."""
+    tvist.reset(np.array(task.move.start))
+    tvist.aim(None if task.stream else np.array(task.move.target))
+    return Running(tvist)

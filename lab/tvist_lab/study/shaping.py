@@ -1,0 +1,177 @@
+"""A shaper applied to one reference until it ends, with checks for hidden motion."""
+
+import time
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from tvist_controller.api import STILL, ElasticFeedForward
+from tvist_lab.recordings import Floats
+from tvist_plant.plant import PERIOD
+from tvist_shaping.base import Filter
+
+LONGEST = 3.0
+"""Time after the reference's end within which a shaped reference has to end [s]."""
+ENDED = 10
+"""Number of ticks at the target after which the output has ended."""
+WATCHED = 0.5
+"""Time for which the output is checked for a tail after it has ended [s]."""
+TAIL = 1e-6
+"""Largest motion in that time, and largest distance from the target [rad]."""
+SLACK = 3
+"""Ticks by which a shaper may end later than declared, since interpolation uses samples on both sides."""
+WARM = 20
+"""Number of first ticks whose processing time is ignored, since they may compile code."""
+
+
+class ShaperFaultError(Exception):
+    """A shaper's output is no shaped reference, so no figure can be based on it; the message says why."""
+
+
+@dataclass(frozen=True)
+class Shaped:
+    """A shaped reference, and what the drives need to follow it."""
+
+    q: Floats
+    """Samples up to the end and a few ticks more, shape (T', n) [rad]."""
+    delay: float = 0.0
+    """Time from the reference's end to the output's, limited to the declared delay [s]."""
+    cost: float | None = None
+    """Measured processor time per tick [s]."""
+    elastic: ElasticFeedForward | None = None
+    """Elastic feed-forward for the drives; None for that of the paper's controller."""
+    ended: bool = True
+    """Whether it came to rest at the target."""
+
+
+class RunningShaper(Protocol):
+    """A shaper in operation on one reference."""
+
+    def step(self, q: Floats) -> Floats:
+        """Return the next sample, shape (n,) [rad]."""
+
+    @property
+    def delay(self) -> float | None:
+        """Time over which the last output depends on the past [s]; None if the shaper does not declare it."""
+
+
+@runtime_checkable
+class InOneGo(Protocol):
+    """A shaper that takes many samples at once, faster than one by one."""
+
+    def all(self, q: Floats) -> Floats:
+        """Return the next samples, shape (T, n) [rad], equal to those one by one."""
+
+
+class Running:
+    """A filter in operation, which fails when its shaper's function does, so that no figure is based on old weights.
+
+    Args:
+        tvist: The filter, at rest at the first sample.
+    """
+
+    def __init__(self, tvist: Filter) -> None:
+        self._tvist = tvist
+
+    @property
+    def delay(self) -> float:
+        """Delay of the last output [s]."""
+        return self._tvist.delay
+
+    def step(self, q: Floats) -> Floats:
+        """Return the next shaped sample, shape (n,) [rad].
+
+        Raises:
+            ShaperFaultError: The shaper's function fails.
+        """
+        return self._checked(self._tvist.filter(q))
+
+    def all(self, q: Floats) -> Floats:
+        """Return the next shaped samples, shape (T, n) [rad].
+
+        Raises:
+            ShaperFaultError: The shaper's function fails at the last of them.
+        """
+        return self._checked(self._tvist.filter_all(q))
+
+    def _checked(self, shaped: Floats) -> Floats:
+        if self._tvist.fault is not None:
+            raise ShaperFaultError(self._tvist.fault)
+        return shaped
+
+
+def shape(stepper: RunningShaper, reference: Floats, *, watched: bool) -> Shaped:
+    """Apply a shaper to a reference until it rests at the target.
+
+    Args:
+        stepper: The shaper, at rest at the first sample.
+        reference: Reference, at rest at its last sample, shape (T, n) [rad].
+        watched: Whether the shaper has to end, keep its word about its delay, and then hide no tail. Its processor time
+            is measured as well.
+
+    Raises:
+        ShaperFaultError: The shaper's function fails; or it is watched, and does not end at the target, or moves after
+            its end or its declared delay.
+    """
+    target, stop = reference[-1], len(reference) - 1
+    q, cost = _through(stepper, reference, timed=watched)
+    declared = [stepper.delay]
+    quiet = 0
+    while quiet < ENDED and len(q) <= stop + LONGEST / PERIOD:
+        q.append(stepper.step(target))
+        declared.append(stepper.delay)
+        moved = np.abs(q[-1] - q[-2]).max()
+        quiet = quiet + 1 if max(moved, np.abs(q[-1] - target).max()) <= STILL else 0
+    own = max(len(q) - ENDED - 1 - stop, 0) * PERIOD
+    if watched:
+        _check_end(q[-1], target, ended=quiet >= ENDED)
+        _check_tail(stepper, target)
+        _check_word(q, stop, declared, own)
+    said = declared[0]
+    delay = own if said is None else min(own, max(said, 0.0))
+    return Shaped(np.array(q), delay, cost, ended=quiet >= ENDED)
+
+
+def _through(stepper: RunningShaper, reference: Floats, *, timed: bool) -> tuple[list[Floats], float | None]:
+    """Shape a reference; return the samples, and the processor time of a tick if it is wanted."""
+    if not timed and isinstance(stepper, InOneGo):
+        return list(stepper.all(reference)), None
+    warm = min(WARM, len(reference) - 1)
+    q = [stepper.step(sample) for sample in reference[:warm]]
+    began = time.thread_time()
+    q += [stepper.step(sample) for sample in reference[warm:]]
+    return q, (time.thread_time() - began) / (len(reference) - warm)
+
+
+def _check_end(last: Floats, target: Floats, *, ended: bool) -> None:
+    if not ended:
+        away = float(np.abs(last - target).max())
+        raise ShaperFaultError(
+            f"does not end: {1e3 * LONGEST:.0f} ms after the reference it is {away:.2g} rad from the target"
+        )
+
+
+def _check_tail(stepper: RunningShaper, target: Floats) -> None:
+    """Run on for a while, and check that the output stays at the target."""
+    for late in range(round(WATCHED / PERIOD)):
+        away = float(np.abs(stepper.step(target) - target).max())
+        if away > TAIL:
+            after = 1e3 * PERIOD * (late + ENDED)
+            raise ShaperFaultError(
+                f"hides a tail: {after:.0f} ms after it seemed to have ended it is {away:.2g} rad from the target"
+            )
+
+
+def _check_word(q: list[Floats], stop: int, declared: list[float | None], own: float) -> None:
+    """Check that the output does not move for longer than was declared at each tick."""
+    for late, said in enumerate(declared):
+        if said is None or late * PERIOD <= said + SLACK * PERIOD:
+            continue
+        moved = float(np.abs(q[stop + late] - q[-1]).max())
+        if moved > TAIL:
+            raise ShaperFaultError(
+                f"hides a tail: it declares a delay of {1e3 * said:.0f} ms, and ends {1e3 * own:.0f} ms after the "
+                f"reference, {moved:.2g} rad further"
+            )
+        return

@@ -1,0 +1,156 @@
+"""A study of one's own: cases by methods, and what its tables, its page and its figure show."""
+
+import importlib.util
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from tvist_lab.study.case import Case
+from tvist_lab.study.columns import Column, column_of, columns_of, schema_of
+from tvist_lab.study.engine import Plan
+from tvist_lab.study.measures import MEASURES, OF_PEAKS
+from tvist_lab.study.method import Method
+from tvist_lab.study.tables import Shown
+from tvist_lab.study.work import FAILED, MEASURED, Job
+from tvist_lab.words import counted, named
+
+SHARES = {"median": 0.5, "p5": 0.05, "p95": 0.95}
+"""Percentiles of each measure that are summarized."""
+DIGITS = 3
+"""Decimals of the figures in tables."""
+
+
+class StudyError(ValueError):
+    """A file contains no study that can be made; the message says why."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """Every method makes every case."""
+
+    title: str
+    cases: Sequence[Case]
+    """The cases, each with the same axes."""
+    methods: Sequence[Method]
+    by: tuple[str, ...] = ()
+    """Axes that the tables distinguish; the figure is drawn over the first. The other axes, such as the number of the
+    move, are summarized.
+    """
+    show: tuple[str, ...] = ("reduction_percent", "delay_ms")
+    """Measures in tables and in the figure."""
+    measures: tuple[str, ...] = OF_PEAKS
+    """What else is measured and kept in the rows."""
+    as_served: bool = True
+    """Whether moves are planned for the shaper as a robot plans them, instead of giving it the same reference."""
+    notes: str = ""
+    """What a reader should know, in Markdown."""
+    file: bytes = field(default=b"", repr=False)
+    """Content of the file that defines it."""
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """All that is measured."""
+        return tuple(dict.fromkeys((*self.measures, *self.show)))
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """The columns of its rows."""
+        axes = [column_of(name, value) for name, value in self.cases[0].axes.items()]
+        names = (Column("shaper", pl.String, "", "the method"), Column("arm", pl.String, "", "the arm"))
+        return columns_of((*axes, *names), self.measured)
+
+    def check(self) -> None:
+        """Check that it can be made.
+
+        Raises:
+            StudyError: It has no cases or methods, the cases have different axes, or a name is unknown.
+        """
+        if not self.cases or not self.methods:
+            raise StudyError("it needs a case and a method at least")
+        for place, case in enumerate(self.cases):
+            if set(case.axes) != set(self.cases[0].axes):
+                raise StudyError(f"cases[{place}] has the axes {sorted(case.axes)}: all need the same")
+            if len(case.arms) != len(self.cases[0].arms):
+                raise StudyError(f"cases[{place}] has {counted(len(case.arms), 'arm')}: all need as many")
+        for name in self.measured:
+            if name not in MEASURES:
+                raise StudyError(f"{name!r} is no measure: there are {', '.join(MEASURES)}")
+        for name in self.by:
+            if name not in self.cases[0].axes:
+                raise StudyError(f"by has {name!r}: the axes are {', '.join(self.cases[0].axes)}")
+        names = [method.name for method in self.methods]
+        if len(set(names)) < len(names):
+            raise StudyError(f"methods have the same name: {', '.join(names)}")
+
+    def plan(self) -> Plan:
+        """Return what the engine runs."""
+        methods = tuple(self.methods)
+        jobs = [Job(case, methods, self.measured, self.as_served) for case in self.cases]
+        identity = {
+            "title": self.title,
+            "contents of its file": sha256(self.file).hexdigest(),
+            "version of tvist": version("tvist"),
+        }
+        return Plan(jobs, schema_of(self.columns), identity)
+
+    def summary(self, rows: pl.DataFrame) -> list[dict[str, Any]]:
+        """Return an entry for each setting, arm and method, over all other axes."""
+        measured = pl.col("status") == MEASURED
+        keys = [*self.by, *(["arm"] if len(self.cases[0].arms) > 1 else []), "shaper"]
+        shares = {
+            f"{name}.{share}": pl.col(name).filter(measured).quantile(value, "linear")
+            for name in self.measured
+            for share, value in SHARES.items()
+        }
+        grouped = rows.group_by(keys, maintain_order=True).agg(
+            rows=pl.len(), measured=measured.sum(), failed=(pl.col("status") == FAILED).sum(), **shares
+        )
+        return [
+            {name: row[name] for name in (*keys, "rows", "measured", "failed")}
+            | {name: {share: row[f"{name}.{share}"] for share in SHARES} for name in self.measured}
+            for row in grouped.iter_rows(named=True)
+        ]
+
+    def shown(self, entries: Sequence[dict[str, Any]]) -> list[Shown]:
+        """Return the columns of its table."""
+        keys = [name for name in entries[0] if name not in {"rows", "failed", *self.measured}]
+        figures = [
+            Shown(f"{name}{'' if share == 'median' else f' {share}'}", f"{name}.{share}", DIGITS)
+            for name in self.show
+            for share in ("median", "p95")
+        ]
+        return [*(Shown(name, name) for name in keys), *figures]
+
+
+def read_study(path: Path) -> Study:
+    """Run a Python file, and return its `STUDY`.
+
+    Raises:
+        StudyError: The file cannot be run, or has no study that can be made.
+        OSError: The file cannot be read.
+    """
+    content = path.read_bytes()
+    name = f"tvist_study_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path.resolve())
+    if spec is None or spec.loader is None:
+        raise StudyError(f"study {path}: must be a Python file, *.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise StudyError(f"study {path}: running it raises {named(error)}") from error
+    found = getattr(module, "STUDY", None)
+    if not isinstance(found, Study):
+        raise StudyError(f"study {path}: contains no STUDY = Study(...)")
+    try:
+        found.check()
+    except StudyError as error:
+        raise StudyError(f"study {path}: {error}") from error
+    return Study(**{**vars(found), "file": content})

@@ -1,0 +1,169 @@
+"""What a worker does: make a case by some methods on its arms, and measure each motion: one flat row a motion."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from tvist_lab.recordings import Recording
+from tvist_lab.runners import TaskError
+from tvist_lab.study.case import Case, World
+from tvist_lab.study.measures import OF_PEAKS, Motion, measured
+from tvist_lab.study.method import Method, Task, Waiting
+from tvist_lab.study.shaping import Shaped, ShaperFaultError
+from tvist_lab.words import named
+from tvist_plant.plant import PERIOD
+
+MEASURED, TOO_WEAK, FAILED = "measured", "too weak", "failed"
+"""What became of a row."""
+
+Row = Mapping[str, Any]
+"""A row: a value, or None, by the name of its column."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A case, and the methods to make it by."""
+
+    case: Case
+    methods: tuple[Method, ...]
+    measures: tuple[str, ...] = OF_PEAKS
+    """Names of the columns to measure."""
+    as_served: bool = True
+    """See `Task.as_served`."""
+
+    @property
+    def motions(self) -> int:
+        """Number of motions."""
+        return len(self.methods) * len(self.case.arms)
+
+    def head(self, method: str, arm: str) -> dict[str, Any]:
+        """Return the cells of a row that are known before anything is made."""
+        return {**self.case.axes, "shaper": method, "arm": arm}
+
+
+class Bench:
+    """The arms and the line of a job, on which its motions are made.
+
+    Args:
+        job: The job.
+    """
+
+    def __init__(self, job: Job) -> None:
+        self.job, self._world = job, World(job.case)
+        self._plain: dict[str, Motion] = {}
+
+    @cached_property
+    def task(self) -> Task:
+        """What the first method gets."""
+        case = self.job.case
+        return Task(
+            case.description,
+            case.declared,
+            self._world.reference,
+            case.limits,
+            self.job.as_served,
+            case.stream,
+        )
+
+    def make(self, method: Method, ticks: int | None = None) -> Iterator[tuple[str, Motion]]:
+        """Yield the motion of each arm, with the arm's name.
+
+        Args:
+            method: The method.
+            ticks: Duration of the motion that it is compared with; None if there is none.
+
+        Raises:
+            ShaperFaultError: The method gives no shaped reference.
+        """
+        if isinstance(method, Waiting):
+            yield from ((arm.name, self.unshaped(arm.name)) for arm in self.job.case.arms)
+            return
+        shaped = method.shaped(self.task if ticks is None else _compared(self.task, ticks))
+        follow = self._following(shaped)
+        for arm in self.job.case.arms:
+            name = arm.name
+            yield name, Motion(self.job.case, shaped, follow(name), lambda name=name: self.unshaped(name))  # type: ignore[misc]
+
+    def unshaped(self, arm: str) -> Motion:
+        """Return the unshaped motion of an arm, which is simulated once."""
+        if arm not in self._plain:
+            shaped = Shaped(self._world.reference)
+            recording = self._following(shaped)(arm)
+            self._plain[arm] = Motion(self.job.case, shaped, recording, lambda: self.unshaped(arm))
+        return self._plain[arm]
+
+    def _following(self, shaped: Shaped) -> Callable[[str], Recording]:
+        world = self._world
+        following = world.line.follow(world.reference, shaped.q, shaped.delay, shaped.elastic)
+        return lambda arm: following.simulate(world.arms[arm], self.job.case.seed)
+
+
+def _compared(task: Task, ticks: int) -> Task:
+    return Task(task.description, task.move, task.reference, task.limits, task.as_served, task.stream, ticks)
+
+
+def measure(job: Job) -> tuple[Row, ...]:
+    """Make a case by every method, on every arm; methods after the first are compared with it.
+
+    Raises:
+        ShaperFaultError: A method gives no shaped reference.
+        RecipeError: There is no such filter for this arm.
+    """
+    bench = Bench(job)
+    found: list[Row] = []
+    ticks = None
+    for method in job.methods:
+        for arm, motion in bench.make(method, ticks):
+            found.append(_row(job, method.name, arm, motion))
+            if ticks is None:
+                ticks = round(motion.duration / PERIOD)
+    return tuple(found)
+
+
+def measure_each(job: Job) -> tuple[Row, ...]:
+    """Make a case by every method; a method that fails costs its own rows alone."""
+    try:
+        share = 0.0 if job.case.stream or not job.as_served else job.case.torque_share
+        if share > 1.0:
+            return failed(job, TOO_WEAK, f"the move needs {100.0 * share:.0f} % of a drive's torque")
+        bench = Bench(job)
+        if job.as_served:
+            for arm in job.case.arms:
+                _ = bench.unshaped(arm.name).peak
+    except Exception as error:  # noqa: BLE001  it costs these rows alone
+        return failed(job, FAILED, why(error))
+    found: list[Row] = []
+    for method in job.methods:
+        try:
+            found += [_row(job, method.name, arm, motion) for arm, motion in bench.make(method)]
+        except ShaperFaultError as fault:
+            found += _lost(job, method.name, FAILED, f"the shaper {fault}")
+        except Exception as error:  # noqa: BLE001  it costs these rows alone
+            found += _lost(job, method.name, FAILED, why(error))
+    return tuple(found)
+
+
+def record(job: Job) -> tuple[Recording, Recording]:
+    """Record a case unshaped, and by the first method of a job, on its first arm."""
+    bench = Bench(job)
+    ((_, motion), *_) = bench.make(job.methods[0])
+    return motion.unshaped.recording, motion.recording
+
+
+def failed(job: Job, status: str, error: str) -> tuple[Row, ...]:
+    """Return the rows of a job that measures nothing."""
+    return tuple(row for method in job.methods for row in _lost(job, method.name, status, error))
+
+
+def why(error: Exception) -> str:
+    """Return an error in one line."""
+    return str(error) if isinstance(error, TaskError) else named(error)
+
+
+def _lost(job: Job, method: str, status: str, error: str) -> list[Row]:
+    return [job.head(method, arm.name) | {"status": status, "error": error} for arm in job.case.arms]
+
+
+def _row(job: Job, method: str, arm: str, motion: Motion) -> Row:
+    return job.head(method, arm) | {"status": MEASURED, **measured(motion, job.measures)}

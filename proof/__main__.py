@@ -1,0 +1,190 @@
+"""`python -m proof`: measure and search what the documents claim; README.md says what each part is for."""
+
+import argparse
+import asyncio
+import math
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import msgspec
+
+from tvist_lab.markdown_table import markdown_table
+from tvist_server.ending import end_like_interrupted
+
+Table = tuple[Sequence[str], Sequence[Sequence[str]]]
+"""Headings and rows."""
+MOST = 1_000_000
+"""Largest number of cases of a search, since the numbers of another seed follow."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Do what the arguments say; return 0, 1 if a promise is broken, or 130 after Control+C."""
+    # Processes of ours are small: threads for their matrices would only slow down each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    given = _parser().parse_args(arguments)
+    try:
+        return int(given.run(given))
+    except KeyboardInterrupt:
+        print("proof: interrupted", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m proof", description=__doc__)
+    parts = parser.add_subparsers(required=True, metavar="PART")
+
+    def part(run: Callable[[argparse.Namespace], int], name: str, what: str) -> argparse.ArgumentParser:
+        one = parts.add_parser(name, help=what, description=what)
+        one.set_defaults(run=run, refuse=one.error)
+        one.add_argument("--json", action="store_true", help="Print one JSON object.")
+        return one
+
+    bench = part(_bench, "bench", "Measure speed, each figure beside a reference from the same run.")
+    bench.add_argument(
+        "--seconds",
+        type=_up_to(86_400),
+        default=10,
+        help="Seconds of each measurement of a robot in real time; 0 serves none [10].",
+    )
+    bench.add_argument("--only", nargs="+", metavar="NAME", help="Parts to measure [all].")
+    soak = part(_soak, "soak", "Serve a robot under load, and tell whether memory and timing stay stable.")
+    soak.add_argument("minutes", type=_minutes)
+    late = part(_lateness, "lateness", "Compare the ticks that a robot misses with a bare thread's.")
+    late.add_argument("minutes", type=_minutes, help="for each: alone, with ten clients, with priority too")
+    search = part(_search, "search", "Search for cases in which a robot breaks its promises.")
+    for name, default, what in (
+        ("stops", 100, "stops of every kind, at random moments of accepted moves"),
+        ("streams", 50, "set-point streams towards the floor, the arm itself and the limits"),
+        ("changes", 50, "changes of payload, shaper, estimator and speed during a motion"),
+        ("sequences", 50, "sequences of 40 random commands; every third one has programs among them"),
+    ):
+        search.add_argument(
+            f"--{name}", type=_up_to(MOST), default=default, help=f"Number of {what} [{default}]."
+        )
+    search.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Another seed tries other cases.")
+    search.add_argument(
+        "--robot",
+        nargs="+",
+        default=["ur5e"],
+        help="Robots, which take turns: names, robot files or URDFs [ur5e].",
+    )
+    search.add_argument(
+        "--flexible", action="store_true", help="Simulate the flexible arm in stops and streams, too."
+    )
+    bound = part(
+        _bound, "bound", "Compute the least time in which moves end without vibration, beside shapers."
+    )
+    bound.add_argument("--random", type=_up_to(100_000), default=30, help="Number of random moves [30].")
+    bound.add_argument("--seed", type=_up_to(2**63 - 1), default=0, help="Seed of the random moves.")
+    bound.add_argument("--shapers", nargs="+", help="Shapers to compare [zv auto auto-target planned].")
+    return parser
+
+
+def _up_to(most: int) -> Callable[[str], int]:
+    def whole(text: str) -> int:
+        if not (text.isdecimal() and int(text) <= most):
+            raise argparse.ArgumentTypeError(f"is {text}: must be 0 to {most}")
+        return int(text)
+
+    return whole
+
+
+def _minutes(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"is {text}: must be more than 0")
+    return value
+
+
+def _bench(given: argparse.Namespace) -> int:
+    from proof.bench.report import PARTS, bench, tables
+
+    if unknown := set(given.only or ()) - set(PARTS):
+        given.refuse(f"there is no part {min(unknown)}: the parts are {' '.join(PARTS)}")
+    result = bench(given.seconds, _tell, given.only or PARTS)
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _soak(given: argparse.Namespace) -> int:
+    from proof.bench.soak import soak
+
+    result = asyncio.run(soak(given.minutes, _tell))
+    _print(
+        result, given.json, [(("what", "figure"), [[key, f"{value:.6g}"] for key, value in result.items()])]
+    )
+    return 0
+
+
+def _lateness(given: argparse.Namespace) -> int:
+    from proof.bench.on_time import on_time
+
+    result = asyncio.run(on_time(given.minutes, _tell))
+    rows = [[name, *(f"{value:.4g}" for value in found.values())] for name, found in result.items()]
+    _print(result, given.json, [(("missed ticks", *next(iter(result.values()))), rows)])
+    return 0
+
+
+def _search(given: argparse.Namespace) -> int:
+    from proof.search.report import Counts, broken, search, tables
+    from tvist_plant.description import DescriptionError
+
+    counts = Counts(given.stops, given.streams, given.changes, given.sequences)
+    if not counts.all:
+        given.refuse("there is nothing to search: give one of --stops --streams --changes --sequences")
+    try:
+        result = search(
+            counts, given.seed, robots=given.robot, flexible=given.flexible, progress=_counted(counts.all)
+        )
+    except DescriptionError as error:
+        given.refuse(str(error))
+    found = broken(result)
+    _print(result, given.json, tables(result))
+    for one in found:
+        _tell(one)
+    if found:
+        _tell(f"{len(found)} of {counts.all} cases broke a promise")
+    return 1 if found else 0
+
+
+def _bound(given: argparse.Namespace) -> int:
+    from proof.bound.report import SHAPERS, compare, report, tables
+    from tvist_shaping import BUILT_IN
+
+    if unknown := set(given.shapers or ()) - set(BUILT_IN.names()):
+        given.refuse(f"there is no shaper {min(unknown)}")
+    result = report(compare(given.random, given.seed, given.shapers or SHAPERS))
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _print(result: dict[str, Any], json: bool, tables: Sequence[Table]) -> None:
+    if json:
+        print(msgspec.json.encode(result).decode())
+        return
+    for columns, rows in tables:
+        print(markdown_table(columns, rows), end="\n\n")
+
+
+def _counted(total: int) -> Callable[[str], None]:
+    """Return what counts cases, and tells every tenth of them."""
+    done = 0
+
+    def count(what: str) -> None:
+        nonlocal done
+        done += 1
+        if done * 10 // total > (done - 1) * 10 // total:
+            _tell(f"{done} of {total} cases, now {what}")
+
+    return count
+
+
+def _tell(what: str) -> None:
+    print(what, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    end_like_interrupted()
+    sys.exit(main())

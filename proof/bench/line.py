@@ -1,0 +1,81 @@
+"""Processor time of a tick: of the plant, the filter, Figure 6 and the whole line, relative to MuJoCo's tick."""
+
+from collections.abc import Callable
+
+from proof.bench.figure import Figure, figure, in_alternation
+from tvist_controller.api import body
+from tvist_lab.bench.moving import (
+    Run,
+    arm_tick,
+    cycle_tick,
+    line_filter,
+    line_tick,
+    motion,
+    plant_tick,
+    us_per_tick,
+)  # fmt: skip
+from tvist_lab.in_process import free_setup
+from tvist_lab.second_opinion import SecondOpinion
+from tvist_plant.plant import PERIOD
+
+REPETITIONS = 20
+SHAPERS = ("zv", "auto")
+"""Filters with which the line is measured; the first one is that of a robot without options."""
+MUJOCO_STEP = 0.00025
+"""Step at which MuJoCo agrees with our plant [s]."""
+MUJOCO = "MuJoCo's tick"
+
+
+def line(tell: Callable[[str], None]) -> dict[str, Figure]:
+    """Measure the line and its parts with MuJoCo in turn.
+
+    Args:
+        tell: Called with a description of the measurement before it starts.
+    """
+    tell("the line and its parts beside MuJoCo")
+    runs: dict[str, Run] = {
+        "mujoco": _mujoco_tick(), "plant": plant_tick(), "filter": _filter_tick(), "cycle": cycle_tick(),
+        **{_key(name): line_tick(name) for name in SHAPERS},
+    }  # fmt: skip
+    found = in_alternation(runs, REPETITIONS)
+    mujoco, usual = found.pop("mujoco"), SHAPERS[0]
+    said = {
+        "plant": "2 ms of the flexible arm",
+        "filter": f"the filter {usual} with its estimator",
+        "cycle": f"Figure 6 with {usual}: trajectory to plant",
+        **{_key(name): f"the line with {name}: messages to encoded state" for name in SHAPERS},
+    }
+    figures = {
+        f"{key}_us_per_tick": figure(said[key], "µs", taken, MUJOCO, mujoco) for key, taken in found.items()
+    }
+    figures["realtime_factor"] = figure(
+        f"robots with {usual} that a core computes in real time",
+        "",
+        [1e6 * PERIOD / taken for taken in found[_key(usual)]],
+        "arms that a core computes with MuJoCo",
+        [1e6 * PERIOD / taken for taken in mujoco],
+    )
+    return figures
+
+
+def _key(shaper: str) -> str:
+    return "line" if shaper == SHAPERS[0] else f"line_{shaper.replace('-', '_')}"
+
+
+def _mujoco_tick() -> Run:
+    setup = free_setup(truth=False)
+    return arm_tick(SecondOpinion(setup.description, body(setup.payload), MUJOCO_STEP))
+
+
+def _filter_tick() -> Run:
+    tvist, references = line_filter(free_setup(truth=False)), motion()
+
+    def go() -> None:
+        for q in references:
+            tvist.filter(q)
+
+    def run() -> float:
+        tvist.reset(references[0])
+        return us_per_tick(go)
+
+    return run

@@ -1,0 +1,83 @@
+"""What clients of RTDE cost a served robot, beside a process that only sends."""
+
+import asyncio
+import sys
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+from proof.bench.figure import Figure, figure
+from proof.bench.readers import readers
+from tvist_lab.bench.one_robot import punctuality
+from tvist_lab.bench.process import cpu_seconds
+from tvist_lab.served import free_port, served
+from tvist_plant.plant import PERIOD
+from tvist_server.ur_ports import UrPorts
+
+CLIENTS = 10
+"""Number of RTDE clients at 500 Hz, each with a different recipe."""
+ROUNDS = 5
+"""Number of rounds of measurements."""
+SHORTEST = 2.0
+"""Shortest time of a measurement [s]: telemetry comes once a second."""
+ADDRESS = "127.0.0.1"
+
+
+async def rtde(seconds: float, tell: Callable[[str], None]) -> dict[str, Figure]:
+    """Measure a robot without clients at its UR interfaces, and with ten clients that read every tick.
+
+    In between, as many read from a process that does nothing but send packages of the same sizes.
+
+    Args:
+        seconds: Duration of each measurement [s].
+        tell: Called with a description of each measurement before it starts.
+    """
+    port, bare_port = str(free_port()), str(free_port())
+    part, several = max(SHORTEST, seconds / ROUNDS), str(CLIENTS)
+    ours, theirs = [], []
+    async with served(_options(port)) as server, _sender(bare_port) as sender:
+        await server.robot.state()
+        for number in range(ROUNDS):
+            tell(
+                f"round {number + 1} of {ROUNDS}: a robot and a bare sender, without and with {CLIENTS} clients"
+            )
+            _, alone = await punctuality(server, part)
+            async with readers("rtde_clients", ADDRESS, port, several) as said:
+                _, share = await punctuality(server, part)
+            assert all(one["received"] for one in said), "a client has received nothing"
+            ours.append(share - alone)
+            alone = await _share(sender, part)
+            async with readers("rtde_clients", ADDRESS, bare_port, several):
+                theirs.append(await _share(sender, part) - alone)
+    scale = 1e6 * PERIOD / CLIENTS
+    found = figure(
+        "an RTDE client, of ten with different recipes", "µs per tick", [scale * share for share in ours],
+        "a bare send() of as many bytes", [scale * share for share in theirs],
+    )  # fmt: skip
+    return {"rtde_us_per_client_and_tick": found}
+
+
+@asynccontextmanager
+async def _sender(port: str) -> AsyncIterator[int]:
+    """Run the process that only sends; yield its number."""
+    command = [sys.executable, "-m", "proof.bench.bare_send", ADDRESS, port]
+    process = await asyncio.create_subprocess_exec(*command, stdin=asyncio.subprocess.PIPE)
+    try:
+        yield process.pid
+    finally:
+        await process.communicate(b"")
+
+
+async def _share(pid: int, seconds: float) -> float:
+    """Share of a core that a process uses."""
+    used, began = cpu_seconds(pid), time.monotonic()
+    await asyncio.sleep(seconds)
+    return (cpu_seconds(pid) - used) / (time.monotonic() - began)
+
+
+def _options(port: str) -> list[str]:
+    """Options of a server that has no other of UR's interfaces than RTDE."""
+    options = ["--profile", "real", "--ur-address", ADDRESS]
+    for interface in UrPorts().open():
+        options += ["--ur-port", f"{interface}={port if interface == 'rtde' else 'off'}"]
+    return options

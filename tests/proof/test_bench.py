@@ -1,0 +1,72 @@
+"""Figures beside their references, and what the bench makes of them."""
+
+import json
+
+import numpy as np
+import pytest
+from proof.__main__ import main
+from proof.bench.figure import figure, in_alternation, median_interval
+
+
+def test_the_interval_of_a_median_holds_it_as_often_as_it_says():
+    chance = np.random.default_rng(0)
+    held = [
+        low <= 0.0 <= high for _, low, high in (median_interval(chance.normal(size=20)) for _ in range(2000))
+    ]
+    assert 0.95 <= np.mean(held) <= 0.98  # order statistics hold it a little more often
+
+
+def test_a_ratio_is_that_of_each_repetition_so_that_a_drift_of_the_machine_cancels_out():
+    drift = np.linspace(1.0, 3.0, 20)
+    one = figure("ours", "µs", 0.5 * drift, "theirs", drift)
+    assert (one.compared, one.low, one.high) == (0.5, 0.5, 0.5)
+
+
+def test_there_is_no_ratio_to_nothing():
+    assert figure("ours", "", [1.0, 2.0], "theirs", [0.0, 0.0]).compared is None
+
+
+def test_repetitions_alternate_forwards_and_backwards_after_a_first_one_that_does_not_count():
+    order = []
+    taken = in_alternation({name: lambda name=name: order.append(name) or len(order) for name in "ab"}, 2)
+    assert "".join(order) == "ababba"
+    assert taken == {"a": [3, 6], "b": [4, 5]}
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["bench", "--only", "lines"], "no part lines: the parts are line motion"),
+        (["bench", "--seconds", "-1"], "is -1"),
+        (["soak", "0"], "is 0: must be more than 0"),
+        (["lateness", "nan"], "is nan"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(words, why, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2
+    assert why in capsys.readouterr().err
+
+
+@pytest.mark.nightly
+def test_the_bench_gives_each_figure_with_its_reference(capsys):
+    assert main(["bench", "--seconds", "0", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert {"plant_us_per_tick", "filter_us_per_tick", "line_us_per_tick", "realtime_factor"} <= said.keys()
+    for key, one in said["figures"].items():
+        assert one["value"] == said[key] > 0.0
+        assert one["low"] <= one["compared"] <= one["high"]
+
+
+@pytest.mark.nightly
+@pytest.mark.realtime
+def test_a_short_soak_loses_nothing_and_says_what_it_saw(capsys):
+    assert main(["soak", "0.1", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["samples_lost"] == 0
+    assert said["states_recorded"] >= said["ticks"] > 0
+    assert said["observers"] == 5
+    assert said["states_observed"] + said["states_lost_by_observers"] >= 5 * said["ticks"]
+    assert 0 < said["setpoints_sent"] <= 3001
+    assert {"missed_percent", "late_p99_us", "memory_growth_percent"} <= said.keys()
