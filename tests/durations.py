@@ -1,8 +1,9 @@
 """How long tests took, kept in durations.json: it says what begins first, and what is quick.
 
 When tests run side by side, what is longest begins first. `pytest --quick` runs of each test function as many cases as
-fit into a short time, spread over all, and none of one whose single case takes long. `pytest --keep-durations` writes the seconds of every test function that it ran, set-up and end included, its cases
-taken together; what it did not run keeps its figure, and what is no longer there is dropped.
+fit into a short time, spread over all, and none of one whose single case takes long. `pytest --keep-durations` writes
+the seconds of every test function that it ran, set-up and end included, its cases taken together; what it did not run
+keeps its figure, and what is no longer there is dropped.
 """
 
 import json

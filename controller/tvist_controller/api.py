@@ -11,7 +11,7 @@ from tvist_controller.calibrations import estimator_of
 from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.calibrations.modal import drivetrain, mass_matrix, modal_estimator
 from tvist_controller.choices import choose_filter, wanted_modes
-from tvist_controller.collision import CLEARANCE, FAR, CollisionModel
+from tvist_controller.collision import CLEARANCE, CollisionModel
 from tvist_controller.control.differentiator import Target, central_differences
 from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.control.inverse_dynamics import InverseDynamics
@@ -39,13 +39,11 @@ from tvist_controller.reporting import truth_of
 from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.sink import Sink
-from tvist_controller.stopping import stopping
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Trajectory, quickest_motion
 from tvist_controller.whole_motion import Driven, DrivenLine, respond
 
 __all__ = [
     "CLEARANCE",
-    "FAR",
     "STILL",
     "TORQUE_SHARE",
     "CollisionModel",
@@ -98,7 +96,6 @@ __all__ = [
     "quiet_motion",
     "respond",
     "resting_after",
-    "stopping",
     "truth_of",
     "turned",
     "wanted_modes",

@@ -86,10 +86,15 @@ def tables(result: dict[str, Any]) -> list[tuple[Sequence[str], list[list[str]]]
     }
     columns = ("figure", "value", "unit", "reference", "value", "ratio", "95 %", "n")
     return [
-        (tuple(result["machine"]), [[str(value) for value in result["machine"].values()]]),
+        (("machine", ""), [[key, _plain(value)] for key, value in result["machine"].items()]),
         (columns, [_row(one) for one in figures.values()]),
         (("without a reference", "figure"), [[key, f"{value:.4g}"] for key, value in flat.items()]),
     ]
+
+
+def _plain(value: Any) -> str:
+    """Return a text or a number; of several versions, a list."""
+    return ", ".join(map(" ".join, value.items())) if isinstance(value, dict) else f"{value}"
 
 
 def _row(one: dict[str, Any]) -> list[str]:

@@ -10,10 +10,9 @@ PAGE = Path(__file__).parents[2] / "docs" / "reference" / "shaping-library.md"
 """Path of the page in a checkout."""
 HEAD = """# The shaping library
 
-This page lists everything that `tvist_shaping` exports. `python -m tvist_shaping.reference` makes it from the
-docstrings, and a test compares them. The [README](../../shaping/README.md) introduces the library with examples, and
-another page shows [how to make a shaper of your own](../how-to/change-a-shaper.md). Anything not listed here may
-change without notice.
+For whoever calls `tvist_shaping`: everything that it exports; anything else may change without notice. The
+[README](../../shaping/README.md) introduces the library with examples, and another page shows
+[how to make a shaper of your own](../how-to/change-a-shaper.md). `python -m tvist_shaping.reference` makes this page.
 
 """
 PARTS: dict[str, tuple[str, ...]] = {

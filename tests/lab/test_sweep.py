@@ -237,7 +237,7 @@ class TestFolder:
     def test_two_sweeps_cannot_write_one_folder(self, tmp_path):
         with (
             Store(tmp_path / "x", {}, SCHEMA),
-            pytest.raises(StoreError, match=r"another tvist sweep is writing .*x"),
+            pytest.raises(StoreError, match=r"another study is writing .*x"),
         ):
             Store(tmp_path / "x", {}, SCHEMA)
         with Store(tmp_path / "x", {}, SCHEMA) as store:

@@ -1,4 +1,4 @@
-"""The example whose figure stands in docs/how-to/use-ur-rtde.md does what the page says."""
+"""The example whose figure stands in docs/how-to/connect-ur-clients.md does what the page says."""
 
 import re
 from pathlib import Path

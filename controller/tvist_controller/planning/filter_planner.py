@@ -20,7 +20,7 @@ from tvist_shaping.errors import EstimatorError
 from tvist_shaping.named import AnyShaper
 
 SURPLUSES = deque[tuple[ModeSource, AnyShaper | None, str, int, tuple[float, float]]](maxlen=32)
-"""`surplus` of the latest filters of all robots: modes' source, own shaper, name, number of modes, and what was found."""
+"""`surplus` of the latest filters of all robots: source of modes, own shaper, name, number of modes, what was found."""
 
 
 @dataclass(frozen=True)

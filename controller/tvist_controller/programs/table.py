@@ -22,9 +22,8 @@ from tvist_urscript.signatures import REQUIRED, Signature
 
 HEAD = """# Functions of programs
 
-Made by `python -m tvist_controller.programs.table > docs/reference/urscript-functions.md`.
-
-What programs in URScript can call, besides [the functions of the language](urscript.md). Lengths are metres, angles
+For whoever writes programs in URScript: what they can call, besides [the functions of the language](urscript.md).
+Made by `python -m tvist_controller.programs.table > docs/reference/urscript-functions.md`. Lengths are metres, angles
 radians, times seconds; poses are of the tool centre point in the base frame. Parameters with a default may be left out,
 and any may be given by name. A function that *waits* lets time pass; all others return in the same tick. Bad arguments
 end the program with an error at the place of the call.

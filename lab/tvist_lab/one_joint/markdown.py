@@ -8,8 +8,8 @@ from tvist_lab.one_joint.lesson import ANGLES, MASSES, TURNS, WAYS, Lesson
 HEAD = """\
 # One flexible joint
 
-Why one fixed shaper is not enough for a robot arm, on the smallest arm that shows it: the one of Figure 2 of the paper
-(Thomsen et al., ICINCO 2019). Made by
+For whoever learns or teaches shaping: why one fixed shaper is not enough for a robot arm. The arm is the smallest one
+that shows it, that of Figure 2 of the paper (Thomsen et al., ICINCO 2019). Made by
 `{command}`; do not edit.
 
 An actuator with flexibility turns an arm that can stretch and fold. The actuator is a motor that holds its reference,

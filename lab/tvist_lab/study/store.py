@@ -64,7 +64,7 @@ class Store:
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            raise StoreError(f"another tvist sweep is writing {self.folder}") from error
+            raise StoreError(f"another study is writing {self.folder}") from error
         if self._files():
             _check_same(self.folder, manifest, identity)
         else:

@@ -14,9 +14,9 @@ SOURCES = ("State", "Io", "Computed", "Constant")
 HEAD = """\
 # RTDE's variables
 
-Made by `python -m tvist_server.gateways.ur.rtde.table > docs/reference/rtde-variables.md`.
-
-Nothing here was measured on a robot. Each output has one of four sources:
+For whoever reads or writes variables of RTDE, and asks where a value comes from. Nothing here was measured on a robot.
+Made by `python -m tvist_server.gateways.ur.rtde.table > docs/reference/rtde-variables.md`. Each output has one of four
+sources:
 
 - **state**: the value that every client gets in [`state`](../../protocol/README.md#state), equal to the last bit;
 - **io**: terminals, registers and the setup of the tool;
