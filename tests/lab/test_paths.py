@@ -16,6 +16,7 @@ from tvist_lab.studies.paths import PathJob, compare, draw
 from tvist_lab.studies.random_paths import KINDS, REGULAR
 from tvist_lab.studies.tool_path import ToolPath, jacobian
 from tvist_lab.study.measures import kinematics
+from tvist_lab.study.tables import cells
 from tvist_plant.description import load
 from tvist_protocol.motions import MovePath
 from tvist_protocol.replies import Accepted
@@ -139,7 +140,7 @@ class TestComparison:
         assert told["summary"]["all"]["paths"] == 2
         first = told["paths"][0]["shaped"]["auto"][JOINTS]
         assert first["off_mm"] == pytest.approx(1e3 * judged[0].shaped["auto"][JOINTS].off)
-        assert {len(row) for row in rows(told["summary"]["all"])} == {len(COLUMNS)}
+        assert {len(row) for row in cells(rows(told["summary"]["all"]), COLUMNS)} == {len(COLUMNS)}
 
     def test_the_page_names_its_command(self, judged, ur5e, modal):
         told = {

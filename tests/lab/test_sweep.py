@@ -342,7 +342,7 @@ def test_the_study_of_the_page_is_made_kept_and_summarized(tmp_path):
     ("change", "words"),
     [
         (("STUDY =", "study ="), "contains no STUDY"),
-        (('by=("speed",)', 'by=("pace",)'), "'pace': the axes are speed, move"),
+        (('by=("speed",)', 'by=("pace",)'), "'pace' is no axis: there are speed, move"),
         (('"shaped_peak_m_s2")', '"peak")'), "'peak' is no measure"),
         (('"zv", "auto"', '"zvv"'), "KeyError: 'zvv'"),
     ],

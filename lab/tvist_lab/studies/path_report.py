@@ -5,16 +5,20 @@ from typing import Any
 
 import numpy as np
 
-from tvist_lab.markdown_table import markdown_table
-from tvist_lab.studies.evaluate import interval
+from tvist_lab.studies.evaluate import interval, percentiles
 from tvist_lab.studies.pages import page
 from tvist_lab.studies.path_shaping import JOINTS, WAYS
 from tvist_lab.studies.paths import Followed, JudgedPath
 from tvist_lab.study.measures import WORTH
+from tvist_lab.study.tables import Shown, in_markdown
 
 COLUMNS = (
-    "shaper", "shaped", "less %", "p5", "min", "delay ms", "in motion", "off mm", "max", "turned mrad", "q̇ max",
-    "q̈ max",
+    Shown("shaper", "name"), Shown("shaped", "way"), Shown("less %", "reduction_percent.median", 1),
+    Shown("p5", "reduction_percent.p5", 1), Shown("min", "reduction_percent.min", 1),
+    Shown("delay ms", "delay_ms.median", 0), Shown("in motion", "in_motion_ratio.median", 2),
+    Shown("off mm", "off_mm.median", 4), Shown("max", "off_mm.max", 4),
+    Shown("turned mrad", "turned_mrad.median", 4), Shown("q̇ max", "peak_velocity_ratio.max", 3),
+    Shown("q̈ max", "peak_acceleration_ratio.max", 3),
 )  # fmt: skip
 """Columns of the table of all paths."""
 TERMS = {
@@ -90,7 +94,7 @@ def _group(group: list[JudgedPath]) -> dict[str, Any]:
     return {
         "paths": len(group),
         "counted": len(counted),
-        "unshaped_peak_m_s2": _percentiles([one.unshaped.peak for one in group], median=50, max=100),
+        "unshaped_peak_m_s2": percentiles([one.unshaped.peak for one in group], median=50, max=100),
         "shapers": {
             name: {way: _way(group, name, way) for way in WAYS} for name in (group[0].shaped if group else ())
         },
@@ -102,50 +106,34 @@ def _way(group: list[JudgedPath], name: str, way: str) -> dict[str, Any]:
     pairs = [(one, one.shaped[name][way]) for one in group]
     reductions = np.array([one.reduction(found) for one, found in pairs if one.counts])
     return {
-        "peak_m_s2": _percentiles([found.peak for one, found in pairs if one.counts], median=50, p95=95),
-        "reduction_percent": _percentiles(reductions, median=50, p5=5, min=0),
+        "peak_m_s2": percentiles([found.peak for one, found in pairs if one.counts], median=50, p95=95),
+        "reduction_percent": percentiles(reductions, median=50, p5=5, min=0),
         "reduction_percent_interval": interval(reductions, 50),
-        "delay_ms": _percentiles([_delay(*pair) for pair in pairs], median=50, max=100),
-        "in_motion_ratio": _percentiles([_in_motion(*pair) for pair in pairs], median=50, p95=95),
-        "off_mm": _percentiles([1e3 * found.off for _, found in pairs], median=50, p95=95, max=100),
-        "turned_mrad": _percentiles([1e3 * found.turned for _, found in pairs], median=50, p95=95, max=100),
-        "peak_velocity_ratio": _percentiles([found.velocity for _, found in pairs], median=50, max=100),
-        "peak_acceleration_ratio": _percentiles(
+        "delay_ms": percentiles([_delay(*pair) for pair in pairs], median=50, max=100),
+        "in_motion_ratio": percentiles([_in_motion(*pair) for pair in pairs], median=50, p95=95),
+        "off_mm": percentiles([1e3 * found.off for _, found in pairs], median=50, p95=95, max=100),
+        "turned_mrad": percentiles([1e3 * found.turned for _, found in pairs], median=50, p95=95, max=100),
+        "peak_velocity_ratio": percentiles([found.velocity for _, found in pairs], median=50, max=100),
+        "peak_acceleration_ratio": percentiles(
             [found.acceleration for _, found in pairs], median=50, max=100
         ),
     }
 
 
-def _percentiles(values: Sequence[float] | np.ndarray, **shares: float) -> dict[str, float | None]:
-    return {
-        name: float(np.percentile(values, share)) if len(values) else None for name, share in shares.items()
-    }
-
-
-def rows(group: dict[str, Any]) -> list[tuple[str, ...]]:
-    """Rows of a table with `COLUMNS`, from a group of the summary, without those that equal the one above."""
+def rows(group: dict[str, Any]) -> list[dict[str, Any]]:
+    """Entries of the table of a group of the summary, without those that equal the one above."""
     return [
-        (name, WAYS[way], *_cells(found))
+        {"name": name, "way": WAYS[way], **found}
         for name, ways in group["shapers"].items()
         for way, found in ways.items()
         if way == JOINTS or found != ways[JOINTS]
     ]
 
 
-def _cells(found: dict[str, Any]) -> tuple[str, ...]:
-    less, off = found["reduction_percent"], found["off_mm"]
-    return (
-        *(_said(less[key], 1) for key in ("median", "p5", "min")), _said(found["delay_ms"]["median"], 0),
-        _said(found["in_motion_ratio"]["median"], 2), *(_said(off[key], 4) for key in ("median", "max")),
-        _said(found["turned_mrad"]["median"], 4), _said(found["peak_velocity_ratio"]["max"], 3),
-        _said(found["peak_acceleration_ratio"]["max"], 3),
-    )  # fmt: skip
-
-
 def page_of(result: dict[str, Any], command: str) -> str:
     """Return the tables with explanations, as the body of a page."""
     kinds = [(kind, group) for kind, group in result["summary"].items() if kind != "all"]
-    tables = [(title_of(*one), markdown_table(COLUMNS, rows(one[1]), left=2)) for one in kinds]
+    tables = [(title_of(*one), in_markdown(rows(one[1]), COLUMNS, left=2)) for one in kinds]
     in_words = circle_in_words(result["circle"])
     return page("paths", result, command, tables=tables, terms=TERMS, circle_in_words=in_words)
 
@@ -155,7 +143,7 @@ def title_of(kind: str, group: dict[str, Any]) -> str:
     peak = group["unshaped_peak_m_s2"]
     return (
         f"{group['paths']} {KIND_NAMES[kind]}, {group['counted']} of them with an unshaped peak of {WORTH:g} m/s² or "
-        f"more, which count in the percentages; median {_said(peak['median'], 2)} m/s²"
+        f"more, which count in the percentages; median {peak['median']:.2f} m/s²"
     )
 
 
@@ -169,7 +157,3 @@ def circle_in_words(circle: dict[str, Any]) -> str:
         f"circle itself would lose {circle['predicted_mm']:.2f} mm of its radius. Along the path it is left by "
         f"{1e6 * largest['along']:.0f} nm."
     )
-
-
-def _said(value: float | None, digits: int) -> str:
-    return "–" if value is None else f"{value:.{digits}f}"

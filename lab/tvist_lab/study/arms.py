@@ -138,7 +138,11 @@ def scattered(share: float) -> ArmVariant:
     """Return an arm with each gear, link and velocity loop stiffer or softer by a share, at random."""
     if share == 0.0:
         return AS_DESCRIBED
-    return ArmVariant("scattered", f"stiffness and gains off by {100.0 * share:g} %", partial(_off, share))
+    return ArmVariant(
+        f"scattered_{100.0 * share:g}_percent",
+        f"stiffness and gains off by {100.0 * share:g} %",
+        partial(_off, share),
+    )
 
 
 def _off(share: float, description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:
@@ -149,7 +153,11 @@ def with_springs(factor: float) -> ArmVariant:
     """Return an arm all of whose springs are stiffer by a factor."""
     if factor == 1.0:
         return AS_DESCRIBED
-    return ArmVariant("stiffer", f"springs {100.0 * (factor - 1.0):+g} %", partial(_sprung, factor))
+    return ArmVariant(
+        f"springs_{100.0 * (factor - 1.0):+g}_percent",
+        f"springs {100.0 * (factor - 1.0):+g} %",
+        partial(_sprung, factor),
+    )
 
 
 def _sprung(factor: float, description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001

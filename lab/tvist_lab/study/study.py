@@ -2,7 +2,7 @@
 
 import importlib.util
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 from importlib.metadata import version
@@ -69,24 +69,23 @@ class Study:
         """Check that it can be made.
 
         Raises:
-            StudyError: It has no cases or methods, the cases have different axes, or a name is unknown.
+            StudyError: It has no cases or methods, the cases have different axes, or a name is unknown or not alone.
         """
         if not self.cases or not self.methods:
             raise StudyError("it needs a case and a method at least")
         for place, case in enumerate(self.cases):
-            if set(case.axes) != set(self.cases[0].axes):
-                raise StudyError(f"cases[{place}] has the axes {sorted(case.axes)}: all need the same")
-            if len(case.arms) != len(self.cases[0].arms):
-                raise StudyError(f"cases[{place}] has {counted(len(case.arms), 'arm')}: all need as many")
-        for name in self.measured:
-            if name not in MEASURES:
-                raise StudyError(f"{name!r} is no measure: there are {', '.join(MEASURES)}")
-        for name in self.by:
-            if name not in self.cases[0].axes:
-                raise StudyError(f"by has {name!r}: the axes are {', '.join(self.cases[0].axes)}")
-        names = [method.name for method in self.methods]
-        if len(set(names)) < len(names):
-            raise StudyError(f"methods have the same name: {', '.join(names)}")
+            self._check_case(f"cases[{place}]", case)
+        _check_known(self.measured, MEASURES, "measure")
+        _check_known(self.by, self.cases[0].axes, "axis")
+        _check_alone([method.name for method in self.methods], "methods")
+
+    def _check_case(self, place: str, case: Case) -> None:
+        first = self.cases[0]
+        if set(case.axes) != set(first.axes):
+            raise StudyError(f"{place} has the axes {sorted(case.axes)}: all need the same")
+        if len(case.arms) != len(first.arms):
+            raise StudyError(f"{place} has {counted(len(case.arms), 'arm')}: all need as many")
+        _check_alone([arm.name for arm in case.arms], f"arms of {place}")
 
     def plan(self) -> Plan:
         """Return what the engine runs."""
@@ -126,6 +125,17 @@ class Study:
             for share in ("median", "p95")
         ]
         return [*(Shown(name, name) for name in keys), *figures]
+
+
+def _check_known(names: Iterable[str], known: Iterable[str], what: str) -> None:
+    for name in names:
+        if name not in known:
+            raise StudyError(f"{name!r} is no {what}: there are {', '.join(known)}")
+
+
+def _check_alone(names: Sequence[str], what: str) -> None:
+    if len(set(names)) < len(names):
+        raise StudyError(f"{what} have the same name: {', '.join(names)}")
 
 
 def read_study(path: Path) -> Study:

@@ -1,8 +1,8 @@
 """What a worker does: make a case by some methods on its arms, and measure each motion: one flat row a motion."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any
 
 from tvist_lab.recordings import Recording
@@ -79,28 +79,24 @@ class Bench:
         if isinstance(method, Waiting):
             yield from ((arm.name, self.unshaped(arm.name)) for arm in self.job.case.arms)
             return
-        shaped = method.shaped(self.task if ticks is None else _compared(self.task, ticks))
+        shaped = method.shaped(replace(self.task, ticks=ticks))
         follow = self._following(shaped)
         for arm in self.job.case.arms:
-            name = arm.name
-            yield name, Motion(self.job.case, shaped, follow(name), lambda name=name: self.unshaped(name))  # type: ignore[misc]
+            unshaped = partial(self.unshaped, arm.name)
+            yield arm.name, Motion(self.job.case, shaped, follow(arm.name), unshaped)
 
     def unshaped(self, arm: str) -> Motion:
         """Return the unshaped motion of an arm, which is simulated once."""
         if arm not in self._plain:
             shaped = Shaped(self._world.reference)
             recording = self._following(shaped)(arm)
-            self._plain[arm] = Motion(self.job.case, shaped, recording, lambda: self.unshaped(arm))
+            self._plain[arm] = Motion(self.job.case, shaped, recording, partial(self.unshaped, arm))
         return self._plain[arm]
 
     def _following(self, shaped: Shaped) -> Callable[[str], Recording]:
         world = self._world
         following = world.line.follow(world.reference, shaped.q, shaped.delay, shaped.elastic)
         return lambda arm: following.simulate(world.arms[arm], self.job.case.seed)
-
-
-def _compared(task: Task, ticks: int) -> Task:
-    return Task(task.description, task.move, task.reference, task.limits, task.as_served, task.stream, ticks)
 
 
 def measure(job: Job) -> tuple[Row, ...]:
@@ -129,7 +125,7 @@ def measure_each(job: Job) -> tuple[Row, ...]:
             return failed(job, TOO_WEAK, f"the move needs {100.0 * share:.0f} % of a drive's torque")
         bench = Bench(job)
         if job.as_served:
-            for arm in job.case.arms:
+            for arm in job.case.arms:  # where the unshaped motion fails, no method is to blame
                 _ = bench.unshaped(arm.name).peak
     except Exception as error:  # noqa: BLE001  it costs these rows alone
         return failed(job, FAILED, why(error))

@@ -172,10 +172,15 @@ def _draw(
 
 def _print(result: dict[str, Any]) -> None:
     from tvist_lab.studies.path_report import COLUMNS, TERMS, circle_in_words, rows, title_of
+    from tvist_lab.study.tables import cells, titles
 
     for kind, group in result["summary"].items():
         if kind != "all":
-            table(f"{title_of(kind, group)}; arm {result['plant']}", COLUMNS, rows(group))
+            table(
+                f"{title_of(kind, group)}; arm {result['plant']}",
+                titles(COLUMNS),
+                cells(rows(group), COLUMNS),
+            )
     words(TERMS)
     out.print(circle_in_words(result["circle"]), soft_wrap=True)
     say(
