@@ -794,7 +794,6 @@ def anything(random: np.random.Generator, robot: Robot):
     return robot.send(kind, **fields)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_whatever_comes_nothing_breaks_and_every_motion_ends_once(seed):
     """A thousand commands a seed, with set-points and ticks in between."""

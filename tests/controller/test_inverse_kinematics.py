@@ -52,7 +52,7 @@ def test_forward_of_inverse_is_the_pose_and_the_nearest_posture_is_returned(meas
     assert worst <= 1e-12
 
 
-@pytest.mark.parametrize("number", [200, pytest.param(2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [200, 2000])
 def test_no_posture_is_missed(number):
     rng, ik = np.random.default_rng(2), InverseKinematics(UR5E)
     for _ in range(number):

@@ -31,7 +31,6 @@ def test_every_kind_of_stop_stays_on_the_path_behind_the_motion_and_rests_no_lat
     stopped_as_promised(seed)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(QUICK, SLOW))
 def test_so_do_many_more(seed):
     stopped_as_promised(seed)

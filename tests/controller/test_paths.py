@@ -34,7 +34,6 @@ def test_a_random_path_is_where_it_should_be_with_every_shaper(seed):
     is_where_it_should_be(seed)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(QUICK, SLOW))
 def test_so_are_many_more(seed):
     is_where_it_should_be(seed)

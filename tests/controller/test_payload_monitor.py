@@ -96,7 +96,6 @@ def told_and_false(rounds, seed):
     return missed, false, worst
 
 
-@pytest.mark.slow
 def test_within_three_random_moves_a_wrong_payload_is_told_and_a_right_one_never():
     missed, false, worst = told_and_false(5, seed=1)
     assert (missed, false) == (0, 0)

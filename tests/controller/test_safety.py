@@ -79,7 +79,6 @@ def test_a_stop_that_is_not_clear_is_passed_over_for_one_that_is():
     assert gentle.acceleration < free.acceleration, "hardened until it is clear, and no more"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_a_stop_is_no_protective_stop(seed):
     """The flexible arm swings beyond what is asked of it, but never for more than 10 ms beyond its drives' limits."""

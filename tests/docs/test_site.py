@@ -99,7 +99,6 @@ def site(tmp_path_factory):
     return folder
 
 
-@pytest.mark.slow
 class TestBuilt:
     def test_nothing_is_loaded_from_outside(self, site):
         for page in (site / "html").rglob("*.html"):

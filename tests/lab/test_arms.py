@@ -37,7 +37,6 @@ def test_every_table_of_numbers_has_an_origin():
         assert {"kinematics", "links", "limits", "drives"} <= told, name
 
 
-@pytest.mark.slow
 def test_three_arms_are_stilled_by_auto_out_of_the_box(tmp_path):
     """By the command that the reference page names, with fewer moves."""
     page = tmp_path / "robots.md"

@@ -254,7 +254,6 @@ class TestReport:
 
 
 class TestMoves:
-    @pytest.mark.slow
     def test_the_papers_motion_is_what_the_paper_page_says(self, ur5e, paper, move):
         recipe = Recipe("zv", paper)
         every = methods(Named(recipe, "zv"), baselines(recipe, ur5e, (5.0, 5.0)))
@@ -275,7 +274,6 @@ class TestMoves:
         for baseline in baselines(recipe, ur5e, (5.0, 5.0)):
             np.testing.assert_allclose(baseline.shaped(task).q[-1], move.target, atol=1e-9)
 
-    @pytest.mark.slow
     def test_other_processes_give_the_same_figures(self, ur5e, paper):
         zv = (Named(Recipe("zv", paper), "zv"),)
         jobs = [

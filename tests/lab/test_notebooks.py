@@ -131,7 +131,6 @@ class TestPoses:
         assert answer["fixed_ms"] > 2.0 * answer["following_ms"]
 
 
-@pytest.mark.slow
 class TestPaper:
     def test_what_the_formula_predicts_of_the_fixed_shaper_is_what_the_arm_does(self, paper):
         assert paper["answer"]["predicted"] == pytest.approx(paper["answer"]["fixed"], abs=0.15)
@@ -149,7 +148,6 @@ class TestPaper:
         assert unshaped[1] == pytest.approx(unshaped[0], rel=0.25)
 
 
-@pytest.mark.slow
 class TestYourShaper:
     def test_the_robust_shaper_leaves_less_at_a_wrong_frequency_and_is_twice_as_long(self, own):
         remaining, delay = own["answer"]["remaining"], own["answer"]["delay_ms"]

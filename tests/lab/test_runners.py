@@ -81,7 +81,6 @@ class TestFew:
         assert type(got[8].error).__name__ == "OddError"
 
 
-@pytest.mark.slow
 class TestOthers:
     @pytest.fixture(autouse=True)
     def importable(self, monkeypatch):

@@ -417,7 +417,6 @@ class TestScores:
         shaped = shape(Passes(), task.reference, watched=True)
         assert shaped.delay == 0.0
 
-    @pytest.mark.slow
     def test_a_leaderboard_ranks_and_says_why_it_does_not(self, ur5e, calibration, own):
         candidate = own("def step(q_ref, info):\n    return q_ref[:5]")
         standing = [*bench(ur5e, calibration, None, ["zv", "double_s_as_zv"]), candidate]

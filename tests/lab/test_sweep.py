@@ -365,7 +365,6 @@ class Locked(Axes):
         return replace(task, case=short) if position == 2 else task
 
 
-@pytest.mark.slow
 def test_a_task_that_cannot_be_pickled_and_one_that_fails_name_their_moves_and_the_others_go_on(tmp_path):
     tasks = tasks_of(tmp_path, "shapers = ['none']\nmoves = 4\npayloads = [5]")
     bad = run(Locked(tasks.spec, tasks.robots), tmp_path / "x", Cluster(processes=2), quietly).rows

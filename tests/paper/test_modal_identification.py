@@ -58,7 +58,6 @@ def synthetic():
     return arm, candidates, rings
 
 
-@pytest.mark.slow
 def test_eight_ring_downs_say_three_modes_at_poses_and_with_payloads_never_seen(done):
     found, _ = done
     assert found.errors is not None
@@ -69,7 +68,6 @@ def test_eight_ring_downs_say_three_modes_at_poses_and_with_payloads_never_seen(
     assert first.zeta.median < 10.0
 
 
-@pytest.mark.slow
 def test_the_calibration_says_how_sure_it_is_and_what_it_came_from(done):
     found, info = done
     calibration = found.calibration
@@ -96,7 +94,6 @@ def test_the_calibration_says_how_sure_it_is_and_what_it_came_from(done):
         assert not estimator.clipped
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("wrong", [(2,), pytest.param((1, 6), marks=pytest.mark.nightly)])
 def test_a_ring_down_with_another_payload_than_declared_is_named(done, wrong):
     found, info = done

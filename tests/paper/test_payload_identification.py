@@ -28,7 +28,6 @@ def found(mass, com, *, declared=2.0, poses=4, seed=0, description=ROBOT):
     return asyncio.run(run())
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mass", "com", "seed"),
     [(3.3, (-0.02, 0.05, 0.06), 1), (0.6, (0.03, 0.0, 0.05), 2), (5.0, (0, 0, 0.0405), 3)],
@@ -43,7 +42,6 @@ def test_mass_and_centre_are_found_whatever_is_declared(mass, com, seed):
     assert payload.payload.mass <= 5.0  # what is rated, or it could not be declared
 
 
-@pytest.mark.slow
 def test_nothing_carried_is_found_to_be_nothing():
     payload = found(0.0, (0.0, 0.0, 0.0))
     assert payload.payload.mass < 0.02

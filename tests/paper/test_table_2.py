@@ -10,8 +10,6 @@ from tvist_lab.studies.paper.report import as_dict
 
 LEAST_REDUCTION = {"Q1-Q2": 83.0, "Q1-Q3": 76.0, "Q3-Q1": 78.0}
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def table(done):

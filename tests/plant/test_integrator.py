@@ -124,14 +124,12 @@ def test_without_numba_the_python_function_serves(monkeypatch):
     assert double.py_func is double
 
 
-@pytest.mark.slow
 def test_acceleration_is_that_of_runge_kutta_with_friction(arm, drive, felt_by_runge_kutta, measured):
     error = worst(felt(arm, drive), felt_by_runge_kutta)
     measured("max |alpha - alpha of RK4| [m/s^2]", error)
     assert error < 0.002  # measured 0.00113; the project asks for 0.02
 
 
-@pytest.mark.slow
 def test_acceleration_is_that_of_runge_kutta_on_the_clean_arm(ur5e, measured):
     clean = ur5e.clean()
     friction = np.array(clean.drives.coulomb_friction) / clean.drives.friction_width
@@ -144,7 +142,6 @@ def test_acceleration_is_that_of_runge_kutta_on_the_clean_arm(ur5e, measured):
     assert error < 0.002
 
 
-@pytest.mark.slow
 def test_error_falls_with_the_square_of_the_period(arm, drive, felt_by_runge_kutta, measured):
     errors = [
         worst(felt(arm, drive, period=period), felt_by_runge_kutta) for period in (0.002, 0.001, 0.0005)
@@ -154,7 +151,6 @@ def test_error_falls_with_the_square_of_the_period(arm, drive, felt_by_runge_kut
         assert 3.5 < coarse / fine < 5.0
 
 
-@pytest.mark.slow
 def test_error_falls_with_the_square_of_the_substep(arm, drive, measured):
     fine = felt(arm, drive, substeps=32)
     errors = [worst(felt(arm, drive, substeps=substeps), fine) for substeps in (1, 2, 4)]

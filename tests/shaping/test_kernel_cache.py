@@ -84,7 +84,6 @@ def test_a_second_process_compiles_nothing(package):
     assert call(package) == ["True", "3.0", "1", "0"]  # damaged code does not run
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("changed", ["callee", "constants"])
 def test_a_change_of_what_a_kernel_calls_or_uses_in_another_file_compiles_it_again(package, changed):
     call(package)
@@ -98,7 +97,6 @@ def test_a_change_of_what_a_kernel_calls_or_uses_in_another_file_compiles_it_aga
     assert len(list(package.rglob("*outer*.kernel"))) == 1  # what it was before is gone
 
 
-@pytest.mark.slow
 def test_machine_code_of_another_processor_is_not_loaded_and_stays(package):
     call(package)
     other = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
@@ -107,7 +105,6 @@ def test_machine_code_of_another_processor_is_not_loaded_and_stays(package):
     assert call(package) == ["True", "3.0", "0", "0"]
 
 
-@pytest.mark.slow
 def test_where_the_sources_cannot_be_written_the_users_cache_folder_is_and_else_it_is_noted(package):
     (package / "__pycache__").write_text("a file where the folder would be")  # root may write anywhere
     assert call(package, PYTHONDONTWRITEBYTECODE="1") == ["False", "3.0", "1", "0"]
@@ -116,7 +113,6 @@ def test_where_the_sources_cannot_be_written_the_users_cache_folder_is_and_else_
     assert call(package, NUMBA_CACHE_DIR="/proc/none") == ["False", "3.0", "1", "1"]
 
 
-@pytest.mark.slow
 def test_processes_that_compile_at_once_keep_what_each_compiled(package):
     """numba's own cache may give one's machine code, for integers, the name of the other's, for floats."""
     at_once = [start(package, values) for values in ("[1.0, 2]", "[2, 1.0]")]

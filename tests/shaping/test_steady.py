@@ -359,7 +359,6 @@ def test_a_sample_of_another_size_is_refused():
             tvist.filter(wrong)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_after_a_hundred_thousand_ticks_the_taps_are_what_they_would_be_anew(kind):
     tvist = a_filter(kind)

@@ -7,8 +7,6 @@ import msgpack
 import pytest
 from tests.conformance.wire import Q1, STOPPED, Wire
 
-pytestmark = pytest.mark.quick
-
 NAN, INF = math.nan, math.inf
 MEGABYTES = bytes(5_000_000)
 UNSETTLED = {"type", "tick", "control"}

@@ -300,7 +300,6 @@ class TestRecordAndAnalyze:
 
 
 class TestMoveAndWatch:
-    @pytest.mark.quick
     def test_move_says_how_long_it_took(self, realtime):
         said = (
             tvist("move", "0,-3.0,0,-1.5,0,0", "--endpoint", realtime.endpoint, "--json").assert_done().json
@@ -380,7 +379,6 @@ class TestMoveAndWatch:
         with Wire(realtime.endpoint) as wire, wire.control("somebody"):
             tvist("move", NEAR, "--endpoint", realtime.endpoint).assert_failed(1, "somebody")
 
-    @pytest.mark.quick
     def test_stop_ends_the_motion_of_another_who_keeps_control(self, realtime):
         at = ("--endpoint", realtime.endpoint)
         with Wire(realtime.endpoint) as wire, wire.control("somebody") as token:
@@ -472,7 +470,6 @@ def test_too_few_configurations_for_a_fit_is_a_sentence(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
 @pytest.mark.realtime
 def test_the_demonstration_replays_equal_and_its_recording_gives_the_same_figures(tmp_path):
     ended = tvist("demo", "--output", tmp_path / "demo", "--json", cwd=tmp_path).assert_done()
@@ -485,14 +482,12 @@ def test_the_demonstration_replays_equal_and_its_recording_gives_the_same_figure
     assert [path.name for path in tmp_path.iterdir()] == ["demo"]
 
 
-@pytest.mark.slow
 def test_the_paper_in_one_run_prints_its_tables(tmp_path):
     said = tvist("paper", "--runs", 1, "--no-baselines", "--json").assert_done().json
     assert {"seed", "runs", "shaper", "estimator", "table_1", "table_2", "baselines"} <= said.keys()
     assert (said["seed"], said["runs"], said["shaper"]) == (0, 1, "zv")
 
 
-@pytest.mark.slow
 def test_the_bench_tells_how_fast_a_robot_is_computed():
     said = tvist("bench", "--seconds", 0, "--shaper", "EI", "--json").assert_done().json
     assert (said["seconds"], said["shaper"]) == (0, "ei")
@@ -512,7 +507,6 @@ def test_the_bench_tells_how_many_robots_are_served_and_how_late_they_are():
     assert said["robots_at_500_hz"] >= 0
 
 
-@pytest.mark.slow
 def test_the_bare_client_swings_the_arm_and_measures_what_comes_back(realtime):
     example = Path(__file__).parents[2] / "clients" / "examples" / "01_bare_client.py"
     ended = python(example, realtime.endpoint).assert_done()

@@ -10,8 +10,6 @@ import pytest
 
 from tvist_cli.main import COMMANDS, LOG
 
-pytestmark = pytest.mark.quick
-
 ASKING_ZSH = Path(__file__).with_name("completion")
 CASES = {
     "tvist che": {"check"},

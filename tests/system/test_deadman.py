@@ -35,7 +35,6 @@ STREAM = ("amplitude=0.4", "rate=2.0")
 """Up to 0.8 rad/s and 1.6 rad/s², within the 1.5 and 2 of such a stream."""
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize(
     "times", [2, pytest.param(100, marks=[pytest.mark.nightly, pytest.mark.timeout(900)])]
 )

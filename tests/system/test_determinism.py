@@ -92,7 +92,6 @@ def assert_equal(one, other):
     assert one.truths == other.truths
 
 
-@pytest.mark.quick
 async def test_lockstep_over_the_network_and_free_in_process_give_bit_equal_states(runs):
     assert_equal(await run(runs, "lockstep"), await run(runs, "free"))
 

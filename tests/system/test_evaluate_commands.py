@@ -67,7 +67,6 @@ class TestEvaluate:
         assert set(told["delay_ms"]) == {"median", "max"}
         assert set(told["peak_acceleration_ratio"]) == {"median", "p90", "max"}
 
-    @pytest.mark.slow
     def test_random_moves_can_be_kept_and_made_again(self, tmp_path):
         saved = tmp_path / "drawn.json"
         first = tvist(
@@ -87,7 +86,6 @@ class TestEvaluate:
         assert 0.0 < first["free_of_collision"] <= 1.0
         assert {path.name for path in (tmp_path / "figures").iterdir()} == {"moves.png", "one_move.png"}
 
-    @pytest.mark.slow
     def test_words_are_for_people(self, moves):
         said = tvist("evaluate", "--moves", moves, "--payload", 5).assert_done()
         assert "unshaped m/s²" in said.out
@@ -151,7 +149,6 @@ class TestPaths:
         typed = "tvist study paths --random 1 --kind arc --shapers zv auto --seed 3 --payload 5 --clean --markdown"
         assert page.startswith(f"```sh\n{typed} ")
 
-    @pytest.mark.slow
     def test_words_and_figures_are_for_people(self, tmp_path):
         said = tvist(
             "study", "paths", "--random", 3, "--shapers", "auto", "--figures", tmp_path / "figures"
@@ -165,7 +162,6 @@ class TestPaths:
 
 
 class TestShaperBench:
-    @pytest.mark.slow
     def test_a_cheat_is_named_and_not_ranked(self, tmp_path):
         path, board = tmp_path / "peeks.py", tmp_path / "board.json"
         path.write_text(PEEKS, encoding="utf-8")

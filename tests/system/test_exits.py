@@ -19,7 +19,6 @@ from tvist_lab.replay import replay_file
 FAR = [1.5, -3.0, 0.2, -1.5, 0.1, 0.3]
 
 
-@pytest.mark.quick
 @pytest.mark.realtime
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
 def test_a_signal_in_mid_motion_ends_it_with_the_recording_complete(number, tmp_path):

@@ -30,7 +30,6 @@ def proxy(realtime):
         yield proxy
 
 
-@pytest.mark.slow
 def test_a_link_cut_for_3_s_ends_control_and_motion_at_once_and_the_client_is_back_by_itself(
     proxy, bystander, measured
 ):
@@ -61,7 +60,6 @@ def test_a_link_cut_for_3_s_ends_control_and_motion_at_once_and_the_client_is_ba
     bystander.assert_undisturbed()
 
 
-@pytest.mark.slow
 def test_the_python_client_says_that_the_link_is_gone_and_is_back_by_itself(proxy, bystander):
     with Robot.connect(proxy.endpoint) as robot:
         states = robot.states()
@@ -85,7 +83,6 @@ def test_the_python_client_says_that_the_link_is_gone_and_is_back_by_itself(prox
     bystander.assert_undisturbed()
 
 
-@pytest.mark.slow
 def test_a_link_that_stands_still_ends_the_stream_and_loses_states_but_no_event(proxy, bystander, measured):
     """A cable that is pulled and put back: both ends keep the connection."""
     with Wire(proxy.endpoint) as wire:
@@ -157,7 +154,6 @@ def router(robot, endpoint):
         process.stdout.close()
 
 
-@pytest.mark.slow
 def test_a_router_in_the_middle_that_is_killed_ends_control_and_the_next_one_brings_the_client_back(
     realtime, bystander, measured
 ):
@@ -197,7 +193,6 @@ def test_a_link_of_50_ms_each_way_brings_everything_50_ms_late(proxy, bystander,
     bystander.assert_undisturbed()
 
 
-@pytest.mark.slow
 def test_on_a_link_for_two_fifths_of_the_states_the_others_are_dropped_and_answers_go_first(
     proxy, bystander, measured
 ):

@@ -63,7 +63,6 @@ class TestFrozen:
             assert before + 350 <= bystander.event("lease_lost")["tick"] <= granted + 355
 
 
-@pytest.mark.slow
 class TestKilled:
     def test_a_client_is_told_at_once_and_finds_the_next_server_by_itself(self):
         endpoint = free_endpoint()

@@ -42,7 +42,6 @@ def test_too_few_measurements_are_a_sentence_and_no_file(arguments, named, tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
 def test_a_few_ring_downs_make_a_calibration(tmp_path):
     path = tmp_path / "mine.json"
     options = ("--model", "modal", "--ring-downs", 5, "--output", path, "--json")
@@ -80,7 +79,6 @@ def test_it_finds_the_same_over_the_network_as_in_process(lockstep, tmp_path):
         assert there["value"] == pytest.approx(here["value"], rel=0.02)
 
 
-@pytest.mark.slow
 def test_the_payload_of_a_served_robot_is_found_and_declared(lockstep):
     options = ("--payload", "--poses", 3, "--json")
     said = tvist("identify", lockstep.endpoint, *options, "--declare").assert_done().json

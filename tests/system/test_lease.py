@@ -35,7 +35,6 @@ def kill(process):
     process.wait(PATIENCE)
 
 
-@pytest.mark.quick
 def test_a_client_with_a_token_of_liveliness_killed_in_mid_motion_loses_control_at_once(client, live):
     process = client("move", "announced")
     live.next("state", lambda state: state["target_qd"][0] > 0.5)

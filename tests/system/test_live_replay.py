@@ -12,7 +12,7 @@ from tvist_client.robot import Robot
 from tvist_lab.collect import collect
 from tvist_lab.recordings.mcap_file import read
 
-pytestmark = [pytest.mark.realtime, pytest.mark.slow]
+pytestmark = pytest.mark.realtime
 Q1 = (0.0, -math.pi, 0.0, -math.pi / 2, 0.0, 0.0)
 NEAR = (0.4, -2.8, 0.3, -1.4, 0.1, -0.1)
 PERIOD = 0.008

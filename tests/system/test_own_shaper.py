@@ -76,7 +76,6 @@ def test_it_stands_in_the_table_and_the_json_of_shapers(folder):
     assert (len(mean["amplitudes"]), mean["mean_delay_ms"]) == (20, pytest.approx(19.0))
 
 
-@pytest.mark.slow
 def test_processes_that_share_the_work_load_it_again(folder):
     """Ten motions and more are shared among processes; the shaper travels there as its file."""
     same = ("--random", 10, "--no-baselines", "--clean", "--json")

@@ -184,7 +184,6 @@ def live(tmp_path_factory):
 
 
 @pytest.mark.realtime
-@pytest.mark.slow
 def test_the_replay_of_a_live_run_with_a_client_is_equal_to_the_last_bit(live):
     told, path = live
     code, said, _ = tvist("log", "replay", path)
@@ -195,7 +194,6 @@ def test_the_replay_of_a_live_run_with_a_client_is_equal_to_the_last_bit(live):
 
 
 @pytest.mark.realtime
-@pytest.mark.slow
 def test_the_live_run_did_all_that_may_differ(live):
     kinds = [event.kind for event in live[0].events]
     assert kinds.count("program_started") == kinds.count("program_stopped") == 1
@@ -218,7 +216,6 @@ async def test_a_run_with_statements_in_lockstep_is_the_same_again_and_in_its_re
 
 
 @pytest.mark.realtime
-@pytest.mark.slow
 def test_a_program_that_waits_for_nothing_moves_alike_live_and_as_fast_as_it_computes():
     """Plans are made beside the ticks live, and at once otherwise."""
 

@@ -47,7 +47,7 @@ COLUMNS = {
 ELSEWHERE = (0.0, -2.0, 0.5, -1.0, 0.0, 0.0)
 """Where the arm is put between runs, so that the log shows where each begins."""
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.timeout(900)
 
 
 def logged(path):

@@ -79,7 +79,6 @@ def waiting(tvist, tmp_path):
         process.communicate(timeout=PATIENCE)
 
 
-@pytest.mark.quick
 class TestInLockstep:
     def test_messages_are_on_stdout_and_the_account_is_on_stderr(self, tvist):
         code, out, err = tvist("run", "moves.script", "--lockstep")
@@ -258,7 +257,6 @@ class TestInRealTime:
         assert "SIGTERM ended the run" in err
 
 
-@pytest.mark.quick
 class TestCheckScript:
     def test_every_error_is_a_line_on_stdout_and_exit_code_1(self, tvist):
         code, out, err = tvist("run", "--check", "moves.script", "wrong.script")

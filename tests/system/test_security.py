@@ -118,7 +118,6 @@ def keys_in(heard):
 
 
 class TestOperator:
-    @pytest.mark.quick
     def test_moves_and_sees_it(self, operator):
         with operator.control("anna") as token:
             motion = operator.command("move_j", token=token, q=FAR)["id"]

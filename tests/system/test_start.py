@@ -46,10 +46,8 @@ def asked(endpoint, key):
 @pytest.mark.parametrize(
     ("options", "names", "place"),
     [
-        pytest.param((*ONE, "--namespace", "hall-3"), ["ur5e"], "hall-3", marks=pytest.mark.quick),
-        pytest.param(
-            (*SEVERAL, "--workers", "2"), ["ur5e-1", "ur5e-2", "ur5e-3"], "", marks=pytest.mark.quick
-        ),
+        pytest.param((*ONE, "--namespace", "hall-3"), ["ur5e"], "hall-3"),
+        pytest.param((*SEVERAL, "--workers", "2"), ["ur5e-1", "ur5e-2", "ur5e-3"], ""),
         (SEVERAL, ["ur5e-1", "ur5e-2", "ur5e-3"], ""),
         ((*SEVERAL, "--workers", "2", "--namespace", "hall-3"), ["ur5e-1", "ur5e-2", "ur5e-3"], "hall-3"),
     ],

@@ -178,7 +178,6 @@ def test_in_real_time_nobody_holds_the_clock(realtime):
         assert info["commands"]["take_clock"] == ["client", "protocol"]
 
 
-@pytest.mark.quick
 async def test_in_python_one_client_steps_while_another_moves_and_waits_for_its_motion(lockstep):
     async with (
         await Robot.connect(lockstep.endpoint) as robot,

@@ -220,7 +220,6 @@ def quiet():
         yield served
 
 
-@pytest.mark.quick
 def test_everything_that_can_be_set_is_and_zenoh_shows_it(quiet):
     with (
         Wire(quiet.endpoint) as wire,

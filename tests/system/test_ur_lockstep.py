@@ -312,7 +312,6 @@ def test_the_going_of_the_stepping_client_ends_its_step_and_another_one_s_takes_
     assert next(entry.client for entry in journal if entry.kind == "client_gone") == "stepper"
 
 
-@pytest.mark.quick
 def test_unmodified_clients_of_ur_rtde_live_by_the_steps_of_another_client(tmp_path):
     pytest.importorskip("rtde_receive")
     from tests.system.test_ur_clients import Client, until

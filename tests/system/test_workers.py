@@ -17,8 +17,6 @@ from tvist_client.check import check
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 
-pytestmark = pytest.mark.slow
-
 LOCKSTEP = ("--robots", "ur5e*3", "--workers", "2", "--clock", "lockstep")
 NAMES = ["ur5e-1", "ur5e-2", "ur5e-3"]
 

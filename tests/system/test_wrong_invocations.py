@@ -11,6 +11,7 @@ import pytest
 from tests.conformance.served import free_endpoint
 
 from tvist_cli import main
+from tvist_cli.removed import INSTEAD
 
 MSGSPEC = re.compile(
     r"Expected `|Object (missing|contains)|Invalid enum|at `\$|is malformed|Traceback|Errno|Unused"
@@ -74,7 +75,6 @@ MISUSE = [
     # commands and options
     (("dance",), ["'dance'", "--help"]),
     (("mvoe", "Q1"), ["did you mean move?"]),
-    (("log", "analyze", "x.mcap", "--json"), ["'analyze'", "it is now tvist log analyze"]),
     (("log", "analize", "x.mcap"), ["did you mean analyze?", "tvist log --help"]),
     (("serve", "--compile", "--ur"), ["--compile serves nothing"]),
     (("shapers", "--output", "x.json"), ["--output are for --sensitivity"]),
@@ -303,3 +303,16 @@ def test_a_wrong_line_of_the_roles_is_named(tvist, tmp_path, line, words):
     ended = tvist("serve", "--security", ".", "--listen", f"tls/{free_endpoint().partition('/')[2]}")
     assert_said(ended, ended[0], ["clients.toml", *words])
     assert ended[0] in {1, 2}
+
+
+@pytest.mark.parametrize("name", INSTEAD)
+def test_a_command_that_has_another_name_now_says_it(tvist, name):
+    assert_said(tvist(name), 2, [INSTEAD[name]])
+    program, *words = INSTEAD[name].split()
+    if program == "tvist":
+        code, out, _ = tvist(*(word for word in words if word != "FILE"), "--help")
+        assert (code, not out) == (0, False)
+
+
+def test_there_are_no_more_commands_than_one_overlooks():
+    assert len(main.COMMANDS) <= 24

@@ -63,7 +63,6 @@ def test_every_step_of_the_action_is_one_of_its_script():
     assert used == known
 
 
-@pytest.mark.slow
 def test_tests_run_and_the_recordings_of_failed_ones_are_named(run, tmp_path):
     (tmp_path / "test_it.py").write_text(TESTS)
     ran = run("test", "test_it.py", "-q")
@@ -87,7 +86,6 @@ def test_a_wrong_step_is_told_in_a_sentence(run, arguments, said):
     assert (ran.returncode, ran.stderr) == (1, f"tvist action: {said}\n")
 
 
-@pytest.mark.slow
 def test_a_robot_that_cannot_start_is_told(run):
     ran = run("serve", "--payload", "500")
     assert (ran.returncode, "payload is 500" in ran.stderr) == (1, True)

@@ -172,7 +172,6 @@ def test_markers_with_wrong_arguments_fail_with_a_sentence(pytester):
         assert text.count("\n") == 0, text
 
 
-@pytest.mark.slow
 def test_two_workers_side_by_side_never_meet(pytester):
     pytester.makepyfile("""
         import pytest

@@ -25,7 +25,6 @@ def test_any_text_is_an_error_or_a_run(group):
     all_of(group)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("group", groups(QUICK, CI))
 def test_so_are_many_more(group):
     all_of(group)

@@ -47,7 +47,6 @@ def test_the_curve_is_zero_without_an_error_and_rises_to_both_sides():
     assert (np.diff(curve[:31]) < 0.0).all()
 
 
-@pytest.mark.slow
 def test_every_browser_has_sliders_of_its_own():
     with Page(command="lesson") as served, browser() as chromium:
         first = opened(chromium, served)
