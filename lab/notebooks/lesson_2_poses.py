@@ -9,7 +9,7 @@ with app.setup:
     import marimo as mo
     import numpy as np
 
-    from tvist_controller.api import estimator_of, load_calibration
+    from tvist_controller.api.line import estimator_of, load_calibration
     from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, note, panels, title
     from tvist_lab.studies.paper.published import pose
     from tvist_lab.study.catalogue import names

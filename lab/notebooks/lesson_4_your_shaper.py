@@ -11,7 +11,7 @@ with app.setup:
     import marimo as mo
     import numpy as np
 
-    from tvist_controller.api import OwnShaper, load_calibration
+    from tvist_controller.api.line import OwnShaper, load_calibration
     from tvist_lab.figures.style import INK, SHAPED, THIRD, UNSHAPED, legend, panels
     from tvist_lab.study.case import Case
     from tvist_lab.study.catalogue import names

@@ -7,7 +7,8 @@ from msgspec.structs import replace
 
 from tvist_client.robot import Robot
 from tvist_client.transports.loopback import LoopbackTransport
-from tvist_controller.api import LoopbackHost, Setup
+from tvist_controller.api.line import Setup
+from tvist_controller.api.robot import LoopbackHost
 from tvist_server.config import ServeConfig
 
 

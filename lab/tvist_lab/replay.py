@@ -7,7 +7,8 @@ from typing import Any
 
 from msgspec.structs import fields
 
-from tvist_controller.api import Controller, OwnShaper, Presence, RecordedShaper, Setup, SocketNews
+from tvist_controller.api.line import OwnShaper, RecordedShaper, Setup
+from tvist_controller.api.robot import Controller, Presence, SocketNews
 from tvist_lab.recordings.mcap_file import RecordingFile
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from proof.bench.figure import Figure, figure, in_alternation
-from tvist_controller.api import body
+from tvist_controller.api.line import body
 from tvist_lab.bench.moving import (
     Run,
     arm_tick,

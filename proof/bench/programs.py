@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 
 from proof.bench.figure import Figure, figure, in_alternation
-from tvist_controller.api import LoopbackHost, ScriptCompiler
+from tvist_controller.api.robot import LoopbackHost, ScriptCompiler
 from tvist_lab.in_process import free_setup
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import TakeControl

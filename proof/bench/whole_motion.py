@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from proof.bench.figure import Figure, figure, in_alternation
-from tvist_controller.api import DrivenLine, body, respond
+from tvist_controller.api.line import DrivenLine, body, respond
 from tvist_lab.in_process import free_setup
 from tvist_lab.studies.paper.published import pose
 from tvist_lab.study.line import Unchanged, point_to_point

@@ -11,7 +11,7 @@ is the least number of ticks for which this is possible. The bound is T less the
 
 import numpy as np
 
-from tvist_controller.api import JointLine, MotionLimits, Programme, inside, optimize, quickest_motion
+from tvist_controller.api.line import JointLine, MotionLimits, Programme, inside, optimize, quickest_motion
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from proof.bound.least_time import MODES, bound
-from tvist_controller.api import body, load_calibration, paper_payload
+from tvist_controller.api.line import body, load_calibration, paper_payload
 from tvist_lab.runners import Processes, in_order
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import names

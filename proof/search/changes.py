@@ -7,7 +7,7 @@ import numpy as np
 from proof.search import draws, stops, streams
 from proof.search.draws import WITHIN
 from proof.search.subject import Subject, speeds
-from tvist_controller.api import CLEARANCE, CollisionModel, body, paper_payload
+from tvist_controller.api.line import CLEARANCE, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD

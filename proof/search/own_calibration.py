@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from tvist_controller.api import (
+from tvist_controller.api.line import (
     body,
     calibrations,
     default_calibration,
     drivetrain,
     load_calibration,
     paper_payload,
-)  # fmt: skip
+)
 from tvist_lab.identification.modal_calibration import mode_range
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import flexible_model

@@ -7,7 +7,7 @@ from typing import Any
 from proof.search import space
 from proof.search.scripts import Author
 from proof.search.sequences import SENT, Sequence
-from tvist_controller.api import CLEARANCE
+from tvist_controller.api.line import CLEARANCE
 from tvist_lab.recordings import Floats
 from tvist_protocol import programs as p
 from tvist_protocol.io import SetRegisters

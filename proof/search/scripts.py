@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from proof.search import space
-from tvist_controller.api import ToolKinematics
+from tvist_controller.api.planning import ToolKinematics
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 

@@ -11,7 +11,7 @@ from proof.search.changes import far_payload
 from proof.search.draws import WITHIN
 from proof.search.subject import CLIENT, SESSION, Subject, speeds
 from proof.search.undisturbed import ROUNDING, Undisturbed
-from tvist_controller.api import CLEARANCE, CollisionModel, body, paper_payload
+from tvist_controller.api.line import CLEARANCE, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_protocol import commands as c

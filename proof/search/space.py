@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from proof.search.subject import Subject
-from tvist_controller.api import ToolKinematics, placement_vector, turned
+from tvist_controller.api.planning import ToolKinematics, placement_vector, turned
 from tvist_lab.recordings import Floats
 from tvist_protocol import motions as m
 from tvist_protocol.replies import Reply

@@ -8,7 +8,7 @@ import numpy as np
 from proof.search import draws
 from proof.search.draws import WITHIN
 from proof.search.subject import CLIENT, SESSION, Subject, refused, speeds, torques
-from tvist_controller.api import (
+from tvist_controller.api.line import (
     CLEARANCE,
     TORQUE_SHARE,
     CollisionModel,

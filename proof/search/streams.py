@@ -8,7 +8,7 @@ import numpy as np
 from proof.search import draws
 from proof.search.draws import WITHIN
 from proof.search.subject import CLIENT, SESSION, Subject, refused, speeds
-from tvist_controller.api import CLEARANCE, CollisionModel, JointLine, body, paper_payload
+from tvist_controller.api.line import CLEARANCE, CollisionModel, JointLine, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD

@@ -6,14 +6,8 @@ from typing import Any
 import numpy as np
 
 from proof.search.own_calibration import own_calibration
-from tvist_controller.api import (
-    STILL,
-    Controller,
-    InverseDynamics,
-    Setup,
-    body,
-    central_differences,
-)
+from tvist_controller.api.line import STILL, InverseDynamics, Setup, body, central_differences
+from tvist_controller.api.robot import Controller
 from tvist_lab.recordings import Floats
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.api import STILL
+from tvist_controller.api.line import STILL
 from tvist_lab.recordings import Floats
 
 ROUNDING = 1e-9

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.api import ElasticArm, JointLine, load_calibration, paper_payload, quiet_motion
+from tvist_controller.api.line import ElasticArm, JointLine, load_calibration, paper_payload, quiet_motion
 
 from .robots import PAPER, Q1, Q3, UR5E, H
 

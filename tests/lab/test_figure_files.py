@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tvist_controller.api import load_calibration
+from tvist_controller.api.line import load_calibration
 from tvist_lab.metrics import motions
 from tvist_lab.studies.workspace_map import WorkspaceMap
 from tvist_shaping import SHAPERS

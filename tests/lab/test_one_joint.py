@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 from msgspec.structs import replace
 
-from tvist_controller.api import body, estimator_of, load_calibration, paper_payload
+from tvist_controller.api.line import body, estimator_of, load_calibration, paper_payload
 from tvist_lab.one_joint.closed_form import FlexibleShoulder
 from tvist_lab.one_joint.lesson import ANGLES, MASSES, lesson
 from tvist_lab.one_joint.markdown import page

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.api import ControlCycle, body, load_calibration, paper_payload
+from tvist_controller.api.line import ControlCycle, body, load_calibration, paper_payload
 from tvist_lab.study.line import PAPER, REST, ControlLine, point_to_point
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from tvist_controller.api import body, estimator_of, load_calibration, paper_payload
+from tvist_controller.api.line import body, estimator_of, load_calibration, paper_payload
 from tvist_lab.studies.workspace_map import QUANTITIES, MapError, workspace_map
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm

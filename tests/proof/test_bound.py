@@ -7,7 +7,7 @@ from scipy import sparse
 from scipy.optimize import linprog
 from scipy.signal import cont2discrete
 
-from tvist_controller.api import MotionLimits
+from tvist_controller.api.line import MotionLimits
 from tvist_lab.study.line import PAPER
 from tvist_plant.plant import PERIOD as H
 

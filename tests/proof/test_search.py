@@ -11,7 +11,7 @@ from proof.search.own_calibration import own_calibration
 from proof.search.report import Counts, broken, search, tables
 from proof.search.subject import Subject, speeds
 
-from tvist_controller.api import paper_payload
+from tvist_controller.api.line import paper_payload
 from tvist_controller.trajectory import PathStop
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD

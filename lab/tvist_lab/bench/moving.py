@@ -8,16 +8,16 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tvist_controller.api import (
+from tvist_controller.api.line import (
     ControlCycle,
     InverseDynamics,
     JointLine,
-    LoopbackHost,
     MotionLimits,
     Setup,
     body,
     quickest_motion,
 )
+from tvist_controller.api.robot import LoopbackHost
 from tvist_lab.in_process import free_setup
 from tvist_lab.studies.paper.published import pose
 from tvist_plant.drives import DriveCommand

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvist_controller.api import (
+from tvist_controller.api.line import (
     ControlCycle,
     JointLine,
     MotionLimits,
@@ -14,8 +14,8 @@ from tvist_controller.api import (
     modal_estimator,
     paper_payload,
     quickest_motion,
-    truth_of,
 )
+from tvist_controller.api.robot import truth_of
 from tvist_lab.figures.style import OF_SHAPED, OF_THIRD, OF_UNSHAPED, explain, legend, panels
 from tvist_lab.recordings import Floats
 from tvist_plant.description import load

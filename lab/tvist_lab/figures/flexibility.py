@@ -7,7 +7,7 @@ import pinocchio as pin
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tvist_controller.api import (
+from tvist_controller.api.line import (
     ControlCycle,
     JointLine,
     MotionLimits,
@@ -15,8 +15,8 @@ from tvist_controller.api import (
     choose_filter,
     paper_payload,
     quickest_motion,
-    truth_of,
 )
+from tvist_controller.api.robot import truth_of
 from tvist_lab.figures.style import (
     FAINT,
     INK,

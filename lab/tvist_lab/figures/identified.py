@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvist_controller.api import estimator_of
+from tvist_controller.api.line import estimator_of
 from tvist_lab.figures.style import FAINT, OF_SHAPED, OF_UNSHAPED, explain, legend, panels, title
 from tvist_lab.recordings import Floats
 from tvist_protocol.calibration import Calibration

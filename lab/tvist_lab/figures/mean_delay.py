@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvist_controller.api import (
+from tvist_controller.api.line import (
     JointLine,
     MotionLimits,
     load_calibration,

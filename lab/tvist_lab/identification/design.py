@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import expm
 
-from tvist_controller.api import JointLine, MotionLimits, quickest_motion
+from tvist_controller.api.line import JointLine, MotionLimits, quickest_motion
 from tvist_lab.identification.modal_fit import information
 from tvist_lab.identification.ring_downs import SAMPLES, SKIPPED, Jog, Ringing
 from tvist_lab.identification.unknowns import ArmModes

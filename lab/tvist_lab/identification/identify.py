@@ -9,7 +9,7 @@ import numpy as np
 from tvist_client.arm import Arm
 from tvist_client.errors import ClientError
 from tvist_client.robot import Robot
-from tvist_controller.api import estimator_of
+from tvist_controller.api.line import estimator_of
 from tvist_lab.collect import collect
 from tvist_lab.identification.fit import Fit, check_count, fit_polynomials, spread
 from tvist_lab.identification.ring_downs import Jog, measure

@@ -6,7 +6,7 @@ from importlib.metadata import version
 
 import numpy as np
 
-from tvist_controller.api import paper_payload
+from tvist_controller.api.line import paper_payload
 from tvist_lab.identification.fit import spread
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.modal_fit import (

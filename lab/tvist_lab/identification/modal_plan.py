@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from tvist_controller.api import CollisionModel, body
+from tvist_controller.api.line import CollisionModel, body
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.ring_downs import Jog
 from tvist_lab.recordings import Floats

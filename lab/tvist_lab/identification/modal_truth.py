@@ -6,7 +6,7 @@ import numpy as np
 
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
-from tvist_controller.api import modal_estimator, paper_payload
+from tvist_controller.api.line import modal_estimator, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.fit import spread
 from tvist_lab.identification.modal_calibration import TOLD, ModeErrors

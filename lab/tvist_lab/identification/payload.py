@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
-from tvist_controller.api import CollisionModel, body, paper_payload
+from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.ring_downs import reach

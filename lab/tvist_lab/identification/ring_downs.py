@@ -6,7 +6,7 @@ import numpy as np
 
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
-from tvist_controller.api import MotionLimits
+from tvist_controller.api.line import MotionLimits
 from tvist_lab.collect import collect
 from tvist_lab.metrics import RingDown, fit_ring_down, motions, tool_acceleration
 from tvist_lab.recordings import Floats, RecordingError

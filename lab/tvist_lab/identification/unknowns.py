@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.api import body, drivetrain, mass_matrix
+from tvist_controller.api.line import body, drivetrain, mass_matrix
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import FlexibleModel, flexible_model

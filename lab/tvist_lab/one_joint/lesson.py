@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.api import body, default_calibration, estimator_of, load_calibration, paper_payload
+from tvist_controller.api.line import body, default_calibration, estimator_of, load_calibration, paper_payload
 from tvist_lab.metrics import motions, peak_after_stop
 from tvist_lab.one_joint.closed_form import FlexibleShoulder
 from tvist_lab.one_joint.plucked import pluck

@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from tvist_controller.api import Controller, Host, Setup, Sink, info_of
+from tvist_controller.api.line import Setup
+from tvist_controller.api.robot import Controller, Host, Sink, info_of
 from tvist_lab.programs.start import start
 from tvist_lab.programs.watch import ProgramWatch
 from tvist_protocol.codec import encode

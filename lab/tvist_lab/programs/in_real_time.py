@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Callable, Sequence
 
-from tvist_controller.api import Controller
+from tvist_controller.api.robot import Controller
 from tvist_lab.programs.start import CLIENT, LEASE, start
 from tvist_lab.programs.watch import ProgramWatch
 from tvist_protocol.commands import KeepAlive

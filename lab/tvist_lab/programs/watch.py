@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from tvist_controller.api import Controller, Sink, truth_of
+from tvist_controller.api.robot import Controller, Sink, truth_of
 from tvist_plant.plant import GRAVITY, PERIOD
 from tvist_protocol.stream import Event, State
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.api import PlannedMotion, Setup, paper_payload, plan_from_rest
+from tvist_controller.api.line import PlannedMotion, Setup, paper_payload
+from tvist_controller.api.planning import plan_from_rest
 from tvist_lab.recordings import Floats
 from tvist_lab.studies.random_paths import ToolMove
 from tvist_lab.study.shaping import Running, shape

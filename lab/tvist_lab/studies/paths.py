@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.api import RefusalError, body, elastic_feed_forward, paper_payload
+from tvist_controller.api.line import RefusalError, body, elastic_feed_forward, paper_payload
 from tvist_lab.metrics import in_motion_rms, motions, peak_after_stop
 from tvist_lab.recordings import Floats
 from tvist_lab.runners import Processes, in_order

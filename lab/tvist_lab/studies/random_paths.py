@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tvist_controller.api import CollisionModel, body, paper_payload
+from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.studies.tool_path import jacobian
 from tvist_lab.study.measures import kinematics

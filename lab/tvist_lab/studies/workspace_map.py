@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.api import CollisionModel, ModeSource, body, paper_payload
+from tvist_controller.api.line import CollisionModel, ModeSource, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import identified, ranges, workspace
 from tvist_plant.description import RobotDescription

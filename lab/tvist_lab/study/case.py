@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.api import InverseDynamics, MotionLimits, body, central_differences, paper_payload
+from tvist_controller.api.line import InverseDynamics, MotionLimits, body, central_differences, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.study.arms import AS_DESCRIBED, ArmVariant
 from tvist_lab.study.line import PAPER, ControlLine, point_to_point

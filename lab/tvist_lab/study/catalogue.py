@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from tvist_controller.api import OwnShaper
+from tvist_controller.api.line import OwnShaper
 from tvist_lab.study.foreign import FromFile
 from tvist_lab.study.method import Constant, Held, Longer, Method, Named, PeriodOfJerk, Waiting
 from tvist_lab.study.ranges import longest_mean_delay, robust

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.api import MotionLimits, paper_payload
+from tvist_controller.api.line import MotionLimits, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.study.line import PAPER
 from tvist_lab.study.method import Stepping, Task

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from tvist_controller.api import (
+from tvist_controller.api.line import (
     Driven,
     DrivenLine,
     ElasticFeedForward,

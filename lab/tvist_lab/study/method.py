@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tvist_controller.api import ElasticFeedForward, MotionLimits
+from tvist_controller.api.line import ElasticFeedForward, MotionLimits
 from tvist_lab.recordings import Floats
 from tvist_lab.study.line import PAPER, lengthened, point_to_point
 from tvist_lab.study.moves import Move

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
-from tvist_controller.api import CollisionModel, JointLine, body, paper_payload
+from tvist_controller.api.line import CollisionModel, JointLine, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import WORKSPACE, Region, ranges, workspace
 from tvist_plant.description import RobotDescription

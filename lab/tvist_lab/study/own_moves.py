@@ -3,7 +3,7 @@
 import numpy as np
 from msgspec.structs import replace
 
-from tvist_controller.api import (
+from tvist_controller.api.line import (
     ElasticArm,
     JointLine,
     MotionLimits,

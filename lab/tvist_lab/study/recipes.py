@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tvist_controller.api import (
+from tvist_controller.api.line import (
     ElasticFeedForward,
     ModeSource,
     OwnShaper,

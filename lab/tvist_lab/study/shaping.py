@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from tvist_controller.api import STILL, ElasticFeedForward
+from tvist_controller.api.line import STILL, ElasticFeedForward
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter

@@ -3,7 +3,7 @@
 import numpy as np
 import ruckig
 
-from tvist_controller.api import MotionLimits
+from tvist_controller.api.line import MotionLimits
 from tvist_lab.recordings import Floats
 from tvist_lab.study.line import PAPER
 from tvist_lab.workspace import ranges, workspace

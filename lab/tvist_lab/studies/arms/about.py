@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tvist_controller.api import calibrations, load_calibration
+from tvist_controller.api.line import calibrations, load_calibration
 from tvist_plant.description import RobotDescription
 from tvist_plant.robot_tables import ORIGINS
 from tvist_plant.similar import stretched

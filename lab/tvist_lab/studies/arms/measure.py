@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.api import Setup, body, modal_estimator, paper_payload
+from tvist_controller.api.line import Setup, body, modal_estimator, paper_payload
 from tvist_lab.identification.modal import identify_modal
 from tvist_lab.identification.modal_plan import ModalPlan, free_configurations, jog_of
 from tvist_lab.in_process import robot_in_process

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.api import Controller, Setup
+from tvist_controller.api.line import Setup
+from tvist_controller.api.robot import Controller
 from tvist_lab.programs.start import start
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import Plant

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.api import Controller, Setup
+from tvist_controller.api.line import Setup
+from tvist_controller.api.robot import Controller
 from tvist_lab.in_process import free_setup
 from tvist_lab.recordings import Floats
 from tvist_lab.runners import Processes, in_order

@@ -1,9 +1,8 @@
-"""The controller's public interface for studies, experiments and evaluations.
+"""The control line for studies: the boxes of Figure 6, their parameters, and motions of the joints.
 
-The modules behind it may change; `tvist_lab` imports nothing else of this package.
+The modules behind it may change; what studies lines imports nothing else of this package.
 """
 
-from tvist_controller.about import info_of
 from tvist_controller.ahead import resting_after
 from tvist_controller.calibrations import available as calibrations
 from tvist_controller.calibrations import default_for as default_calibration
@@ -12,33 +11,20 @@ from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.calibrations.modal import drivetrain, mass_matrix, modal_estimator
 from tvist_controller.choices import choose_filter, wanted_modes
 from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.control.differentiator import Target, central_differences
+from tvist_controller.control.differentiator import central_differences
 from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.controller import Controller
 from tvist_controller.cycle import STILL, ControlCycle
 from tvist_controller.elastic_source import elastic_feed_forward
-from tvist_controller.from_rest import plan_from_rest
-from tvist_controller.host import Host
-from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.kinematics.tool import ToolKinematics, turned
-from tvist_controller.loopback import LoopbackHost
 from tvist_controller.mode_source import ModeSource
 from tvist_controller.own_shapers import OwnShaper, RecordedShaper
-from tvist_controller.paths.poses import placement_vector
 from tvist_controller.planning.keeping import keeping_motion
-from tvist_controller.presence import Presence
-from tvist_controller.programs.compiling import ScriptCompiler
-from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.quiet.elastic_arm import ElasticArm
 from tvist_controller.quiet.interior_point import Programme, inside, optimize
 from tvist_controller.quiet.quiet_motion import quiet_motion
 from tvist_controller.refusal import RefusalError
-from tvist_controller.report import Report
-from tvist_controller.reporting import truth_of
 from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import Setup, body, paper_payload
-from tvist_controller.sink import Sink
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Trajectory, quickest_motion
 from tvist_controller.whole_motion import Driven, DrivenLine, respond
 
@@ -48,31 +34,20 @@ __all__ = [
     "TORQUE_SHARE",
     "CollisionModel",
     "ControlCycle",
-    "Controller",
     "Driven",
     "DrivenLine",
     "ElasticArm",
     "ElasticFeedForward",
-    "Host",
-    "Instruments",
     "InverseDynamics",
     "JointLine",
-    "LoopbackHost",
     "ModeSource",
     "MotionLimits",
     "OwnShaper",
     "PlannedMotion",
-    "Presence",
     "Programme",
     "RecordedShaper",
     "RefusalError",
-    "Report",
-    "ScriptCompiler",
     "Setup",
-    "Sink",
-    "SocketNews",
-    "Target",
-    "ToolKinematics",
     "Trajectory",
     "body",
     "calibrations",
@@ -82,7 +57,6 @@ __all__ = [
     "drivetrain",
     "elastic_feed_forward",
     "estimator_of",
-    "info_of",
     "inside",
     "keeping_motion",
     "load_calibration",
@@ -90,13 +64,9 @@ __all__ = [
     "modal_estimator",
     "optimize",
     "paper_payload",
-    "placement_vector",
-    "plan_from_rest",
     "quickest_motion",
     "quiet_motion",
     "respond",
     "resting_after",
-    "truth_of",
-    "turned",
     "wanted_modes",
 ]

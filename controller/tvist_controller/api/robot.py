@@ -1,0 +1,26 @@
+"""A whole controller for studies, with its programs, instruments and clients.
+
+The modules behind it may change.
+"""
+
+from tvist_controller.about import info_of
+from tvist_controller.controller import Controller
+from tvist_controller.host import Host
+from tvist_controller.loopback import LoopbackHost
+from tvist_controller.presence import Presence
+from tvist_controller.programs.compiling import ScriptCompiler
+from tvist_controller.programs.socket_traffic import SocketNews
+from tvist_controller.reporting import truth_of
+from tvist_controller.sink import Sink
+
+__all__ = [
+    "Controller",
+    "Host",
+    "LoopbackHost",
+    "Presence",
+    "ScriptCompiler",
+    "Sink",
+    "SocketNews",
+    "info_of",
+    "truth_of",
+]
