@@ -42,18 +42,6 @@ def test_a_client_of_which_no_session_is_known_is_not_missed(session):
     assert not session.client_gone("a", "")
 
 
-def test_renewal_keeps_watching(session):
-    session.renew(session.take("a", 30.0, 0.0, "").token, 1.0)
-    assert session.client_gone("a", "")
-
-
-def test_control_that_was_handed_over_is_not_the_giver_s_any_more(session):
-    session.take("a", 30.0, 0.0, "1f")
-    session.hand_over("b", 1.0)
-    assert not session.client_gone("a", "1f")
-    assert (session.lease.client, session.lease.session) == ("b", None)
-
-
 def test_a_token_of_before_a_restart_is_never_valid_again():
     before, after = (Session(timeouts=True, instance=instance) for instance in ("1f", "2e"))
     old = before.take("a", 30.0, 0.0).token

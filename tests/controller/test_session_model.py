@@ -21,38 +21,22 @@ from tests.examples import share
 from tvist_controller.controller import Controller
 from tvist_controller.streaming import TIMEOUT
 from tvist_protocol import commands as c
-from tvist_protocol import motions as m
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
 from tvist_protocol.transitions import Activity, after
 
 from .robots import Q1, setup
+from .test_modes import COMMANDS, STOPS
 
 CLIENTS = st.sampled_from(["anna", "bert"])
 SESSION = "1f"
 LEASES = st.sampled_from([0.1, 0.4, 30.0, 30.0])
 TOKENS = st.sampled_from(["own", "own", "own", "own", "own", "old", "none of ours"])
 """Whose token a command carries."""
-MOTION = {
-    "power_on": c.PowerOn,
-    "power_off": c.PowerOff,
-    "unlock_protective_stop": c.UnlockProtectiveStop,
-    "move_j": c.MoveJ,
-    "servo_start": c.ServoStart,
-    "servo_stop": c.ServoStop,
-    "pause": c.Pause,
-    "resume": c.Resume,
-    "stop": c.Stop,
-    "servo_j": m.ServoJ,
-    "speed_j": m.SpeedJ,
-    "speed_l": m.SpeedL,
-    "stop_j": m.StopJ,
-    "stop_l": m.StopL,
-}
+MOTION = {name: kind for name, (kind, _) in COMMANDS.items()}
 NUMBERED = {"move_j", "servo_j", "speed_j", "speed_l"}
 """Commands that are answered by the number of a motion."""
-STOPS = {"stop", "stop_j", "stop_l"}
 PUT = {"RUNNING": Activity.REST, "IDLE": Activity.IDLE, "POWER_OFF": Activity.POWER_OFF}
 ENDS = {"motion_done", "motion_stopped"}
 

@@ -11,6 +11,7 @@ from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.session import Lease
+from tvist_controller.sink import Sink
 from tvist_controller.stepping import ClockHold
 from tvist_lab.in_process import free_setup
 from tvist_protocol import commands as c
@@ -26,13 +27,6 @@ LEASE = Lease("anna", "anna#1", 30.0, 30.0, None)
 HOLD = ClockHold("bert", "bert#clock1", None)
 Q2 = UR5E.poses["Q2"]
 LONG = tuple(StepSetpoint(sequence=n, q=(3.0,) * 6) for n in range(1000))
-
-
-class Sink:
-    """Takes what a host puts out."""
-
-    def __getattr__(self, _):
-        return lambda *_: None
 
 
 class Network:

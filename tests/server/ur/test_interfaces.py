@@ -12,7 +12,6 @@ from tests.controller.robots import UR5E
 
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
-from tvist_protocol.commands import TakeControl
 from tvist_protocol.simulation import SimulationInject
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.ur.interfaces import UrInterfaces
@@ -64,16 +63,6 @@ async def test_a_client_that_stops_reading_loses_samples_and_nobody_else_does(de
     assert dropped[0] == 0
     # What the system holds of packages of 1220 bytes, on both sides, and one that waits.
     assert dropped[1] > 0
-
-
-async def test_a_door_declines_in_its_own_way_where_somebody_else_has_control(desk):
-    desk.host.request(encode(TakeControl(client="anna")))
-    reader, writer = await connect_and_greet(desk)
-    answers = await lines(reader, writer, "is in remote control", "power off", "robotmode")
-    assert answers[0] == "false"
-    assert answers[1].startswith("Failed to execute: power off")
-    assert answers[2] == "Robotmode: RUNNING"
-    assert desk.holder() == "anna"
 
 
 async def test_a_fault_of_ours_ends_one_connection_and_no_other(desk, monkeypatch, caplog):
