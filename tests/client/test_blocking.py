@@ -3,7 +3,6 @@
 import asyncio
 import inspect
 import threading
-from contextlib import AbstractContextManager
 
 import pytest
 
@@ -150,7 +149,3 @@ def test_it_may_be_used_beside_a_running_loop(fake):
             return robot.info().model
 
     assert asyncio.run(main()) == "UR5e"
-
-
-def test_control_is_a_context_manager(robot):
-    assert isinstance(robot.control("me"), AbstractContextManager)

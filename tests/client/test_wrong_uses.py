@@ -157,34 +157,11 @@ async def test_a_stream_that_was_left_takes_nothing_more(robot):
             servo.set(Q1)
 
 
-async def test_without_control_and_with_another_s_there_is_none(robot):
-    with pytest.raises(MisuseError, match=r"robot\.control"):
-        await robot.advance(1)
-    async with robot.control("me") as arm:
-        with pytest.raises(RefusedError, match="'me'"):
-            async with robot.control("you"):
-                pass
-    with pytest.raises(RefusedError, match=r"stale_token|no_control"):
-        await arm.move_j(Q1)
-
-
 @pytest.mark.parametrize("name", ["", "a/b", "x" * 65, "ä", None, 3])
 async def test_a_client_s_name_that_is_none_says_what_one_is(robot, name):
     with pytest.raises(ProtocolError, match="printable ASCII"):
         async with robot.control(name):
             pass
-
-
-async def test_a_closed_robot_answers_nothing_and_keeps_nobody_waiting(host):
-    async with Robot.over(LoopbackTransport(host)) as robot:
-        await robot.state()
-        stream = robot.states()
-    for call in (robot.state, robot.io, robot.info, robot.stop):
-        with pytest.raises(NotConnectedError, match="closed"):
-            await call()
-    with pytest.raises(NotConnectedError, match="closed"):
-        robot.states()
-    assert [state async for state in stream] == []
 
 
 @pytest.mark.parametrize(
@@ -212,14 +189,6 @@ def test_what_is_no_robot_s_name_is_told_what_one_is(name):
 def test_a_payload_that_is_none_says_so(arguments, said):
     with pytest.raises(ArgumentError, match=said):
         make_payload(*arguments)
-
-
-async def test_a_motion_can_be_awaited(robot):
-    async with robot.control("me") as arm:
-        motion = await arm.move_j((0.1, *Q1[1:]), wait=False)
-        assert not motion.ended
-        assert await motion is motion
-        assert motion.done is not None
 
 
 class TestBlocking:
@@ -251,8 +220,3 @@ class TestBlocking:
             robot.advance(1)
         assert isinstance(raised[0], MisuseError)
         assert "callback" in str(raised[0])
-
-    def test_a_closed_robot_says_so(self, robot):
-        robot.close()
-        with pytest.raises(NotConnectedError, match="closed"):
-            robot.state()

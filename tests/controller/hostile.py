@@ -1,11 +1,5 @@
-"""Hostile programs from seeds: every dear function in loops, threads and secondary programs, at edges of arguments.
+"""Hostile programs from seeds: every dear function in loops, threads and secondary programs, at edges of arguments."""
 
-`python -m tests.controller.hostile FIRST LAST` measures them: p99 of a tick's processor time with a program over the
-median of an idle robot's ticks, which alternate with it. That is no test, since tests assert counts.
-"""
-
-import sys
-import time
 from random import Random
 
 import numpy as np
@@ -16,7 +10,6 @@ from tvist_protocol.programs import ProgramRun
 from .robots import UR5E
 from .scripts import URSIM, a_robot
 
-TICKS = 1500
 STARTS = (
     *(UR5E.poses[name] for name in ("Q1", "Q2", "Q3")),
     (0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0),
@@ -156,43 +149,3 @@ def begin(seed: int):
         reply = robot.send(ProgramRun, text=one)
         assert not hasattr(reply, "why"), f"{reply}\n{one}"
     return robot, beside, texts
-
-
-def run(seed: int, ticks: int) -> tuple[list[float], list[float]]:
-    """Return the processor times of a hostile robot's ticks and of an idle one's, in turn [s]."""
-    robot, beside, texts = begin(seed)
-    idle = a_robot().controller
-    took: tuple[list[float], list[float]] = [], []
-    for tick in range(ticks):
-        if not robot.controller.programs._all:
-            for one in texts:
-                robot.send(ProgramRun, text=one)
-            if tick > ticks // 3:
-                break
-        for place, controller in enumerate((robot.controller, idle)):
-            began = time.thread_time()
-            controller.begin_tick()
-            controller.complete_tick()
-            took[place].append(time.thread_time() - began)
-        beside.work()
-    return took
-
-
-def measure(seed: int, ticks: int = TICKS, runs: int = 3) -> tuple[float, float, float, int]:
-    """Return median, p99 and maximum of a tick over an idle robot's median, and the ticks that a program ran.
-
-    Equal runs compute the same, so the least time of each tick in some of them is its own, without what else the
-    machine does.
-    """
-    took = [run(seed, ticks) for _ in range(runs)]
-    hostile = np.min([one for one, _ in took], axis=0)[10:]
-    still = float(np.median(np.min([one for _, one in took], axis=0)))
-    found = np.median(hostile), np.percentile(hostile, 99), hostile.max()
-    return (*(float(of) / still for of in found), len(hostile))
-
-
-if __name__ == "__main__":
-    first, last = map(int, sys.argv[1:3])
-    for seed in range(first, last):
-        found = measure(seed, *map(int, sys.argv[3:5]))
-        print(seed, *(f"{value:.1f}" for value in found), flush=True)  # noqa: T201

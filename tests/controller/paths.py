@@ -3,15 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-from proof.search.subject import Subject
+from proof.search.subject import Subject, torques
 
-from tvist_controller.setup import paper_payload
+from tvist_controller.collision import CLEARANCE, CollisionModel
+from tvist_controller.safety import TORQUE_SHARE
+from tvist_controller.setup import body, paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetTcp
 from tvist_protocol.motions import MovePath
-from tvist_protocol.replies import Accepted
+from tvist_protocol.replies import Accepted, Done
 
-from .robots import UR5E
+from .robots import UR5E, H
 from .spaces import TOOL, Leg, random_path, start_posture
 
 
@@ -50,6 +52,23 @@ def journey(seed, shapers) -> Journey:
             return found
 
 
+def interfere(robot: Subject, random, longest: int, shapers) -> None:
+    """Move the slider, pause, resume and change the filter at random, and let the motion go on in the end."""
+    for _ in range(12):
+        robot.tick(int(random.integers(1, longest)))
+        match int(random.integers(4)):
+            case 0:
+                robot.send(c.SetSpeed, fraction=float(random.uniform(0.05, 1.0)))
+            case 1:
+                robot.send(c.Pause)
+            case 2:
+                robot.send(c.Resume)
+            case _:
+                assert robot.send(c.SetShaper, name=str(random.choice(shapers))) == Done()
+    robot.send(c.Resume)
+    robot.send(c.SetSpeed, fraction=1.0)
+
+
 class Progress:
     """Length that the shaped reference has covered of the robot's path, tick by tick.
 
@@ -79,3 +98,14 @@ class Progress:
         while not self.robot.resting:
             self.tick()
             assert len(self.covered) < most, "the motion does not end"
+
+
+def keeps_limits(q, free, payload, case):
+    """Torque, acceleration and clearance after a stop, in comparison with the motion that was left alone."""
+    most = TORQUE_SHARE * np.array(UR5E.limits.torque)
+    asked, taken = (np.abs(torques(UR5E, payload, each)).max(axis=0) for each in (free, q))
+    assert (taken / np.maximum(most, asked)).max() <= 1.001, case
+    present = np.abs(np.diff(free, 2, axis=0)).max() / H**2
+    hardest = np.abs(np.diff(q, 2, axis=0)).max() / H**2
+    assert hardest <= max(1.01 * min(UR5E.limits.acceleration), present), case
+    assert CollisionModel(UR5E, body(payload)).nearest(q) >= CLEARANCE, case

@@ -7,6 +7,7 @@ from tvist_controller.controller import Controller
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.outlook import Outlook
 from tvist_controller.setup import Setup, body, paper_payload
+from tvist_controller.sink import Sink
 from tvist_controller.trajectory import MotionLimits
 from tvist_plant.description import RobotDescription, load
 from tvist_plant.plant import PERIOD, Measurement, Plant
@@ -127,6 +128,14 @@ def without_arm(*arguments, **named) -> ControlCycle:
 def setup(description: RobotDescription = UR5E, **changes) -> Setup:
     start = {"q": description.poses["Q1"], "payload": paper_payload(description), "calibration": None}
     return Setup(description=description, **({"clock": "free"} | start | changes))
+
+
+class Kept(Sink):
+    """Keeps what a robot said, and what a replay needs."""
+
+    def __init__(self) -> None:
+        self.events, self.entries, self.states = [], [], []
+        self.event, self.journal, self.state = self.events.append, self.entries.append, self.states.append
 
 
 class Robot:

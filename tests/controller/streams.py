@@ -4,7 +4,7 @@ import numpy as np
 
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 
-from .robots import H
+from .robots import PAPER, H
 
 
 def network(motion, period, seconds, *, seed=0, jitter=0.0, loss=0.0, twice=0.0, clock=0.0, burst=1):
@@ -48,6 +48,15 @@ def peaks(out, limits):
     """Largest first, second and third difference as shares of their limits, shape (3,)."""
     orders = enumerate((limits.velocity, limits.acceleration, limits.jerk), 1)
     return np.array([np.abs(np.diff(out, order, axis=0)).max() / H**order / limit for order, limit in orders])
+
+
+def assert_within(out, limits=PAPER):
+    """Acceleration and jerk to rounding, velocity to a tick of acceleration."""
+    velocity, acceleration, jerk = peaks(out, limits)
+    assert np.isfinite(out).all()
+    assert velocity <= 1.0 + limits.acceleration * H / limits.velocity
+    assert acceleration <= 1.0 + 1e-5
+    assert jerk <= 1.0 + 1e-4
 
 
 def there_and_back(limits: MotionLimits, way=(1.4, -1.0, 0.8, -0.5, 0.3, 2.0), dwell=0.3):

@@ -334,16 +334,3 @@ def test_changes_are_done_in_motion_and_the_same_every_time(begin):
     assert [msgspec.json.encode(state) for state in one.states] == [
         msgspec.json.encode(state) for state in other.states
     ]
-
-
-def test_a_change_in_motion_that_is_refused_changes_nothing():
-    robots = [Robot(calibration=calibration()) for _ in range(2)]
-    for robot in robots:
-        moving(robot)
-    assert robots[0].send(c.SetShaper, name="zvdddd").code == "unknown_shaper"
-    assert robots[0].send(c.SetEstimator, name="fixed", f_d=(0.2,), zeta=(0.2,)).code == "out_of_range"
-    assert robots[0].send(c.SetPayload, mass=6.0, com=DISC.com, inertia=DISC.inertia).code == "out_of_range"
-    for robot in robots:
-        robot.tick(300)
-    for one, other in zip(*(robot.states for robot in robots), strict=True):
-        assert msgspec.json.encode(one) == msgspec.json.encode(other)

@@ -226,26 +226,6 @@ def test_an_arm_in_a_meeting_may_be_put_at_rest_again_and_move_out_of_it_and_not
     assert robot.controller.motion.collisions.meeting(robot.controller.cycle.position) is None
 
 
-def test_a_stream_that_would_collide_is_stopped_before_it_does():
-    robot = Robot()
-    start = np.array([0.0, -1.0, 0.0, -1.57, 0.0, 0.0])
-    robot.send(SimulationReset, q=tuple(start))
-    assert robot.send(c.ServoStart) == Done()
-    q = start.copy()
-    for sequence in range(2000):
-        q[1] += min(0.002 * 0.004 * sequence, 0.002 * 1.2)
-        if not robot.controller.motion.streaming:
-            break
-        robot.setpoint(sequence, tuple(q))
-        robot.tick()
-    robot.until_rest()
-    ended = [event for event in robot.events if event.kind == "stream_stopped"]
-    assert [event.code for event in ended] == ["collision"]
-    # The stop begins a tick after it is known to be needed: of the clearance that tick's way is lost.
-    for state in robot.states[-200:]:
-        assert nearest(np.array(state.target_q)) > 0.0
-
-
 def test_a_robot_file_without_bodies_never_meets_anything():
     import msgspec
 

@@ -2,35 +2,35 @@
 
 import numpy as np
 import pytest
-from proof.search import draws, sequences
 from proof.search.draws import SHAPERS
-from proof.search.sequences import Sequence
 from proof.search.stops import KINDS, PAUSES
-from proof.search.subject import Subject, torques
+from proof.search.subject import Subject
 
 from tvist_controller.ahead import resting_after
 from tvist_controller.collision import CollisionModel
 from tvist_controller.refusal import RefusalError
-from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
 from tvist_protocol import values
-from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationInject
 
-from .curved import DISC, EXCESS, ON, curve_of, moving, played, random_limits, start
-from .curves import Arc, progress, random_arc
+from .curved import DISC, ON, curve_of, moving, played, random_limits, start
+from .curves import Arc, progress
+from .paths import keeps_limits
 from .robots import PAPER, UR5E, H
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize(
+    "seed", [*range(12), *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(12, 220))]
+)
 def test_every_kind_of_stop_stays_on_the_curve_behind_the_motion_and_rests_no_later(seed):
     random, curve = np.random.default_rng([seed, 5]), curve_of(seed)
-    limits, shaper = random_limits(random), str(random.choice(SHAPERS))
+    limits, shaper = random_limits(random), SHAPERS[seed % len(SHAPERS)]
     speed = float(random.choice([1.0, 1.0, random.uniform(0.1, 1.0)]))
-    kind = str(random.choice(list(KINDS)))
+    kind = list(KINDS)[seed % len(KINDS)]
     alone = played(moving(curve, shaper, limits, speed))
     moment = int(random.integers(1, max(resting_after(alone), 2)))
     robot = moving(curve, shaper, limits, speed)
@@ -44,13 +44,8 @@ def test_every_kind_of_stop_stays_on_the_curve_behind_the_motion_and_rests_no_la
     assert off < ON, case
     assert (shares - free_shares)[moment:].max() <= ON, case
     assert resting_after(stopped) <= resting_after(alone), case
-    most = TORQUE_SHARE * np.array(UR5E.limits.torque)
-    asked, taken = (np.abs(torques(UR5E, DISC, q[moment - 1 :])).max(axis=0) for q in (alone, stopped))
-    assert (taken / np.maximum(most, asked)).max() <= 1.001, case
-    # A stop keeps the limits of the joints; whoever paused goes on within those of the motion.
-    hardest = np.abs(np.diff(stopped[moment - 2 :], 2, axis=0)).max() / H**2
-    present = np.abs(np.diff(alone, 2, axis=0)).max() / H**2
-    assert hardest <= max(EXCESS * min(UR5E.limits.acceleration), present), case
+    since = max(moment - 2, 0)
+    keeps_limits(stopped[since:], alone[since:], DISC, case)
     if kind not in PAUSES:
         event = next(event for event in robot.events if event.kind == "motion_stopped")
         if event.duration is not None:
@@ -60,7 +55,7 @@ def test_every_kind_of_stop_stays_on_the_curve_behind_the_motion_and_rests_no_la
 
 def test_stops_of_curves_are_stops_and_not_only_the_motion_let_run_out():
     sooner = []
-    for seed in range(1, 12):
+    for seed in range(1, 7):
         curve = curve_of(seed)
         alone = resting_after(played(moving(curve, "zv", PAPER)))
         robot = moving(curve, "zv", PAPER)
@@ -88,50 +83,6 @@ def test_a_stop_keeps_every_joint_within_the_deceleration_that_it_tells(wanted):
         hardest.append(np.abs(np.diff(q, 2, axis=0)).max() / H**2 / plan.acceleration)
     assert max(hardest) <= 1.0 + 1e-6
     assert max(hardest) > 0.6
-
-
-class OnCurves(Sequence):
-    """Random commands as ever, of which every second move goes along a curve."""
-
-    curve = None
-
-    def move(self):
-        motion = self.robot.controller.basis.motion
-        if motion is None or self._random.random() < 0.5:
-            reply = super().move()
-            self.curve = None if isinstance(reply, Accepted) else self.curve
-            return reply
-        for _ in range(20):
-            curve = random_arc(self._random, motion.q)
-            if (np.abs(curve.posture(curve.end)) < np.array(UR5E.limits.position)).all():
-                break
-        try:
-            start(self.robot, curve, MotionLimits(**draws.limits(UR5E, self._random)))
-        except RefusalError as refusal:
-            return refusal.reply
-        self.curve = curve
-        return None
-
-    def _watch_way(self, ahead, q):
-        if self.curve is None:
-            super()._watch_way(ahead, q)
-            return
-        tick = self.robot.controller.tick_number - ahead.since
-        there = ahead.references[min(tick, len(ahead.references) - 1)]
-        (reached, bound), off = progress(self.curve, np.array([q, there]))
-        creeps = 1e-6 if tick >= len(ahead.references) else 0.0
-        if off > ON:
-            raise self._broken("a stop leaves the curve")
-        if reached > bound + ON + creeps:
-            raise self._broken("a stop is ahead of what the motion along a curve would have done")
-        if tick > len(ahead.references) + 1 and not self.robot.resting:
-            raise self._broken("a stop lasts longer than the motion along a curve would have")
-
-
-@pytest.mark.parametrize("number", range(6))
-def test_whatever_is_sent_the_promises_hold_on_curves(number, monkeypatch):
-    monkeypatch.setitem(sequences.SENT, "move", (14.0, OnCurves.move))
-    OnCurves(UR5E, number).run()
 
 
 def over_the_floor():

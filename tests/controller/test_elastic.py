@@ -157,8 +157,7 @@ def test_a_rough_lead_is_followed_with_limited_acceleration_and_caught_up(seed, 
 # ------------------------------------------------------------------ what it is for
 
 
-@pytest.mark.parametrize("mass", [0.0, 5.0])
-@pytest.mark.parametrize(("start", "target"), [(Q1, Q3), (Q3, Q2)])
+@pytest.mark.parametrize(("mass", "start", "target"), [(0.0, Q1, Q3), (5.0, Q3, Q2)])
 def test_the_arm_rests_a_hundred_milliseconds_earlier_than_it_would_and_nearly_still(mass, start, target):
     clean = UR5E.clean()
     left = {
@@ -203,15 +202,6 @@ def test_the_flange_accelerates_as_a_rigid_arms_would():
         away = flange - rigid[: len(flange)]
         wrong[name] = np.sqrt((np.diff(away, 2, axis=0) ** 2).sum(axis=1).mean()) / H**2
     assert wrong["elastic"] < 0.25 * wrong["none"]
-
-
-def test_it_needs_no_target_and_keeps_the_limits_to_the_last_digit():
-    robot = Robot(calibration=calibration(), shaper="elastic")
-    robot.send(c.MoveJ, q=tuple(Q3))
-    robot.until_rest()
-    q = robot.column("target_q")
-    assert np.abs(np.diff(q, 2, axis=0)).max() / H**2 <= PAPER.acceleration * (1.0 + 1e-8)
-    assert np.abs(np.diff(q, axis=0)).max() / H <= PAPER.velocity * (1.0 + 1e-9)
 
 
 # ------------------------------------------------------------------ choosing it
@@ -283,19 +273,12 @@ def act(robot, name, random):
         robot.send(c.SetShaper, name=name)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_position_and_velocity_of_the_motors_stay_continuous_through_whatever_happens(seed):
     random = np.random.default_rng(seed)
     robot = Robot(calibration=calibration(), shaper="elastic", q=tuple(Q3))
-    cycle, commands = robot.controller.cycle, []
-    step = cycle.plant.step
-
-    def watched(command):
-        commands.append(command)
-        return step(command)
-
-    cycle.plant.step = watched
+    commands = watched_commands(robot)
     act(robot, "move", random)
     for _ in range(12):
         robot.tick(int(random.integers(2, 200)))
@@ -311,9 +294,8 @@ def test_position_and_velocity_of_the_motors_stay_continuous_through_whatever_ha
     assert (np.abs(torque) <= LIMIT).all()
 
 
-@pytest.mark.parametrize("ticks", [1, 4])
+@pytest.mark.parametrize(("ticks", "jitter"), [(1, False), (4, False), (4, True)])
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("jitter", [False, True])
 def test_rounded_setpoints_make_little_torque_ripple(name, ticks, jitter):
     """Set-points at 500 and 125 Hz, rounded to 1e-5 rad, some a tick late: at most 5 % of the rating."""
     random, torques = np.random.default_rng(5), []
@@ -323,7 +305,7 @@ def test_rounded_setpoints_make_little_torque_ripple(name, ticks, jitter):
         motion = quickest_motion(JointLine(Q3, Q3 + 0.4), PAPER, H)
         stream, found = cycle.stream(ticks * H, limits), []
         q = [motion.next() for _ in range(round(motion.duration / H))]
-        late = random.integers(0, 2, len(q)) if jitter and ticks > 1 else np.zeros(len(q), int)
+        late = random.integers(0, 2, len(q)) if jitter else np.zeros(len(q), int)
         due = {}
         for number, value in enumerate(q[::ticks]):
             sent = np.round(value / rounding) * rounding if rounding else value

@@ -128,9 +128,20 @@ def test_a_ramp_is_followed_with_a_lag_of_lookahead_and_two_ticks(lookahead, gai
     assert lag == pytest.approx(lookahead + 2 * H, abs=1e-4)  # 34 ms at 0.03, as measured on a UR10e
 
 
-@pytest.mark.parametrize("lookahead", [0.03, 0.1, 0.2])
-@pytest.mark.parametrize("gain", [100.0, 300.0, 2000.0])
-@pytest.mark.parametrize("way", [1e-3, 0.03, 0.5])
+@pytest.mark.parametrize(
+    ("lookahead", "gain", "way"),
+    [
+        (0.03, 100.0, 1e-3),
+        (0.03, 300.0, 0.03),
+        (0.03, 2000.0, 0.5),
+        (0.1, 100.0, 0.03),
+        (0.1, 300.0, 0.5),
+        (0.1, 2000.0, 1e-3),
+        (0.2, 100.0, 0.5),
+        (0.2, 300.0, 1e-3),
+        (0.2, 2000.0, 0.03),
+    ],
+)
 def test_a_posture_is_reached_exactly_and_hardly_overshot(lookahead, gain, way):
     arm = robot()
     arm.send(m.ServoJ, q=(HOME[0] + way, *HOME[1:]), lookahead=lookahead, gain=gain)
@@ -437,17 +448,3 @@ def test_a_stop_during_a_stop_is_not_gentler(kind):
         arm.until_rest()
         ticks.append(len(arm.states))
     assert ticks[0] == ticks[1]
-
-
-def test_equal_commands_at_equal_ticks_are_equal_to_the_last_bit():
-    runs = []
-    for _ in range(2):
-        arm = robot()
-        arm.send(m.SpeedL, xd=(0.2, 0.1, 0.0, 0.1, 0.0, 0.0))
-        arm.tick(120)
-        arm.send(m.ServoJ, q=BESIDE)
-        arm.tick(70)
-        arm.send(m.SpeedJ, qd=(0.0, 0.1, 0.0, 0.0, 0.0, 0.0))
-        arm.tick(50)
-        runs.append(arm.column("target_q"))
-    assert np.array_equal(*runs)

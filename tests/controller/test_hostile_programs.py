@@ -237,7 +237,7 @@ def written(robot, *, all_places):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", range(80))
+@pytest.mark.parametrize("seed", range(40))
 def test_what_has_ended_or_stopped_does_nothing_any_more(seed):
     """Not even in the same tick: after a stop no output, register or message changes, and no motion begins.
 

@@ -40,7 +40,7 @@ def test_forward_of_inverse_is_the_pose_and_the_nearest_posture_is_returned(meas
     rng, ik, worst = np.random.default_rng(1), InverseKinematics(UR5E), 0.0
     limit = UR5E.limits.position
     assert ik.closed_form
-    for _ in range(share(10_000)):
+    for _ in range(share(3_000)):
         q, near = rng.uniform(-2 * np.pi, 2 * np.pi, (2, 6))
         pose = pose_of(UR5E, q)
         found = ik.solve(*pose, near)
@@ -48,14 +48,13 @@ def test_forward_of_inverse_is_the_pose_and_the_nearest_posture_is_returned(meas
         assert np.all(np.abs(found) <= limit)
         assert np.linalg.norm(found - near) == pytest.approx(nearest(ik.all(*pose), near, limit), abs=1e-7)
         np.testing.assert_allclose(ik.solve(*pose, q), q, rtol=0, atol=1e-6)
-    measured("largest error of 10,000 poses [m, rad]", worst)
+    measured("largest error of 3,000 poses [m, rad]", worst)
     assert worst <= 1e-12
 
 
-@pytest.mark.parametrize("number", [200, 2000])
-def test_no_posture_is_missed(number):
+def test_no_posture_is_missed():
     rng, ik = np.random.default_rng(2), InverseKinematics(UR5E)
-    for _ in range(number):
+    for _ in range(500):
         pose = pose_of(UR5E, rng.uniform(-np.pi, np.pi, 6))
         assert not list(missed(UR5E, ik, pose, rng))
 

@@ -114,13 +114,6 @@ def test_a_payload_that_would_meet_the_floor_on_the_rest_of_the_way_is_refused_a
     assert robot.send(c.SetPayload, mass=3.0, com=(0.0, 0.0, 0.05), inertia=moment) == Done()
 
 
-def test_at_rest_any_payload_may_be_declared():
-    robot = Robot()
-    robot.send(SimulationReset, q=(0.0, -0.3, 0.0, -1.57, 0.0, 0.0))
-    moment = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
-    assert robot.send(c.SetPayload, mass=3.0, com=(0.3, 0.0, 0.3), inertia=moment) == Done()
-
-
 @pytest.mark.parametrize("shaper", ["none", "zv", "ei3"])
 def test_a_stream_whose_end_through_the_filter_would_meet_is_stopped_instead(shaper):
     """With its own low acceleration the stream would come to rest in the floor; a hard stop does not."""

@@ -73,22 +73,21 @@ def at(activity: Activity) -> Robot:
 
 
 @pytest.mark.parametrize("activity", Activity)
-@pytest.mark.parametrize("command", COMMANDS)
-def test_a_command_leads_where_the_table_says_or_is_refused(command, activity):
-    robot, target = at(activity), after(activity, command)
-    kind, fields = COMMANDS[command]
-    reply = robot.send(kind, **fields)
-    if target is not None:
-        assert isinstance(reply, Accepted | Done), reply
-        assert robot.controller.motion.activity is target
-    elif command in STOPS:
-        assert reply == Done()
-        assert robot.controller.motion.activity is activity
-    else:
-        assert isinstance(reply, Refused)
-        assert reply.code in {"busy", "wrong_mode"}
-        assert (reply.code == "busy") <= activity.moving
-        assert robot.controller.motion.activity is activity
+def test_a_command_leads_where_the_table_says_or_is_refused(activity):
+    refusing = at(activity)
+    for command, (kind, fields) in COMMANDS.items():
+        target = after(activity, command)
+        robot = refusing if target is None else at(activity)
+        reply = robot.send(kind, **fields)
+        assert robot.controller.motion.activity is (target or activity), command
+        if target is not None:
+            assert isinstance(reply, Accepted | Done), reply
+        elif command in STOPS:
+            assert reply == Done()
+        else:
+            assert isinstance(reply, Refused), command
+            assert reply.code in {"busy", "wrong_mode"}
+            assert (reply.code == "busy") <= activity.moving
 
 
 @pytest.mark.parametrize("activity", [activity for activity in Activity if activity.moving])
@@ -114,20 +113,6 @@ def test_the_state_says_the_modes_of_what_it_does(activity):
     assert state.safety_mode == activity.safety_mode(reduced=False)
     resting = not activity.moving
     assert (state.runtime_state == RuntimeState.STOPPED) == resting
-
-
-@pytest.mark.parametrize("activity", Activity)
-@pytest.mark.parametrize("mode", ["RUNNING", "IDLE", "POWER_OFF", None])
-def test_a_reset_puts_it_into_any_mode_from_everywhere(activity, mode):
-    robot = at(activity)
-    assert isinstance(robot.send(SimulationReset, mode=mode, q=Q2_), Done)
-    state = robot.tick(2)
-    named = {"RUNNING": RobotMode.RUNNING, "IDLE": RobotMode.IDLE, "POWER_OFF": RobotMode.POWER_OFF}
-    assert state.robot_mode == (activity.robot_mode if mode is None else named[mode])
-    protected = mode is None and activity.safety_mode(reduced=False) is SafetyMode.PROTECTIVE_STOP
-    assert state.safety_mode == (SafetyMode.PROTECTIVE_STOP if protected else SafetyMode.NORMAL)
-    assert state.target_q == list(Q2_)
-    assert np.ptp(robot.column("target_q")[-2:], axis=0).max() == 0.0
 
 
 @pytest.mark.parametrize("mode", ["IDLE", "POWER_OFF"])

@@ -84,19 +84,6 @@ def test_a_pause_brings_the_arm_to_rest_on_its_way_and_resume_takes_it_to_the_ta
     assert np.abs(robot.column("target_qdd")).max() <= 2.1
 
 
-def test_there_is_nothing_to_pause_at_rest_and_nothing_to_resume_in_motion():
-    robot = Robot()
-    assert robot.send(c.Pause).code == "wrong_mode"
-    assert robot.send(c.Resume).code == "wrong_mode"
-    robot.send(c.MoveJ, q=tuple(Q3))
-    robot.tick(10)
-    assert robot.send(c.Resume).code == "wrong_mode"
-    robot.send(c.Stop)
-    robot.until_rest()
-    robot.send(c.ServoStart)
-    assert robot.send(c.Pause).code == "wrong_mode"
-
-
 def test_a_stop_ends_a_paused_motion_and_the_next_one_is_not_paused():
     robot = Robot()
     robot.send(c.MoveJ, q=tuple(Q3))
@@ -116,18 +103,3 @@ def test_slow_limits_do_not_make_the_pause_impossible():
     assert rates[5900] == 0.0
     assert np.array_equal(q[-1], Q3)
     assert accelerations(q) <= 0.05 * 1.01
-
-
-def test_control_handed_over_is_the_other_clients_without_a_gap():
-    robot = Robot()
-    robot.send(c.MoveJ, q=tuple(Q3))
-    robot.tick(10)
-    assert robot.send(c.HandOver, client="b") == Done()
-    assert robot.send(c.KeepAlive).code == "stale_token"
-    assert robot.controller.receive(c.TakeControl(client="c")).code == "no_control"
-    taken = robot.controller.receive(c.TakeControl(client="b"))
-    assert isinstance(taken, Accepted)
-    robot.token = taken.token
-    assert robot.send(c.KeepAlive) == Done()
-    robot.until_rest()
-    assert robot.kinds() == ["motion_started", "motion_done"]

@@ -4,40 +4,30 @@ import numpy as np
 import pytest
 from proof.search.draws import SHAPERS
 from proof.search.stops import KINDS, PAUSES
-from proof.search.subject import torques
 
 from tvist_controller.ahead import resting_after
-from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.safety import TORQUE_SHARE
-from tvist_controller.setup import body
-from tvist_protocol import commands as c
 from tvist_protocol.commands import MoveJ, Pause, Resume, SetPayload, Stop
 from tvist_protocol.motions import LineSegment, MoveL, MovePath
 from tvist_protocol.replies import Accepted
 from tvist_protocol.simulation import SimulationInject
 from tvist_protocol.transitions import Activity
 
-from .paths import Progress, journey
+from .paths import Progress, interfere, journey, keeps_limits
 from .robots import UR5E, H
 from .spaces import BENT, away, begun, errors, tool_pose
 
 LEAD = 1e-8
 """A pause goes through a filter whose weights follow the posture, and so may lead by nanometres [m]."""
-QUICK, SLOW, ALL = 8, 16, 500
+SOME, ALL = 12, 500
 
 
-@pytest.mark.parametrize("seed", range(QUICK))
+@pytest.mark.parametrize("seed", range(SOME))
 def test_every_kind_of_stop_stays_on_the_path_behind_the_motion_and_rests_no_later(seed):
     stopped_as_promised(seed)
 
 
-@pytest.mark.parametrize("seed", range(QUICK, SLOW))
-def test_so_do_many_more(seed):
-    stopped_as_promised(seed)
-
-
 @pytest.mark.nightly
-@pytest.mark.parametrize("seed", range(SLOW, ALL))
+@pytest.mark.parametrize("seed", range(SOME, ALL))
 def test_so_do_all_five_hundred(seed):
     stopped_as_promised(seed)
 
@@ -73,35 +63,12 @@ def stopped_as_promised(seed):
             assert event.duration == pytest.approx(max(resting_after(q) - moment, 0) * H, abs=3 * H), case
 
 
-def keeps_limits(q, free, payload, case):
-    """Torque, acceleration and clearance after a stop, in comparison with the motion that was left alone."""
-    most = TORQUE_SHARE * np.array(UR5E.limits.torque)
-    asked, taken = (np.abs(torques(UR5E, payload, each)).max(axis=0) for each in (free, q))
-    assert (taken / np.maximum(most, asked)).max() <= 1.001, case
-    present = np.abs(np.diff(free, 2, axis=0)).max() / H**2
-    hardest = np.abs(np.diff(q, 2, axis=0)).max() / H**2
-    assert hardest <= max(1.01 * min(UR5E.limits.acceleration), present), case
-    assert CollisionModel(UR5E, body(payload)).nearest(q) >= CLEARANCE, case
-
-
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(5))
 def test_slider_and_pauses_stay_on_the_path_and_lead_to_its_end(seed):
     trip = journey([seed, 43], [name for name in SHAPERS if not name.startswith("um_")])
     random = np.random.default_rng([seed, 44])
     robot = trip.begin()
-    for _ in range(12):
-        robot.tick(int(random.integers(1, 200)))
-        match int(random.integers(4)):
-            case 0:
-                robot.send(c.SetSpeed, fraction=float(random.uniform(0.05, 1.0)))
-            case 1:
-                robot.send(c.Pause)
-            case 2:
-                robot.send(c.Resume)
-            case _:
-                robot.send(c.SetShaper, name=str(random.choice(["none", "zv", "zvd", "auto"])))
-    robot.send(c.Resume)
-    robot.send(c.SetSpeed, fraction=1.0)
+    interfere(robot, random, 200, ["none", "zv", "zvd", "auto"])
     robot.until_rest(500_000)
     robot.tick(20)
     q = np.array(robot.references)

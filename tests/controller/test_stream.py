@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from tests.examples import examples
 
 from tvist_controller.trajectory import MotionLimits, SetpointStream
 
 from .robots import PAPER, ROUNDING, H
-from .streams import network, peaks, there_and_back
+from .streams import assert_within, network, peaks, there_and_back
 
 SLOW = 0.008
 WIDE = MotionLimits(3.0, 40.0, 2000.0)
@@ -43,15 +40,6 @@ def jumps(out):
     return np.abs(np.diff(out, 2, axis=0)).max() / H**2
 
 
-def assert_within(out, limits=PAPER):
-    """Acceleration and jerk to rounding, velocity to a tick of acceleration."""
-    velocity, acceleration, jerk = peaks(out, limits)
-    assert np.isfinite(out).all()
-    assert velocity <= 1.0 + limits.acceleration * H / limits.velocity
-    assert acceleration <= 1.0 + 1e-5
-    assert jerk <= 1.0 + 1e-4
-
-
 # ---------------------------------------------------------------- at the controller's rate
 
 
@@ -70,13 +58,8 @@ def test_before_the_first_set_point_it_rests_and_tells_no_sequence():
     assert stream.sequence is None
 
 
-def test_a_stream_may_begin_with_any_number():
-    out = play(start(), {k: [(40 + k, gentle(k * H))] for k in range(500)}, 500)
-    assert (out[:, 0] == gentle(np.arange(500) * H)).all()
-
-
-@pytest.mark.parametrize("first", [2**63 - 200, 2**64 - 500])
-def test_huge_numbers_are_as_good_as_small_ones(first):
+@pytest.mark.parametrize("first", [40, 2**63 - 200, 2**64 - 500])
+def test_a_stream_may_begin_with_any_number(first):
     stream = start()
     out = play(stream, {k: [(first + k, gentle(k * H))] for k in range(500)}, 500)
     assert (out[:, 0] == gentle(np.arange(500) * H)).all()
@@ -252,27 +235,6 @@ def test_the_delay_holds_still_for_a_tick_of_jitter():
     wanted = gentle(np.maximum(np.arange(800) * H - delay(SLOW) - H, 0.0))
     assert out == pytest.approx(wanted, abs=1.6 * SLOW**2 / 6 * 1.01 + 2e-5)
     assert stream.late == stream.lost == stream.limited == 0
-
-
-@examples(25)
-@given(seed=st.integers(0, 2**32 - 1), period=st.sampled_from([H, 0.003, SLOW, 0.05]))
-def test_whatever_comes_stays_finite_and_inside_the_limits(seed, period):
-    """Loss, jitter, duplicates, leaps and noise."""
-    random = np.random.default_rng(seed)
-    every, arrivals = period / H, {}
-    sequence = 0
-    for k in range(int(600 / every)):
-        sequence += int(random.choice([1, 1, 1, 1, 1, 1, 1, 2, 7, 100, 2**40]))
-        if random.random() < 0.1:
-            continue
-        tick = int(k * every + random.exponential(every))
-        q = np.clip(gentle(k * period) + random.choice([0, 0, 0, 1]) * random.normal(0, 0.3), -6, 6)
-        arrivals.setdefault(tick, []).extend([(sequence, q)] * int(random.choice([1, 1, 1, 3])))
-    stream = start(period)
-    out = play(stream, arrivals, 600)
-    assert_within(out)
-    assert stream.late >= 0
-    assert stream.lost >= 0
 
 
 @pytest.mark.parametrize("pause", [0.1, 0.2, 0.8])

@@ -25,11 +25,6 @@ def played(motion: PlannedMotion, start) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("start", "target", "duration"), MOTIONS)
-def test_durations_are_the_analytic_ones(start, target, duration):
-    assert quickest_motion(JointLine(start, target), PAPER, H).duration == pytest.approx(duration, abs=1e-3)
-
-
-@pytest.mark.parametrize(("start", "target", "duration"), MOTIONS)
 def test_duration_follows_the_textbook(start, target, duration):
     """Biagiotti and Melchiorri 2008, sec. 3.4, with the velocity limit reached."""
     way = np.abs(target - start).max()

@@ -39,7 +39,7 @@ def test_each_imperfection_is_felt_in_motion(ur5e, drive, imperfections):
     assert np.abs(felt(ur5e, drive, imperfections) - felt(ur5e, drive, None)).max() > 0.01
 
 
-@pytest.mark.parametrize("imperfections", IMPERFECT.values(), ids=IMPERFECT)
+@pytest.mark.parametrize("imperfections", [None, *IMPERFECT.values()], ids=["described", *IMPERFECT])
 @pytest.mark.parametrize("pose", ["Q1", "Q3"])
 def test_the_start_has_no_transient(ur5e, imperfections, pose):
     arm = FlexibleArm(ur5e, ur5e.payload, imperfections=imperfections)

@@ -6,7 +6,6 @@ import pytest
 
 from tvist_protocol import (
     Done,
-    Event,
     MoveJ,
     Payload,
     ProtocolError,
@@ -20,7 +19,6 @@ from tvist_protocol import (
     StepSetpoint,
     TvistError,
     check,
-    decode_event,
     decode_state,
     encode,
 )
@@ -114,16 +112,6 @@ def test_a_named_mode_travels_as_its_number():
     idle = check(msgspec.structs.replace(state, robot_mode=RobotMode.IDLE))
     assert idle.robot_mode == 5
     assert type(idle.robot_mode) is int
-
-
-def test_a_message_cannot_be_changed():
-    with pytest.raises(AttributeError):
-        MoveJ(token=LEASE, q=(0.0,)).velocity = 1.0
-
-
-def test_an_event_carries_its_code():
-    event = Event(tick=3, kind="protective_stop", code="collision", why="joint 2")
-    assert decode_event(encode(event)) == event
 
 
 def test_all_errors_have_one_root():

@@ -126,10 +126,6 @@ def test_a_start_by_its_angles(start):
     assert config(start=start).setup().q == (0.1, -1.0, 2.0, 0.0, 0.0, 0.5)
 
 
-def test_a_start_on_the_floor_where_there_is_none():
-    assert config(start="0,0,0,0,0,0", profile="ursim").setup().q == (0.0,) * 6
-
-
 def test_a_start_by_its_name():
     assert config(start="Q3").setup().q == tuple(Q3)
 

@@ -336,8 +336,12 @@ def rest(one):
     one.tick(10)
 
 
+EACH = [(name, (move, stream, fade, rest)[number % 4]) for number, name in enumerate(FAILING)]
+"""Every failure in some activity, and every activity."""
+
+
 class TestOneThatFails:
-    @pytest.mark.parametrize("activity", [move, stream, fade, rest])
+    @pytest.mark.parametrize(("failing", "activity"), EACH, indirect=["failing"])
     def test_the_robot_makes_a_protective_stop_that_names_it_and_goes_on_with_another(
         self, failing, activity
     ):

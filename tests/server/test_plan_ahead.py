@@ -4,7 +4,7 @@ import threading
 from collections import deque
 
 import pytest
-from tests.controller.robots import Q2, Q3, Robot, calibration, setup
+from tests.controller.robots import Q2, Q3, Kept, Robot, calibration, setup
 
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
@@ -25,27 +25,12 @@ WAIT = 20.0
 LIGHT = {"mass": 2.0, "com": (0.0, 0.0, 0.04), "inertia": (0.002, 0.0, 0.0, 0.002, 0.0, 0.002)}
 
 
-class Sink:
-    def __init__(self):
-        self.entries, self.states, self.events = [], [], []
-        self.journal, self.event = self.entries.append, self.events.append
-
-    def report(self, report):
-        self.states.append(report.state)
-
-    def io(self, io):
-        pass
-
-    def truth(self, truth):
-        pass
-
-
 class Served:
     """A robot whose controller's thread is the test's own: jobs run when it says."""
 
     def __init__(self, complete=None, **changes):
         start = setup(clock="realtime", **changes)
-        self.sink = Sink()
+        self.sink = Kept()
         self.host = Host(Controller(start), self.sink)
         self.jobs, self.came = deque(), threading.Condition()
         self.ahead = PlanAhead(self.host, Planner(start), self.post, complete)
@@ -100,6 +85,7 @@ class Served:
 def served():
     served = Served()
     yield served
+    served.ahead.end()
     served.ahead.close()
 
 
@@ -126,6 +112,7 @@ def test_a_program_of_the_folder_is_loaded_and_journaled_with_its_text(tmp_path)
     replies = [
         served.ask(ProgramLoad(name=name)) for name in ("wait.urp", "bad.urp", "nothing.urp", "Q1.urp")
     ]
+    served.ahead.end()
     served.ahead.close()
     assert [type(reply) for reply in replies] == [Done, Refused, Refused, Done]
     assert [reply.where for reply in replies[1:3]] == ["name", "name"]
@@ -201,13 +188,15 @@ def test_no_motion_that_was_sent_before_a_stop_outlives_it(served, waiting, stop
 
 
 @pytest.mark.parametrize("stop", [c.Stop(), ProgramStop()])
-def test_a_stop_of_what_moves_waits_for_no_plan(served, stop):
+def test_a_stop_of_what_moves_waits_for_no_plan_however_many_commands_wait(served, stop):
     served.ask(served.of(c.MoveJ, q=tuple(Q2.tolist())))
     served.tick(100)
-    for _ in range(10):
+    for _ in range(MAX_WAITING):
         served.send(served.of(c.SetShaper, name="auto"))
-    served.send(stop)
+    replies = []
+    served.reception.request(encode(stop), replies.append)
     served.empty()
+    assert replies == [Done()]
     kinds = [entry.message["type"] for entry in served.sink.entries]
     assert kinds.index(tag(type(stop))) < len(kinds) - 5, (
         "most of what was sent before it was still to be planned"
@@ -292,18 +281,6 @@ def test_a_plan_that_fails_is_a_refusal_and_the_next_one_is_made(served, monkeyp
         assert served.ask(served.of(c.SetShaper, name="zvd")).code == "wrong_mode"
     assert "ZeroDivisionError" in caplog.text
     assert served.ask(served.of(c.SetShaper, name="zvd")) == Done()
-
-
-@pytest.mark.parametrize("stop", [c.Stop(), ProgramStop()])
-def test_a_stop_is_made_however_many_commands_wait(served, stop):
-    served.ask(served.of(c.MoveJ, q=tuple(Q2.tolist())))
-    served.tick(100)
-    for _ in range(MAX_WAITING):
-        served.send(served.of(c.SetShaper, name="auto"))
-    replies = []
-    served.reception.request(encode(stop), replies.append)
-    served.empty()
-    assert replies == [Done()]
 
 
 def test_at_its_end_what_waits_is_refused(served):

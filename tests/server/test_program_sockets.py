@@ -39,85 +39,70 @@ class Side:
         return [news.change for news in self.heard]
 
 
-def with_sockets(test, allowed=()):
-    """Run a test with them."""
-
-    async def run():
-        heard, warned = [], []
-        sockets = ProgramSockets(heard.append, warned.append, AllowedHosts(allowed))
-        side = None
-
-        writers = []
-
-        async def accept(reader, writer):
-            writers.append(writer)
-            await side.accepted.put((reader, writer))
-
-        server = await asyncio.start_server(accept, HERE, 0)
-        side = Side(sockets, server, heard, warned)
-        await sockets.open()
-        try:
-            await test(side)
-        finally:
-            await sockets.shut()
-            sockets.close()
-            server.close()
-            for writer in writers:
-                writer.transport.abort()
-            await asyncio.sleep(0)
-
-    asyncio.run(run())
+@pytest.fixture
+def allowed():
+    """Machines that may be reached besides the one that sent the program."""
+    return ()
 
 
-def test_bytes_go_both_ways_and_the_end_is_told_once():
-    async def test(side):
-        assert await side.connect() == "opened"
-        reader, writer = await side.accepted.get()
-        side.sockets.carry_out([Send(1, b"hello")])
-        assert await reader.readexactly(5) == b"hello"
-        writer.write(b"well")
-        await side.until(lambda: side.received() == b"well")
-        writer.write(b"bye")
-        writer.close()
-        await side.until(lambda: "closed" in side.changes())
-        side.sockets.carry_out([Send(1, b"too late"), Close(1)])
-        await asyncio.sleep(0)
-        assert side.received() == b"wellbye"
-        assert side.changes().count("closed") == 1
+@pytest.fixture
+async def side(allowed):
+    heard, warned, writers = [], [], []
+    sockets = ProgramSockets(heard.append, warned.append, AllowedHosts(allowed))
 
-    with_sockets(test)
+    async def accept(reader, writer):
+        writers.append(writer)
+        await side.accepted.put((reader, writer))
 
-
-def test_a_program_that_closes_hears_nothing_more_and_what_it_sent_arrives():
-    async def test(side):
-        await side.connect()
-        reader, writer = await side.accepted.get()
-        side.sockets.carry_out([Send(1, b"last words"), Close(1)])
-        assert await reader.read() == b"last words"
-        writer.write(b"late")
-        with contextlib.suppress(ConnectionError):
-            await writer.drain()
-        assert side.changes() == ["opened"]
-
-    with_sockets(test)
+    server = await asyncio.start_server(accept, HERE, 0)
+    side = Side(sockets, server, heard, warned)
+    await sockets.open()
+    yield side
+    await sockets.shut()
+    sockets.close()
+    server.close()
+    for writer in writers:
+        writer.transport.abort()
+    await asyncio.sleep(0)
 
 
-def test_a_socket_that_is_closed_while_it_connects_is_never_opened():
-    async def test(side):
-        side.sockets.carry_out([Open(1, HERE, HERE, side.port), Close(1)])
-        assert await side.connect(2) == "opened"
-        assert [news.number for news in side.heard] == [2]
+async def test_bytes_go_both_ways_and_the_end_is_told_once(side):
+    assert await side.connect() == "opened"
+    reader, writer = await side.accepted.get()
+    side.sockets.carry_out([Send(1, b"hello")])
+    assert await reader.readexactly(5) == b"hello"
+    writer.write(b"well")
+    await side.until(lambda: side.received() == b"well")
+    writer.write(b"bye")
+    writer.close()
+    await side.until(lambda: "closed" in side.changes())
+    side.sockets.carry_out([Send(1, b"too late"), Close(1)])
+    await asyncio.sleep(0)
+    assert side.received() == b"wellbye"
+    assert side.changes().count("closed") == 1
 
-    with_sockets(test)
+
+async def test_a_program_that_closes_hears_nothing_more_and_what_it_sent_arrives(side):
+    await side.connect()
+    reader, writer = await side.accepted.get()
+    side.sockets.carry_out([Send(1, b"last words"), Close(1)])
+    assert await reader.read() == b"last words"
+    writer.write(b"late")
+    with contextlib.suppress(ConnectionError):
+        await writer.drain()
+    assert side.changes() == ["opened"]
+
+
+async def test_a_socket_that_is_closed_while_it_connects_is_never_opened(side):
+    side.sockets.carry_out([Open(1, HERE, HERE, side.port), Close(1)])
+    assert await side.connect(2) == "opened"
+    assert [news.number for news in side.heard] == [2]
 
 
 @pytest.mark.parametrize("port", [1, None])
-def test_a_machine_that_does_not_answer_is_told(port):
-    async def test(side):
-        side.port = port or side.port
-        assert await side.connect(address="no.such.host.invalid" if port is None else HERE) == "failed"
-
-    with_sockets(test)
+async def test_a_machine_that_does_not_answer_is_told(side, port):
+    side.port = port or side.port
+    assert await side.connect(address="no.such.host.invalid" if port is None else HERE) == "failed"
 
 
 @pytest.mark.parametrize(
@@ -134,15 +119,12 @@ def test_a_machine_that_does_not_answer_is_told(port):
         ("192.168.1.5", "127.0.0.1", ("127.0.0.1",), True),
     ],
 )
-def test_a_program_reaches_the_machine_that_sent_it_and_those_that_are_allowed(
-    origin, address, allowed, well
+async def test_a_program_reaches_the_machine_that_sent_it_and_those_that_are_allowed(
+    side, origin, address, well
 ):
-    async def test(side):
-        assert await side.connect(address=address, origin=origin) == ("opened" if well else "failed")
-        assert bool(side.warned) is not well
-        assert well or f"--ur-allow {address}" in side.warned[0]
-
-    with_sockets(test, allowed)
+    assert await side.connect(address=address, origin=origin) == ("opened" if well else "failed")
+    assert bool(side.warned) is not well
+    assert well or f"--ur-allow {address}" in side.warned[0]
 
 
 @pytest.mark.parametrize(
@@ -165,87 +147,72 @@ def test_who_may_be_reached(name, address, origin, well):
     assert AllowedHosts(["10.0.0.0/8", "gripper"]).allows(name, address, origin) is well
 
 
-def test_a_sender_that_floods_has_to_wait_until_the_program_reads():
-    async def test(side):
-        await side.connect()
-        _, writer = await side.accepted.get()
-        size = 64 * MAX_UNREAD
-        writer.write(bytes(size))
-        await side.until(lambda: len(side.received()) > MAX_UNREAD)
-        for _ in range(2000):
+async def test_a_sender_that_floods_has_to_wait_until_the_program_reads(side):
+    await side.connect()
+    _, writer = await side.accepted.get()
+    size = 64 * MAX_UNREAD
+    writer.write(bytes(size))
+    await side.until(lambda: len(side.received()) > MAX_UNREAD)
+    for _ in range(2000):
+        await asyncio.sleep(0)
+    held = len(side.received())
+    assert held < size // 4
+    taken = 0
+    async with asyncio.timeout(60):
+        while taken < size:
+            more = len(side.received()) - taken
+            side.sockets.carry_out([Taken(1, more)] if more else [])
+            taken += more
             await asyncio.sleep(0)
-        held = len(side.received())
-        assert held < size // 4
-        taken = 0
-        async with asyncio.timeout(60):
-            while taken < size:
-                more = len(side.received()) - taken
-                side.sockets.carry_out([Taken(1, more)] if more else [])
-                taken += more
-                await asyncio.sleep(0)
-        assert side.received() == bytes(size)
-
-    with_sockets(test)
+    assert side.received() == bytes(size)
 
 
-def test_a_machine_that_does_not_read_is_disconnected():
-    async def test(side):
-        await side.connect()
-        reader, writer = await side.accepted.get()
-        writer.transport.pause_reading()
-        for _ in range(400):
-            side.sockets.carry_out([Send(1, bytes(MAX_UNSENT // 8))])
-            await asyncio.sleep(0)
-        await side.until(lambda: "closed" in side.changes())
-        del reader
-
-    with_sockets(test)
+async def test_a_machine_that_does_not_read_is_disconnected(side):
+    await side.connect()
+    reader, writer = await side.accepted.get()
+    writer.transport.pause_reading()
+    for _ in range(400):
+        side.sockets.carry_out([Send(1, bytes(MAX_UNSENT // 8))])
+        await asyncio.sleep(0)
+    await side.until(lambda: "closed" in side.changes())
+    del reader
 
 
-def test_a_time_out_waits_for_the_wall_and_only_for_waits_that_ask():
-    async def test(side):
-        await side.connect()
-        side.sockets.carry_out([Wait(7, 1), Wait(8, 1), Expire(7, 1, 0.05)])
-        loop = asyncio.get_running_loop()
-        begun = loop.time()
-        await side.until(lambda: "expired" in side.changes())
-        assert loop.time() - begun >= 0.045
-        assert side.heard[-1].number == 7
-        side.sockets.carry_out([Waited(7), Waited(8)])
-
-    with_sockets(test)
+async def test_a_time_out_waits_for_the_wall_and_only_for_waits_that_ask(side):
+    await side.connect()
+    side.sockets.carry_out([Wait(7, 1), Wait(8, 1), Expire(7, 1, 0.05)])
+    loop = asyncio.get_running_loop()
+    begun = loop.time()
+    await side.until(lambda: "expired" in side.changes())
+    assert loop.time() - begun >= 0.045
+    assert side.heard[-1].number == 7
+    side.sockets.carry_out([Waited(7), Waited(8)])
 
 
-def test_what_has_arrived_is_told_before_a_time_out():
-    async def test(side):
-        await side.connect()
-        _, writer = await side.accepted.get()
-        side.sockets.carry_out([Wait(7, 1)])
-        writer.write(b"x")  # is with the system now, but the network's thread has not read it yet
-        side.sockets.carry_out([Expire(7, 1, 0.0)])
-        await side.until(lambda: "expired" in side.changes())
-        assert side.changes() == ["opened", "received", "expired"]
-
-    with_sockets(test)
+async def test_what_has_arrived_is_told_before_a_time_out(side):
+    await side.connect()
+    _, writer = await side.accepted.get()
+    side.sockets.carry_out([Wait(7, 1)])
+    writer.write(b"x")  # is with the system now, but the network's thread has not read it yet
+    side.sockets.carry_out([Expire(7, 1, 0.0)])
+    await side.until(lambda: "expired" in side.changes())
+    assert side.changes() == ["opened", "received", "expired"]
 
 
-def test_a_step_waits_for_a_socket_that_is_read_but_not_once_something_came():
-    async def test(side):
-        sockets = side.sockets
-        assert sockets.patience() == 0.0
-        await side.connect()
-        sockets.carry_out([Wait(1, 1)])
-        assert 0.0 < sockets.patience() <= PATIENCE
-        _, writer = await side.accepted.get()
-        writer.write(b"x")
-        await side.until(side.received)
-        assert sockets.patience() > 0.0  # the controller does not know yet
-        sockets.note(side.heard[-1])
-        assert sockets.patience() == 0.0
-        sockets.carry_out([Waited(1)])
-        assert sockets.patience() == 0.0
-
-    with_sockets(test)
+async def test_a_step_waits_for_a_socket_that_is_read_but_not_once_something_came(side):
+    sockets = side.sockets
+    assert sockets.patience() == 0.0
+    await side.connect()
+    sockets.carry_out([Wait(1, 1)])
+    assert 0.0 < sockets.patience() <= PATIENCE
+    _, writer = await side.accepted.get()
+    writer.write(b"x")
+    await side.until(side.received)
+    assert sockets.patience() > 0.0  # the controller does not know yet
+    sockets.note(side.heard[-1])
+    assert sockets.patience() == 0.0
+    sockets.carry_out([Waited(1)])
+    assert sockets.patience() == 0.0
 
 
 def test_what_is_asked_before_the_network_opens_is_done_then():

@@ -12,22 +12,15 @@ import msgspec
 import pytest
 from mcap.reader import make_reader
 from tests import forked
+from tests.server.test_recording_writer import INFO, STATE, TRUTH
 
-from tvist_protocol import Event, Info, Setpoint, State, Truth
-from tvist_protocol.generate import FOLDER
+from tvist_protocol import Event, Setpoint, State, Truth
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.recorded import JsonReader
 from tvist_server.recording import Recorder, RecorderError
 from tvist_server.recording import recorder as recorder_module
 from tvist_server.recording.whereabouts import whereabouts
 from tvist_server.recording.writer import RecordingWriter
-
-
-def golden(name, kind):
-    return msgspec.json.decode((FOLDER / "fixtures" / "v1" / f"{name}.json").read_bytes(), type=kind)
-
-
-INFO, STATE, TRUTH = golden("info", Info), golden("state", State), golden("truth", Truth)
 
 
 def state(tick):
@@ -133,13 +126,6 @@ def test_recording_goes_on_after_a_full_queue(path, gate):
     recorder.close()
     assert [s.tick for s in read(path)["state"]] == [0, 1, 2, 5]
     assert recorder.dropped == 2
-
-
-def test_who_may_wait_loses_nothing(path):
-    with Recorder(path, INFO, {}, queue_size=1, wait=True) as recorder:
-        for tick in range(30):
-            recorder.state(state(tick))
-    assert [s.tick for s in read(path)["state"]] == list(range(30))
 
 
 def test_closing_again_does_nothing_and_leaves_no_thread(path):

@@ -10,11 +10,11 @@ from pathlib import Path
 import msgspec
 import pytest
 from mcap.reader import make_reader
+from tests.server.test_recording_writer import INFO, STATE, TRUTH, golden
 
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
-from tvist_protocol import Event, Info, Io, State, Truth
-from tvist_protocol.generate import FOLDER
+from tvist_protocol import Event, Io, State, Truth
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import earlier_name, topics
 from tvist_server.recording import Recorder, RecorderError, writer
@@ -25,12 +25,7 @@ from tvist_server.recording.writer import heading
 KEEP = 100
 
 
-def golden(kind):
-    path = FOLDER / "fixtures" / "v1" / f"{kind.__name__.lower()}.json"
-    return msgspec.json.decode(path.read_bytes(), type=kind)
-
-
-INFO, STATE, TRUTH, IO = map(golden, (Info, State, Truth, Io))
+IO = golden("io", Io)
 
 
 def messages(ticks, first=1):

@@ -70,11 +70,6 @@ def test_each_robot_s_missed_ticks_are_its_own():
         assert sum(missed for _, missed in own) == expected
 
 
-def test_a_tick_just_less_than_a_period_late_is_not_missed():
-    assert played(1, 2, delay=lambda _: 0.0019)[0][3] == 0
-    assert played(1, 2, delay=lambda _: 0.0021)[0][3] == 1
-
-
 @pytest.mark.parametrize("robots", [1, 5])
 def test_a_long_delay_is_made_up_for_by_fifty_ticks_of_each_robot_and_the_rest_is_left_out(robots):
     periods = 200

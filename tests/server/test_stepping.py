@@ -10,8 +10,9 @@ from tvist_controller.admission import Admitted, admit
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.session import Lease, NoControlError
-from tvist_controller.stepping import ClockHold, ClockLease, check_step_token, may_step
+from tvist_controller.session import Lease
+from tvist_controller.sink import Sink
+from tvist_controller.stepping import ClockHold
 from tvist_lab.in_process import free_setup
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
@@ -26,13 +27,6 @@ LEASE = Lease("anna", "anna#1", 30.0, 30.0, None)
 HOLD = ClockHold("bert", "bert#clock1", None)
 Q2 = UR5E.poses["Q2"]
 LONG = tuple(StepSetpoint(sequence=n, q=(3.0,) * 6) for n in range(1000))
-
-
-class Sink:
-    """Takes what a host puts out."""
-
-    def __getattr__(self, _):
-        return lambda *_: None
 
 
 class Network:
@@ -52,45 +46,6 @@ class Network:
         self.send(command)
         self.jobs.do_waiting()
         return self.replies[-1]
-
-
-def test_one_client_holds_the_clock_and_another_is_told_which():
-    stepping = ClockLease()
-    hold = stepping.take("bert")
-    with pytest.raises(NoControlError, match="'bert'") as caught:
-        stepping.take("anna")
-    assert caught.value.code == "no_control"
-    assert stepping.hold == hold
-    again = stepping.take("bert")
-    assert again.token != hold.token
-    with pytest.raises(NoControlError) as caught:
-        stepping.release(hold.token)
-    assert caught.value.code == "stale_token"
-    stepping.release(again.token)
-    assert stepping.hold is None
-
-
-@pytest.mark.parametrize(
-    ("hold", "lease", "token", "code"),
-    [
-        (None, None, "anna#1", "no_control"),
-        (None, LEASE, "anna#1", None),
-        (None, LEASE, "bert#clock1", "stale_token"),
-        (HOLD, None, "bert#clock1", None),
-        (HOLD, LEASE, "bert#clock1", None),
-        (HOLD, LEASE, "anna#1", "no_control"),
-        (HOLD, LEASE, "bert#clock0", "stale_token"),
-        (HOLD, None, "anna#1", "stale_token"),
-    ],
-)
-def test_control_lets_time_pass_while_nobody_holds_the_clock(hold, lease, token, code):
-    assert may_step(hold, lease, token) == (code is None)
-    if code is None:
-        assert check_step_token(hold, lease, token) == token.partition("#")[0]
-    else:
-        with pytest.raises(NoControlError) as caught:
-            check_step_token(hold, lease, token)
-        assert caught.value.code == code
 
 
 def test_a_long_step_of_the_clock_s_holder_is_read_and_a_stranger_s_is_not():

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from scipy.optimize import brentq
 from tests.examples import examples
 
 from tvist_shaping import SHAPERS, DesignError, ShaperRangeError, band, ei, ei_exact, ei_of, residual
@@ -163,16 +162,6 @@ def test_amplitudes_that_only_decay_leave_less_than_they_may(golden):
     for entry in golden["shapers"]:
         if entry["name"] == "ei" and entry["zeta"] > 0.0:
             assert residual(entry["f_d"], entry["zeta"], ei(entry["f_d"], entry["zeta"])) < 0.04
-
-
-def test_an_undamped_hump_is_found_the_long_way_too():
-    """a₂ of three impulses at 0, ½, 1 such that V(1) = V: by bisection on the residual itself."""
-    a = brentq(lambda a: residual_of((1 - a) / 2, a) - 0.05, 0.45, 0.5, xtol=1e-14)
-    assert a == pytest.approx(ei_exact(1.0, 0.0).A[1], abs=1e-8)
-
-
-def residual_of(outer, inner):
-    return abs(2 * outer * math.cos(math.pi) + inner)
 
 
 @pytest.mark.parametrize(("humps", "V"), [(0, 0.05), (11, 0.05), (1, 0.0), (1, 0.9), (1, math.nan)])

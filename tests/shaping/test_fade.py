@@ -246,16 +246,6 @@ def test_without_numba_the_same_comes_out(monkeypatch):
     np.testing.assert_allclose(*outputs, atol=1e-9)
 
 
-def test_the_same_comes_out_the_same():
-    outputs = []
-    for _ in range(2):
-        random = np.random.default_rng(1)
-        outputs.append(
-            run(double_s([1.0, 0.5, -0.7]), a_filter(random, "zv"), a_filter(random, "ei"), 300)[0]
-        )
-    np.testing.assert_array_equal(*outputs)
-
-
 @pytest.mark.parametrize(
     "limits", [{"velocity": 0.0}, {"acceleration": float("nan")}, {"jerk": float("inf")}]
 )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_shaping import Fixed, Polynomial, TvistFilter, residual, shaper, zv
+from tvist_shaping import Polynomial, TvistFilter, shaper, zv
 
 H = 0.002  # [s]
 STROKE = 5.0 * np.pi / 6.0  # [rad]
@@ -73,9 +73,14 @@ def test_rounded_delays_kick_the_arm(double_s, modes):
     assert peak_acceleration(shape_with_rounded_delays(double_s[::-1].copy(), modes)) > 50.0
 
 
-@pytest.mark.parametrize("name", ["zvd", "ei", "ei_exact", "mzv", "si", "zvdd", "ei2", "zvddd", "ei3"])
-def test_no_shaper_of_the_catalogue_kicks_the_arm(name, double_s, modes):
-    assert peak_acceleration(shape(double_s, name, modes)) < 2.2
+@pytest.mark.parametrize("name", ["zv", "zvd", "ei", "ei_exact", "mzv", "si", "zvdd", "ei2", "zvddd", "ei3"])
+def test_no_shaper_of_the_catalogue_kicks_the_arm_or_leaves_the_way_between_start_and_end(
+    name, double_s, modes
+):
+    shaped = shape(double_s, name, modes)
+    assert peak_acceleration(shaped) < 2.2
+    assert shaped.min() >= -1e-6
+    assert shaped.max() <= STROKE + 1e-6
 
 
 def test_the_shaped_move_ends_where_the_reference_does_half_a_period_of_the_end_later(double_s, modes):
@@ -83,19 +88,3 @@ def test_the_shaped_move_ends_where_the_reference_does_half_a_period_of_the_end_
     assert shaped[-1] == double_s[-1]
     last = [np.flatnonzero(np.abs(np.diff(position)) > 1e-9)[-1] for position in (double_s, shaped)]
     assert H * (last[1] - last[0]) == pytest.approx(0.5 / 15.0, abs=2.0 * H)
-
-
-def test_the_shaped_reference_stays_between_start_and_end(double_s, modes):
-    for name in ("zv", "zvd", "ei", "ei_exact", "mzv", "si", "zvdd", "ei2", "zvddd", "ei3"):
-        shaped = shape(double_s, name, modes)
-        assert shaped.min() >= -1e-6
-        assert shaped.max() <= STROKE + 1e-6
-
-
-def test_a_constant_mode_gives_classic_input_shaping(double_s):
-    shaped = shape(double_s, "zv", Fixed([6.7], [0.34]))
-    impulses = zv(6.7, 0.34)
-    ticks = np.arange(double_s.size)
-    late = np.interp(ticks - impulses.tau[1] / H, ticks, double_s)
-    np.testing.assert_allclose(shaped, impulses.A[0] * double_s + impulses.A[1] * late, atol=1e-6)
-    assert residual(6.7, 0.34, impulses) < 1e-15

@@ -309,11 +309,6 @@ def test_a_thread_without_budget_goes_on_where_it_was():
     assert 2 < ticks < 10
 
 
-def test_the_same_program_takes_the_same_ticks_with_any_user():
-    one, two = Robot(LOOP), Robot(LOOP)
-    assert one.ticks(5, budget=123) == two.ticks(5, budget=123)
-
-
 def test_who_missed_a_tick_is_first_in_the_next():
     order = []
     script = compile_script(

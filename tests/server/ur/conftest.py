@@ -172,8 +172,10 @@ def robot(snapshots) -> SimpleNamespace:
 
 @pytest.fixture
 async def desk():
+    """A robot that has made its first tick, for which its interfaces would wait."""
     desk = Desk()
     desk.interfaces = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", EVERYWHERE)
+    await desk.tick()
     await desk.interfaces.open()
     yield desk
     for writer in desk.writers:

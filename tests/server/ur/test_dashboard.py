@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.controller.robots import UR5E
 
 from tvist_protocol import commands as c
-from tvist_protocol.programs import ProgramLoad, ProgramPlay, ProgramStop
+from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_server.gateways.ur.dashboard.commands import COMMANDS, find
 from tvist_server.gateways.ur.dashboard.lines import LONGEST
@@ -272,19 +272,6 @@ def test_a_program_is_loaded_played_paused_and_stopped(client, control):
     assert control.of(ProgramStop)
 
 
-def test_one_segment_does_all_of_it_in_order(client, control, desk):
-    control.reply = Accepted(id=7)
-    assert client.send("load Q2.urp\nplay\nprogramState\nstop\nprogramState\n") == [
-        "Loading program: Q2.urp",
-        "Starting program",
-        "PLAYING Q2.urp",
-        "Stopped",
-        "STOPPED Q2.urp",
-    ]
-    assert [command.name for command in control.of(ProgramLoad)] == ["Q2.urp"]
-    assert len(control.of(ProgramPlay)) == 1
-
-
 PLAYING, STOPPING, STOPPED = 2, 0, 1
 
 
@@ -333,13 +320,6 @@ def test_a_program_ends_with_the_power_and_not_with_a_power_off_that_was_refused
     client.ask("power off")
     desk.programs.io(io(program="wait_program.urp"))
     assert client.ask("programState") == "STOPPED wait_program.urp"
-
-
-def test_what_plays_outlives_its_client(client, desk):
-    client.ask("load wait_program.urp")
-    client.ask("play")
-    client.session.closed()
-    assert desk.programs.playing
 
 
 # ---------------------------------------------------------------------- order, bounds, ends

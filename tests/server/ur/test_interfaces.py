@@ -12,7 +12,6 @@ from tests.controller.robots import UR5E
 
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
-from tvist_protocol.commands import TakeControl
 from tvist_protocol.simulation import SimulationInject
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.ur.interfaces import UrInterfaces
@@ -21,7 +20,6 @@ from .desks import PATIENCE, Desk, connect, connect_and_greet, lines, until
 
 
 async def test_every_door_speaks_its_language(desk):
-    await desk.tick()
     reader, writer = await connect(desk, "dashboard")
     assert (await reader.readline()).startswith(b"Connected")
     assert await lines(reader, writer, "robotmode") == ["Robotmode: RUNNING"]
@@ -42,7 +40,6 @@ async def test_every_door_speaks_its_language(desk):
 
 
 async def test_a_client_that_stops_reading_loses_samples_and_nobody_else_does(desk):
-    await desk.tick()
     quick, _ = await connect(desk, "realtime")
     _, slow = await connect(desk, "realtime")
     slow.transport.pause_reading()
@@ -68,30 +65,7 @@ async def test_a_client_that_stops_reading_loses_samples_and_nobody_else_does(de
     assert dropped[1] > 0
 
 
-async def test_a_door_takes_control_and_gives_it_back(desk):
-    await desk.tick()
-    reader, writer = await connect(desk, "dashboard")
-    await reader.readline()
-    assert await lines(reader, writer, "is in remote control", "power off") == ["true", "Powering off"]
-    assert desk.holder() == "ur-127.0.0.1"
-    writer.close()
-    await until(lambda: desk.holder() is None)
-
-
-async def test_a_door_declines_in_its_own_way_where_somebody_else_has_control(desk):
-    await desk.tick()
-    desk.host.request(encode(TakeControl(client="anna")))
-    reader, writer = await connect(desk, "dashboard")
-    await reader.readline()
-    answers = await lines(reader, writer, "is in remote control", "power off", "robotmode")
-    assert answers[0] == "false"
-    assert answers[1].startswith("Failed to execute: power off")
-    assert answers[2] == "Robotmode: RUNNING"
-    assert desk.holder() == "anna"
-
-
 async def test_a_fault_of_ours_ends_one_connection_and_no_other(desk, monkeypatch, caplog):
-    await desk.tick()
     (broken, _), (whole, _) = [await connect(desk, "realtime") for _ in range(2)]
     await until(lambda: len(desk.interfaces._connections) == 2)
     first = next(iter(desk.interfaces._connections))
@@ -117,7 +91,6 @@ async def test_a_port_in_use_is_said_with_what_to_do(desk):
 
 
 async def test_events_reach_the_clients_of_the_primary_interface(desk):
-    await desk.tick()
     reader, _ = await connect(desk, "primary")
     await reader.readexactly(5)
     token = desk.controller.receive(c.TakeControl(client="a")).token
@@ -151,6 +124,7 @@ async def test_in_lockstep_nothing_is_dropped():
 async def test_what_everybody_is_told_reaches_who_is_far_behind_in_lockstep_alone(lockstep):
     desk = Desk()
     desk.interfaces = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", {"primary": 0}, lockstep=lockstep)
+    await desk.tick()
     await desk.interfaces.open()
     reader, writer = await connect(desk, "primary")
     await until(lambda: desk.interfaces._connections)
@@ -169,9 +143,7 @@ async def test_what_everybody_is_told_reaches_who_is_far_behind_in_lockstep_alon
 
 
 async def test_a_program_goes_on_without_its_client_and_control_ends_with_it(desk):
-    await desk.tick()
-    reader, writer = await connect(desk, "dashboard")
-    await reader.readline()
+    reader, writer = await connect_and_greet(desk)
     answers = await lines(reader, writer, "load Q2.urp", "play")
     assert answers[1] == "Starting program"
     writer.close()
@@ -186,35 +158,20 @@ async def test_a_program_goes_on_without_its_client_and_control_ends_with_it(des
     assert max(abs(a - b) for a, b in zip(target, UR5E.poses["Q2"], strict=True)) < 1e-6
 
 
-async def test_a_client_that_quits_behind_a_slow_command_is_let_out(desk):
-    await desk.tick()
-    reader, writer = await connect(desk, "dashboard")
-    await reader.readline()
-    writer.write(b"power off\nquit\n")
-    assert (await reader.readline()).startswith(b"Powering off")
-    await reader.readline()
-    await desk.tick(2)
-    assert await asyncio.wait_for(reader.read(), PATIENCE) == b""
-
-
 async def answered(reader, lines):
     for _ in range(lines):
         assert await asyncio.wait_for(reader.readline(), PATIENCE)
 
 
 async def test_a_client_that_asks_much_at_once_and_reads_gets_every_answer(desk):
-    await desk.tick()
-    reader, writer = await connect(desk, "dashboard")
-    await reader.readline()
+    reader, writer = await connect_and_greet(desk)
     reading = asyncio.create_task(answered(reader, 60_000))
     writer.write(b"\n" * 60_000)
     await reading
 
 
 async def test_a_client_that_asks_and_does_not_read_is_not_asked_for_more(desk):
-    await desk.tick()
-    reader, writer = await connect(desk, "dashboard")
-    await reader.readline()
+    reader, writer = await connect_and_greet(desk)
     reader._transport.pause_reading()
     (connection,) = desk.interfaces._connections
     writer.write(b"\n" * 60_000)
@@ -226,7 +183,6 @@ async def test_a_client_that_asks_and_does_not_read_is_not_asked_for_more(desk):
 
 
 async def test_scripts_by_the_thousand_cut_nobody_off_who_hears_of_them(desk):
-    await desk.tick()
     listener, _ = await connect(desk, "primary")
     _, writer = await connect(desk, "realtime")
     await until(lambda: len(desk.interfaces._connections) == 2)
@@ -243,7 +199,6 @@ async def test_scripts_by_the_thousand_cut_nobody_off_who_hears_of_them(desk):
 async def test_what_a_client_sends_waits_with_the_client_until_the_controller_has_done_what_came_before(
     desk, monkeypatch
 ):
-    await desk.tick()
     due = []
     monkeypatch.setattr(desk, "command", lambda command, answer, _origin=None: due.append((command, answer)))
     _, writer = await connect(desk, "realtime")
@@ -275,7 +230,6 @@ async def test_who_comes_first_finds_a_robot():
 
 
 async def test_hosts_that_have_gone_are_forgotten(desk):
-    await desk.tick()
     for last in range(2, 12):
         reader, writer = await asyncio.open_connection(
             "127.0.0.1", desk.interfaces.ports["dashboard"], local_addr=(f"127.0.0.{last}", 0)
@@ -292,17 +246,13 @@ async def test_hosts_that_have_gone_are_forgotten(desk):
 
 
 async def test_who_quits_behind_a_slow_command_waits_for_no_tick(desk):
-    await desk.tick()
-    reader, writer = await connect(desk, "dashboard")
-    await reader.readline()
+    reader, writer = await connect_and_greet(desk)
     writer.write(b"power off\nquit\n")
     assert (await asyncio.wait_for(reader.read(), PATIENCE)).endswith(b"Disconnected\n")
 
 
 async def test_a_fault_of_ours_at_an_answer_ends_that_connection(desk, monkeypatch, caplog):
-    await desk.tick()
-    reader, writer = await connect(desk, "dashboard")
-    await reader.readline()
+    reader, writer = await connect_and_greet(desk)
     (connection,) = desk.interfaces._connections
     monkeypatch.setattr(connection.session, "_say", lambda _: 1 / 0)
     writer.write(b"power off\n")
@@ -312,7 +262,6 @@ async def test_a_fault_of_ours_at_an_answer_ends_that_connection(desk, monkeypat
 
 
 async def test_a_tick_leaves_nothing_for_the_collector(desk):
-    await desk.tick()
     reader, writer = await connect(desk, "rtde")
     names = b"actual_q,target_current,output_int_register_3"
     recipe = struct.pack(">HBd", 11 + len(names), ord("O"), 500.0) + names

@@ -74,7 +74,6 @@ async def silent(desk, count=MOST, interface="dashboard"):
 
 @pytest.mark.parametrize("interface", ["dashboard", "rtde"])
 async def test_clients_that_say_nothing_lock_nobody_out(interface, desk):
-    await desk.tick()
     await silent(desk, interface=interface)
     await dashboard(desk)
     await rtde(desk)
@@ -85,7 +84,6 @@ async def test_clients_that_say_nothing_lock_nobody_out(interface, desk):
 async def test_who_says_nothing_for_half_a_minute_is_closed_and_who_reads_or_has_spoken_stays(
     later, desk, caplog
 ):
-    await desk.tick()
     (reading,) = await readers(desk, 1)
     spoken, writer = await dashboard(desk)
     served, _ = await rtde(desk)
@@ -106,7 +104,6 @@ async def test_who_says_nothing_for_half_a_minute_is_closed_and_who_reads_or_has
 
 
 async def test_for_a_newcomer_the_one_that_has_been_silent_for_longest_goes(later, desk, caplog):
-    await desk.tick()
     old, _ = await dashboard(desk)
     served, _ = await rtde(desk)
     later(60.0)
@@ -122,7 +119,6 @@ async def test_for_a_newcomer_the_one_that_has_been_silent_for_longest_goes(late
 
 
 async def test_where_room_is_left_nobody_has_to_go(later, desk):
-    await desk.tick()
     await dashboard(desk)
     later(86_400.0)
     await readers(desk, 230)
@@ -130,7 +126,6 @@ async def test_where_room_is_left_nobody_has_to_go(later, desk):
 
 
 async def test_who_is_being_served_goes_for_nobody_and_the_last_newcomer_is_turned_away(later, desk, caplog):
-    await desk.tick()
     served, writer = await rtde(desk)
     later(86_400.0)
     others = await readers(desk, MOST - 1)

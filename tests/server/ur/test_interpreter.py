@@ -144,7 +144,6 @@ def test_no_bytes_break_it(data, cut):
 
 async def waiting(desk, program="interpreter_mode()\n"):
     """Have a program wait for statements; what speaks to it."""
-    await desk.tick()
     _, script = await connect(desk, "secondary")
     script.write(program.encode())
     await until(lambda: desk.controller.programs.state == "PLAYING")
@@ -160,12 +159,8 @@ async def ask(desk, *sent):
 
 
 async def test_a_program_is_built_statement_by_statement(desk):
-    await desk.tick()
-    _, script = await connect(desk, "secondary")
-    script.write(b'def main():\n  a = 5\n  interpreter_mode()\n  textmsg("over")\nend\n')
-    await until(lambda: desk.controller.programs.state == "PLAYING")
-    await desk.tick(2)
-    reader, writer = await connect(desk, "interpreter")
+    program = 'def main():\n  a = 5\n  interpreter_mode()\n  textmsg("over")\nend\n'
+    reader, writer = await waiting(desk, program)
     assert await lines(reader, writer, "b = a + 1", "write_output_integer_register(3, b)", "nothing()") == [
         "ack: 1: b = a + 1",
         "ack: 2: write_output_integer_register(3, b)",
@@ -183,11 +178,7 @@ async def test_a_program_is_built_statement_by_statement(desk):
 
 
 async def test_without_control_a_statement_is_discarded(desk):
-    await desk.tick()
-    _, script = await connect(desk, "secondary")
-    script.write(b"interpreter_mode()\n")
-    await until(lambda: desk.controller.programs.state == "PLAYING")
-    await desk.tick(2)
+    await waiting(desk)
     reader, writer = await asyncio.open_connection(
         "127.0.0.1", desk.interfaces.ports["interpreter"], local_addr=("127.0.0.5", 0)
     )

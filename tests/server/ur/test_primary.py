@@ -423,33 +423,25 @@ def test_nothing_that_comes_raises(pieces):
 
 
 @pytest.mark.parametrize(
-    ("text", "command"),
+    ("text", "commands"),
     [
-        ("power on", c.PowerOn(token="the-token", release_brakes=False)),
-        ("power off", c.PowerOff(token="the-token")),
-        ("set robotmode run", c.PowerOn(token="the-token")),
-        ("set unlock protective stop", c.UnlockProtectiveStop(token="the-token")),
-        ("stop program", ProgramStop()),
-        ("  stop   program  # now", ProgramStop()),
+        ("power on", [c.PowerOn(token="the-token", release_brakes=False)]),
+        ("power off", [c.PowerOff(token="the-token")]),
+        ("set robotmode run", [c.PowerOn(token="the-token")]),
+        ("set unlock protective stop", [c.UnlockProtectiveStop(token="the-token")]),
+        ("stop program", [ProgramStop()]),
+        ("  stop   program  # now", [ProgramStop()]),
+        ("set sim", []),
+        ("set real", []),
     ],
 )
-def test_commands_that_are_no_urscript_act(robot, control, sent, text, command):
+def test_commands_that_are_no_urscript_act_and_a_simulated_arm_stays_one(
+    robot, control, sent, text, commands
+):
     session(robot, control, sent.append).receive(text.encode() + b"\r\n")
-    assert control.commands == [command]
+    assert control.commands == commands
     assert not sent
     assert not robot.told
-
-
-def test_two_commands_in_one_segment(robot, control, sent):
-    session(robot, control, sent.append).receive(b"stop program\nset robotmode run\n")
-    assert [type(command) for command in control.commands] == [ProgramStop, c.PowerOn]
-
-
-@pytest.mark.parametrize("text", ["set sim", "set real"])
-def test_a_simulated_arm_stays_one(robot, control, sent, text):
-    session(robot, control, sent.append).receive(text.encode() + b"\n")
-    assert not control.commands
-    assert not sent + robot.told
 
 
 @pytest.mark.parametrize(
@@ -516,19 +508,14 @@ def test_a_text_that_is_not_valid_is_told_to_everybody_and_on_the_console(robot,
     assert not sent
 
 
-def test_a_program_that_cannot_run_now_is_a_line_of_the_log_for_who_sent_it(robot, control, sent):
+@pytest.mark.parametrize("text", ["movej(q)", "set robotmode run"])
+def test_what_cannot_be_done_now_is_a_line_of_the_log_for_who_sent_it(robot, control, sent, text):
     control.refuse("wrong_mode", why="the arm has no power")
-    session(robot, control, sent.append).receive(b"movej(q)\n")
+    robot.latest = Ticks(robot.latest).at(1, robot_mode=3)
+    session(robot, control, sent.append).receive(text.encode() + b"\n")
     (line,) = [message(data) for data in sent]
-    assert (line.kind, line.values["text"]) == (0, "movej(q) was refused: the arm has no power")
+    assert (line.kind, line.values["text"]) == (0, f"{text} was refused: the arm has no power")
     assert not robot.told
-
-
-def test_a_program_without_control_is_told_that_the_interface_is_read_only(robot, control, sent):
-    control.refuse("no_control")
-    session(robot, control, sent.append).receive(b"movej(q)\n")
-    (error,) = [message(data) for data in sent]
-    assert (error.kind, error.values["code"]) == (6, 210)
 
 
 def test_a_refusal_is_told_on_the_console_with_its_reason(robot, control, sent):
@@ -540,20 +527,13 @@ def test_a_refusal_is_told_on_the_console_with_its_reason(robot, control, sent):
     assert robot.reported[1].endswith("was refused: this port is read-only")
 
 
-def test_who_does_not_have_control_is_told_that_the_interface_is_read_only(robot, control, sent):
+@pytest.mark.parametrize("text", [b"power on\n", b"movej(q)\n"])
+def test_who_does_not_have_control_is_told_that_the_interface_is_read_only(robot, control, sent, text):
     control.refuse("no_control")
-    session(robot, control, sent.append).receive(b"power on\n")
+    session(robot, control, sent.append).receive(text)
     (error,) = [message(data) for data in sent]
     assert (error.kind, error.values["code"]) == (6, 210)
     assert not robot.told
-
-
-def test_another_refusal_is_a_line_of_the_log_for_who_asked(robot, control, sent):
-    control.refuse("wrong_mode", why="it moves")
-    robot.latest = Ticks(robot.latest).at(1, robot_mode=3)
-    session(robot, control, sent.append).receive(b"set robotmode run\n")
-    (line,) = [message(data) for data in sent]
-    assert line.values["text"] == "set robotmode run was refused: it moves"
 
 
 @pytest.mark.parametrize("text", [b"power on\n", b"set robotmode run\n", b"set unlock protective stop\n"])

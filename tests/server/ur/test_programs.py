@@ -194,16 +194,6 @@ def test_control_of_a_secondary_script_lasts_until_no_secondary_script_runs(prog
     assert (main.left, first.left, second.left) == (1, 1, 1)
 
 
-def test_a_text_that_is_not_valid_is_a_runtime_exception_at_its_place(programs, robot, control):
-    why = "compile_error_name_not_found:calldoesntexist:"
-    control.refuse("script_error", why=why, where="text:2:3")
-    (refused,) = run(programs, control)
-    assert refused.why == why
-    (exception,) = told(robot)
-    assert exception.values == {"line": 2, "column": 3, "text": why}
-    assert control.left == 1
-
-
 @pytest.mark.parametrize("code", ["no_control", "wrong_mode", "busy"])
 def test_a_script_that_is_refused_for_another_reason_gives_control_back(programs, robot, control, code):
     control.refuse(code)

@@ -1,7 +1,6 @@
 """The real-time interface: 1220 bytes a tick, as UR's description lays them out."""
 
 import struct
-from types import SimpleNamespace
 
 import pytest
 from tests.controller.robots import cut
@@ -120,10 +119,3 @@ def test_a_program_sent_without_end_is_bounded(robot, control):
         interface.receive(b"def f():\n" + b"  x = 1\n" * 10_000)
     assert interface._intake.held <= 1 << 20
     assert [one.values["text"].split(":")[0] for one in told(robot)] == ["program_too_long"]
-
-
-def test_namespace_like_snapshots_are_enough():
-    """Nothing but the snapshot's attributes is read."""
-    values = {name: [1.0] * count if count > 1 else 1.0 for name, (_, count) in PLACES.items()}
-    fake = SimpleNamespace(shared={}, **values)
-    assert sum(doubles(package(fake))) == sum(count for _, count in PLACES.values())

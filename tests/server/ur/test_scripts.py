@@ -23,15 +23,20 @@ async def robot_messages(reader, count):
     return found
 
 
+async def listening(desk):
+    """What reads the primary interface, and what writes to the secondary one."""
+    listener, _ = await connect(desk, "primary")
+    _, writer = await connect(desk, "secondary")
+    return listener, writer
+
+
 def keys(messages):
     """Key messages and exceptions in short."""
     return [one.values.get("title", one.values["text"])[12:] + " " + one.values["text"] for one in messages]
 
 
 async def test_a_script_is_run_and_told_about_even_if_its_client_has_gone(desk):
-    await desk.tick()
-    listener, _ = await connect(desk, "primary")
-    _, writer = await connect(desk, "secondary")
+    listener, writer = await listening(desk)
     writer.write(b"movej([0.1,-1.6,0.1,-1.5,0,0])\n")
     writer.close()
     await until(lambda: desk.controller.programs.state == "PLAYING")
@@ -47,7 +52,6 @@ async def test_a_script_is_run_and_told_about_even_if_its_client_has_gone(desk):
 
 
 async def test_programs_in_one_segment_are_run_one_after_the_other(desk):
-    await desk.tick()
     listener, _ = await connect(desk, "primary")
     _, writer = await connect(desk, "realtime")
     programs = [f"def {name}():\n  sleep(10)\nend\n" for name in ("one", "two", "three")]
@@ -58,20 +62,7 @@ async def test_programs_in_one_segment_are_run_one_after_the_other(desk):
     assert keys(told) == ["STARTED one", "STOPPED one", "STARTED two", "STOPPED two", "STARTED three"]
 
 
-async def test_two_clients_run_programs_in_turn(desk):
-    await desk.tick()
-    listener, _ = await connect(desk, "primary")
-    writers = [(await connect(desk, interface))[1] for interface in ("secondary", "realtime")]
-    for number in range(4):
-        writers[number % 2].write(f"def prog{number}():\n  sleep(10)\nend\n".encode())
-        await until(lambda number=number: desk.controller.programs.name == f"prog{number}")
-        await desk.tick()
-    told = keys(await robot_messages(listener, 7))
-    assert told[-3:] == ["STARTED prog2", "STOPPED prog2", "STARTED prog3"]
-
-
 async def test_a_secondary_program_runs_beside_and_is_not_told_about(desk):
-    await desk.tick()
     listener, _ = await connect(desk, "primary")
     _, writer = await connect(desk, "primary")
     writer.write(b"def main():\n  sleep(10)\nend\n")
@@ -87,20 +78,8 @@ async def test_a_secondary_program_runs_beside_and_is_not_told_about(desk):
     assert keys(await robot_messages(listener, 3)) == ["STARTED main", " beside", "STOPPED main"]
 
 
-async def test_an_exception_in_the_text_names_its_place_in_the_text_as_sent(desk):
-    await desk.tick()
-    listener, _ = await connect(desk, "primary")
-    _, writer = await connect(desk, "secondary")
-    writer.write(b"stop program\r\n\r\n# a comment\r\ndef f():\r\n  calldoesntexist()\r\nend\r\n")
-    (exception,) = await robot_messages(listener, 1)
-    text = "compile_error_name_not_found:calldoesntexist:"
-    assert (exception.kind, exception.values) == (10, {"line": 3, "column": 3, "text": text})
-
-
 async def test_an_exception_of_a_running_program_comes_before_its_end(desk):
-    await desk.tick()
-    listener, _ = await connect(desk, "primary")
-    _, writer = await connect(desk, "secondary")
+    listener, writer = await listening(desk)
     writer.write(b"def f():\n  sleep(0.01)\n  movej(p[10,0,0,0,0,0])\nend\n")
     await until(lambda: desk.controller.programs.state == "PLAYING")
     await desk.tick(20)
@@ -109,36 +88,7 @@ async def test_an_exception_of_a_running_program_comes_before_its_end(desk):
     assert (exception.kind, exception.values["line"], exception.values["column"]) == (10, 3, 3)
 
 
-async def test_a_blocking_popup_waits_until_somebody_closes_it(desk):
-    await desk.tick()
-    listener, _ = await connect(desk, "primary")
-    _, writer = await connect(desk, "secondary")
-    writer.write(
-        b'def f():\n  popup("Go on?", title="Robot", warning=True, blocking=True)\n  textmsg("on")\nend\n'
-    )
-    await until(lambda: desk.controller.programs.state == "PLAYING")
-    await desk.tick(5)
-    started, popup = await robot_messages(listener, 2)
-    assert popup.kind == 2
-    assert popup.values == {
-        "request": 0,
-        "type": 0,
-        "flags": [True, False, True],
-        "title": "Robot",
-        "text": "Go on?",
-    }
-    assert await lines(*await connect_and_greet(desk), "close popup", "running") == [
-        "closing popup",
-        "Program running: true",
-    ]
-    await desk.tick(5)
-    text, stopped = await robot_messages(listener, 2)
-    assert (text.kind, text.values["text"]) == (0, "on")
-    assert keys([started, stopped]) == ["STARTED f", "STOPPED f"]
-
-
 async def test_the_dashboard_plays_a_script_again_under_its_name(desk):
-    await desk.tick()
     _, writer = await connect(desk, "secondary")
     writer.write(b"def again():\n  sleep(0.01)\nend\n")
     await until(lambda: desk.controller.programs.name == "again")
@@ -165,7 +115,6 @@ async def test_the_dashboard_plays_a_script_again_under_its_name(desk):
 
 
 async def test_a_client_that_leaves_at_once_without_reading_has_sent_its_script(desk):
-    await desk.tick()
     stream = socket.create_connection(("127.0.0.1", desk.interfaces.ports["realtime"]))
     await until(lambda: desk.interfaces._connections)
     await desk.tick()
