@@ -38,15 +38,20 @@ class FigureOptions:
         self.check(folder)
         return FigureFiles(folder, self.format or "png", self.dpi or DPI, self.columns or 2)
 
-    def check(self, folder: Path | None) -> None:
+    def check(self, folder: Path | None, *files: Path | None) -> None:
         """Refuse what cannot be done, before anything is computed.
 
         Args:
             folder: Value of --figures; None where it was not given.
+            files: Other files that will be written at the end; None for those that were not given.
 
         Raises:
-            Failure: The resolution is out of range, or there are no figures to which an option could apply.
+            Failure: The resolution is out of range, there are no figures to which an option could apply, or a file's
+                folder does not exist.
         """
+        for file in files:
+            if file is not None and not file.parent.is_dir():
+                raise Failure(f"{file} cannot be written: there is no folder {file.parent}")
         for name in ("format", "dpi", "columns"):
             if folder is None and getattr(self, name) is not None:
                 raise Failure(f"--{name} is about figures: give --figures DIR too, or leave it out", code=2)

@@ -6,7 +6,7 @@ _STUDIES = ("robustness", "paths", "tracking", "map")
 INSTEAD = {
     **{name: f"tvist log {name}" for name in _LOG},
     **{name: f"tvist study {name}" for name in _STUDIES},
-    "sweep": "tvist study FILE",
+    "sweep": "tvist study sweep FILE",
     "check-script": "tvist run --check",
     "kernels": "tvist serve --compile",
     "sensitivity": "tvist shapers --sensitivity",

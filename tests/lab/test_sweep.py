@@ -214,7 +214,7 @@ class TestResuming:
     def test_another_spec_does_not_continue(self, tmp_path, old, new, what):
         other = tasks_of(tmp_path, SPEC.replace(old, new))
         with pytest.raises(
-            StoreError, match=rf"whole holds a sweep with other {what}.*: give another --output"
+            StoreError, match=rf"whole holds a study with other {what}.*: give another --output"
         ):
             run(other, tmp_path / "whole", Quick(), quietly)
 
@@ -230,7 +230,7 @@ class TestFolder:
     def test_a_folder_with_something_else_is_left_alone(self, tmp_path, tasks):
         (tmp_path / "x").mkdir()
         (tmp_path / "x" / "thesis.tex").touch()
-        with pytest.raises(StoreError, match="x exists already and holds no sweep"):
+        with pytest.raises(StoreError, match="x exists already and holds no study"):
             run(tasks, tmp_path / "x", Quick(), quietly)
         assert [file.name for file in (tmp_path / "x").iterdir()] == ["thesis.tex"]
 
@@ -271,7 +271,7 @@ class TestFolder:
             store.keep(frame(failed(tasks[0], "failed", "x"), SCHEMA))
             (tmp_path / "x" / "parts" / "000001.parquet").write_bytes(b"PAR1")
             with pytest.raises(
-                StoreError, match=r"000001\.parquet cannot be read as rows of a sweep: remove it"
+                StoreError, match=r"000001\.parquet cannot be read as rows of a study: remove it"
             ):
                 store.rows()
 
@@ -333,6 +333,9 @@ def test_the_study_of_the_page_is_made_kept_and_summarized(tmp_path):
     assert [(one["speed"], one["shaper"]) for one in entries] == [
         (speed, name) for speed in (0.5, 1.0, 1.5) for name in ("zv", "auto")
     ]
+    assert list(ran.rows["speed"]) == [0.5, 0.5, 1.0, 1.0, 1.5, 1.5]
+    unshaped = [one["unshaped_peak_m_s2"]["median"] for one in entries[::2]]
+    assert unshaped == sorted(unshaped)
     for one in entries:
         assert one["shaped_peak_m_s2"]["median"] < one["unshaped_peak_m_s2"]["median"]
     assert len(study_figure(entries, study.by, study.show).axes) == 2
@@ -344,7 +347,20 @@ def test_the_study_of_the_page_is_made_kept_and_summarized(tmp_path):
         (("STUDY =", "study ="), "contains no STUDY"),
         (('by=("speed",)', 'by=("pace",)'), "'pace' is no axis: there are speed, move"),
         (('"shaped_peak_m_s2")', '"peak")'), "'peak' is no measure"),
-        (('"zv", "auto"', '"zvv"'), "KeyError: 'zvv'"),
+        (('"zv", "auto"', '"zvv"'), "there is no method 'zvv', did you mean 'zv'"),
+        (("0.5, 1.0", "1, 'fast'"), "TypeError"),
+        (('"move": number', '"status": number'), "axis 'status' has the name of another column"),
+        (
+            ('"move": number', '"move": number if number else "none"'),
+            "axis 'move' has values of the types int, str",
+        ),
+        (("1.5 * speed", "-1.5 * speed"), "has the velocity limit -0.75: must be a positive number"),
+        (
+            ('show=("unshaped_peak_m_s2", "shaped_peak_m_s2")', 'show=("delay_ms")'),
+            "show is 'delay_ms': must be a tuple",
+        ),
+        (('"unshaped_peak_m_s2", "shaped_peak_m_s2"', ""), "show is empty"),
+        (("robot = load", "raise SystemExit(3)\nrobot = load"), "running it raises SystemExit"),
     ],
 )
 def test_what_is_wrong_with_a_study_is_a_sentence(tmp_path, change, words):

@@ -2,11 +2,8 @@ import pytest
 
 from tvist_shaping import SHAPERS, UnknownShaperError, shaper
 
-NAMES = "none zv zvd zvdd zvddd mzv ei ei2 ei3 ei_exact ei2_exact ei3_exact si um_zv um_zvd"
-
 
 def test_a_shaper_is_found_by_its_name():
-    assert set(NAMES.split()) == set(SHAPERS)
     for name in SHAPERS:
         assert shaper(name).name == name
 

@@ -58,7 +58,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Number of processes that the robots are spread over, behind the same endpoint; each further one uses one more
     core. If one dies, all end, with exit code 1."""
     listen: tuple[str, ...] | None = None
-    """Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447; none with --connect]."""
+    """Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447; none if the robot connects to a router]."""
     connect: tuple[str, ...] = ()
     """Endpoint of a router through which clients reach the robot, repeatable: the robot uses the first that answers. If
     none does within 10 s, the command fails; a router that is lost later is looked for again."""

@@ -99,7 +99,7 @@ def evaluate(
     from tvist_lab.study.work import Job
     from tvist_plant.description import DescriptionError, load
 
-    look.check(figures)
+    look.check(figures, save_moves, report)
     _check(moves, random, seed, modes, frequency_error, wrists=wrists)
     _check_conditions(limits, payload_error, stiffness_error)
     length = _stroke(stroke, moves)

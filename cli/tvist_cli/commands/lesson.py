@@ -46,7 +46,7 @@ def lesson(
         insecure: Serve the page to other machines.
         json: Print one JSON object.
     """
-    look.check(figures)
+    look.check(figures, markdown)
     if not (numbers or json or figures is not None or markdown is not None):
         serve_page(_show, (address, port), "tvist lesson", insecure=insecure)
         return

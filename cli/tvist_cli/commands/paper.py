@@ -39,7 +39,7 @@ def paper(
         markdown: File to write a page to, with all tables and the source of each figure.
         json: Print one JSON object.
     """
-    look.check(figures)
+    look.check(figures, markdown)
     if runs < 1:
         raise Failure(f"runs is {runs}: must be at least 1", code=2)
     from tvist_lab.in_process import free_setup, robot_in_process

@@ -67,7 +67,7 @@ def shaperbench(
     from tvist_lab.study.arms import ARMS
     from tvist_plant.description import load
 
-    look.check(figures)
+    look.check(figures, output, markdown, report)
     count = moves if moves is not None else QUICK if quick else MOVES
     if not 1 <= count <= 10_000:
         raise Failure(f"moves is {count}: must be 1 to 10000", code=2)

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from tvist_shaping import Impulses
     from tvist_shaping.named import AnyShaper
 
+F_D = 10.0
+"""Damped frequency of the mode in the list [Hz]."""
 ERRORS = (-40.0, 60.0)
 """Range of the errors of --sensitivity [%]."""
 BANDS = {"5": 0.05, "10": 0.1}
@@ -26,7 +28,7 @@ TOUCHING = 1.0 + 1e-4
 
 def shapers(
     *,
-    f_d: float = 10.0,
+    f_d: float = F_D,
     zeta: float = 0.0,
     shaper: list[str] | None = None,
     sensitivity: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
@@ -44,17 +46,19 @@ def shapers(
         shaper: FILE.py:NAME, repeatable: run that file and list the shaper in it, too.
         sensitivity: Instead of the list, compute what these shapers, names or FILE.py:NAME, leave of the vibration
             of a mode whose frequency they assume wrongly [zv zvd ei].
-        errors: With --sensitivity, lowest and highest percentage by which the assumed frequency is too high [-40 60].
+        errors: With --sensitivity, lowest and highest percentage by which the assumed frequency is too high.
         output: With --sensitivity, JSON file to write the curves to.
         figures: Folder to write figures to: residual vibration for a wrong frequency, settling time against delay, and
             the effects of a varying mean delay and of elastic feed-forward; with --sensitivity, the curves.
         look: How to write the figures.
         json: Print one JSON object.
     """
-    look.check(figures)
+    look.check(figures, output)
     if sensitivity is None and (output is not None or errors != ERRORS):
         raise Failure("--errors and --output are for --sensitivity: give it, or leave them out", code=2)
     if sensitivity is not None:
+        if f_d != F_D:
+            raise Failure("--sensitivity is relative to any frequency: leave --f-d out", code=2)
         if shaper:
             raise Failure("--sensitivity names its shapers itself: leave --shaper out", code=2)
         print_sensitivity(sensitivity, zeta, errors, output, figures, look, json=json)

@@ -5,6 +5,7 @@ A shaper of the shaping library needs no row: without one, it stands in all menu
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal
 
@@ -164,9 +165,13 @@ def some(
         calibration: Source of the estimates.
 
     Raises:
-        KeyError: There is no method of a name.
+        KeyError: There is no method of a name; the message lists all and the most similar one.
     """
     recipe, known = Recipe("zv", calibration), {row.name: row for row in rows()}
+    for name in wanted:
+        if name not in known:
+            like = "".join(f", did you mean {near!r}?" for near in get_close_matches(name, known, 1))
+            raise KeyError(f"there is no method {name!r}{like} There are {', '.join(known)}")
     return tuple(made(known[name], recipe, description) for name in wanted)
 
 

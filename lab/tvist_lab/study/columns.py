@@ -42,9 +42,20 @@ def columns_of(axes: Sequence[Column], measures: Iterable[str]) -> tuple[Column,
     )  # fmt: skip
 
 
-def column_of(name: str, value: object) -> Column:
-    """Return the column of an axis by one of its values."""
-    return Column(name, _KINDS.get(type(value), pl.String), "", "")
+def column_of(name: str, values: Iterable[object]) -> Column:
+    """Return the column of an axis by its values, whole numbers and others among them as the others.
+
+    Raises:
+        ValueError: Its values have different types.
+    """
+    kinds = {type(value) for value in values}
+    if kinds == {int, float}:
+        kinds = {float}
+    if len(kinds) > 1:
+        raise ValueError(
+            f"axis {name!r} has values of the types {', '.join(sorted(kind.__name__ for kind in kinds))}"
+        )
+    return Column(name, _KINDS.get(kinds.pop(), pl.String), "", "")
 
 
 def schema_of(columns: Iterable[Column]) -> Schema:

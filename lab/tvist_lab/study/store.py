@@ -48,7 +48,7 @@ class Store:
         self._parts = folder / PARTS
         manifest = folder / MANIFEST
         if not manifest.exists() and folder.is_dir() and any(folder.iterdir()):
-            raise StoreError(f"{folder} exists already and holds no sweep: give another --output")
+            raise StoreError(f"{folder} exists already and holds no study: give another --output")
         try:
             self._parts.mkdir(parents=True, exist_ok=True)
             self._lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -102,7 +102,7 @@ class Store:
             return pl.read_parquet(file.read_bytes(), schema=self._schema)
         except (pl.exceptions.PolarsError, OSError) as error:
             raise StoreError(
-                f"{file} cannot be read as rows of a sweep: remove it to run them again"
+                f"{file} cannot be read as rows of a study: remove it to run them again"
             ) from error
 
     def done(self, rows: int) -> set[int]:
@@ -141,12 +141,12 @@ def _check_same(folder: Path, manifest: Path, identity: dict[str, Any]) -> None:
     try:
         held = msgspec.json.decode(manifest.read_bytes(), type=dict[str, Any])
     except (OSError, msgspec.DecodeError) as error:
-        raise StoreError(f"{manifest} cannot be read as what a sweep is of: give another --output") from error
+        raise StoreError(f"{manifest} cannot be read as what a study is of: give another --output") from error
     wanted = msgspec.json.decode(msgspec.json.encode(identity))
     changed = [name for name in dict.fromkeys((*wanted, *held)) if wanted.get(name) != held.get(name)]
     if changed:
         raise StoreError(
-            f"{folder} holds a sweep with other {', '.join(changed)}: give another --output, or remove the folder"
+            f"{folder} holds a study with other {', '.join(changed)}: give another --output, or remove the folder"
         )
 
 

@@ -61,7 +61,7 @@ class Study:
     @property
     def columns(self) -> tuple[Column, ...]:
         """The columns of its rows."""
-        axes = [column_of(name, value) for name, value in self.cases[0].axes.items()]
+        axes = [column_of(name, [case.axes[name] for case in self.cases]) for name in self.cases[0].axes]
         names = (Column("shaper", pl.String, "", "the method"), Column("arm", pl.String, "", "the arm"))
         return columns_of((*axes, *names), self.measured)
 
@@ -75,14 +75,29 @@ class Study:
             raise StudyError("it needs a case and a method at least")
         for place, case in enumerate(self.cases):
             self._check_case(f"cases[{place}]", case)
+        for what, names in (("show", self.show), ("measures", self.measures), ("by", self.by)):
+            if isinstance(names, str):
+                raise StudyError(f"{what} is {names!r}: must be a tuple of names, ({names!r},)")
+        if not self.show:
+            raise StudyError("show is empty: must name a measure at least")
+        taken = {"row", "shaper", "arm", "status", "error", *self.measured}.intersection(self.cases[0].axes)
+        if taken:
+            raise StudyError(f"axis {min(taken)!r} has the name of another column: give it another one")
         _check_known(self.measured, MEASURES, "measure")
         _check_known(self.by, self.cases[0].axes, "axis")
         _check_alone([method.name for method in self.methods], "methods")
+        try:
+            _ = self.columns
+        except ValueError as error:
+            raise StudyError(str(error)) from error
 
     def _check_case(self, place: str, case: Case) -> None:
         first = self.cases[0]
         if set(case.axes) != set(first.axes):
             raise StudyError(f"{place} has the axes {sorted(case.axes)}: all need the same")
+        for limit, value in vars(case.limits).items():
+            if not (isinstance(value, int | float) and value > 0.0):
+                raise StudyError(f"{place} has the {limit} limit {value!r}: must be a positive number")
         if len(case.arms) != len(first.arms):
             raise StudyError(f"{place} has {counted(len(case.arms), 'arm')}: all need as many")
         _check_alone([arm.name for arm in case.arms], f"arms of {place}")
@@ -154,7 +169,7 @@ def read_study(path: Path) -> Study:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise StudyError(f"study {path}: running it raises {named(error)}") from error
     found = getattr(module, "STUDY", None)
     if not isinstance(found, Study):

@@ -56,6 +56,7 @@ def file(
     from tvist_lab.study.study import StudyError, read_study
 
     folder = studying.folder_of(file, output, processes, scheduler, look)
+    look.check(folder, markdown, report)
     with told(StudyError, OSError):
         study = read_study(file)
     ran, elapsed = studying.run(study.plan(), folder, processes, scheduler)

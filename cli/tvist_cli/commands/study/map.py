@@ -47,7 +47,7 @@ def map(  # noqa: A001  the command's name
     from tvist_plant.description import DescriptionError, load
     from tvist_shaping import ShapingError
 
-    look.check(figures)
+    look.check(figures, output)
     if not 3 <= points <= 501:
         raise Failure(f"points is {points}: must be 3 to 501", code=2)
     with told(DescriptionError, code=2):

@@ -47,7 +47,7 @@ def paths(
     Args:
         random: Number of paths.
         kind: Draw only paths of this kind: line, arc or blends [all].
-        shapers: Names of the shapers to compare [zv mzv zvd ei auto auto-target short].
+        shapers: Names of the shapers to compare [those of the catalogue's menu paths, see tvist shapers].
         payload: Mass of the disc on the flange in kg, both carried and declared; uniform draws one for each path, from
             0 to the arm's rating.
         calibration: Name of a calibration that comes with the package, or path of a calibration file.
@@ -65,7 +65,7 @@ def paths(
     from tvist_lab.studies.random_paths import KINDS
     from tvist_plant.description import load
 
-    look.check(figures)
+    look.check(figures, markdown)
     _check(random, seed)
     description, known = load(ROBOT), _calibration(calibration)
     masses = masses_of(payload, description)

@@ -49,7 +49,7 @@ def robustness(
     from tvist_lab.study.shaping import ShaperFaultError
     from tvist_plant.description import load
 
-    look.check(figures)
+    look.check(figures, output, markdown)
     if not 1 <= moves <= 10_000:
         raise Failure(f"moves is {moves}: must be 1 to 10000", code=2)
     if not 0 <= seed < 2**62:
