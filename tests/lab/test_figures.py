@@ -145,13 +145,6 @@ def test_the_overview_says_by_its_own_curves_whether_the_tool_shakes_less_and_re
     assert rest.endswith(f"{gained} with shaping")
 
 
-def test_a_saved_figure_is_an_equal_file_each_time_and_makes_its_folder(figures, tmp_path):
-    files = [figures.save(figures.figure_4(), tmp_path / name / "figure_4.png") for name in ("a", "b")]
-    first, second = (file.read_bytes() for file in files)
-    assert first == second
-    assert first.startswith(b"\x89PNG")
-
-
 @pytest.mark.parametrize("zeta", [0.0, 0.34])
 def test_the_figure_of_the_catalogue_shows_every_shaper_that_is_for_the_damping(figures, zeta):
     mine = custom("mine", [0.5, 0.5], [0.0, 0.5])
