@@ -3,7 +3,6 @@
 import json
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -55,13 +54,13 @@ def make(drawn, one_motion, ring, found):
         return recording, motions(recording)[0]
 
     def judged(count, *, counts=True):
-        shaken = SimpleNamespace(peak=0.4)
-        left = [SimpleNamespace(peak=0.01 * (1 + place)) for place in range(count)]
         return [
-            SimpleNamespace(
-                counts=counts, unshaped=shaken, shaped=one, reduction=lambda one: 100.0 - one.peak
-            )
-            for one in left
+            {
+                "unshaped_peak_m_s2": 0.4,
+                "shaped_peak_m_s2": 0.01 * place,
+                "reduction_percent": 100.0 - place if counts else None,
+            }
+            for place in range(1, count + 1)
         ]
 
     def paths():

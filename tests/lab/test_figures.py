@@ -1,13 +1,11 @@
 """The figures show the numbers they stand for."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from tvist_cli.commands.evaluate import _example
 from tvist_lab.metrics import motions
 from tvist_lab.metrics.residual import residual as measured
+from tvist_lab.studies.evaluate import example
 from tvist_shaping import SHAPERS, custom, residual
 
 TICKS = 1500
@@ -109,10 +107,10 @@ def test_the_band_of_repeatability_has_its_number(figures, recorded):
 def test_the_example_is_the_middle_one_of_the_moves_that_count(counts, drawn):
     peaks = [0.5, 0.1, 0.3, 0.4] if any(counts) else [0.01, 0.04, 0.03, 0.02]
     judged = [
-        SimpleNamespace(counts=one, unshaped=SimpleNamespace(peak=peak))
+        [{"reduction_percent": 90.0 if one else None, "unshaped_peak_m_s2": peak}]
         for one, peak in zip(counts, peaks, strict=True)
     ]
-    assert _example(judged) == drawn
+    assert example(judged) == drawn
 
 
 @pytest.fixture
