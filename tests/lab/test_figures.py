@@ -20,26 +20,6 @@ def figures():
     return tvist_lab.figures
 
 
-@pytest.fixture
-def recorded(one_motion, ring):
-    """The same motion without and with shaping."""
-
-    def make(shaped_ticks, amplitude):
-        position = np.zeros((TICKS, 3))
-        position[:, 0] = np.interp(np.arange(TICKS), [100, 540], [0.5, 0.0])
-        qdd = np.zeros((TICKS, 6))
-        qdd[101:200, 0], qdd[101:200, 1:3] = 2.0, 1.0
-        recording = one_motion(
-            shaped_ticks,
-            alpha=ring(TICKS, 501 + shaped_ticks, 10.0, 0.1, amplitude),
-            position=position,
-            target_qdd=qdd,
-        )
-        return recording, motions(recording)[0]
-
-    return make(0, 1.0), make(37, 0.1)
-
-
 def texts(panel):
     return [text.get_text() for text in panel.texts]
 

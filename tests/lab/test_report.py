@@ -91,7 +91,7 @@ def test_what_was_not_measured_decides_nothing():
 
 
 def test_a_name_that_reads_like_a_formula_is_written_as_it_is(tmp_path):
-    named = [SyntheticLog().csv(tmp_path / name) for name in (r"_$\frac{$.csv", "100% & $x_.csv")]
+    named = [SyntheticLog(motions=1).csv(tmp_path / name) for name in (r"_$\frac{$.csv", "100% & $x_.csv")]
     text = render(recordings_page(named, "tvist log report"))
     assert r"_$\frac{$.csv" in text
     assert "100% &amp; $x_.csv" in text
@@ -100,7 +100,7 @@ def test_a_name_that_reads_like_a_formula_is_written_as_it_is(tmp_path):
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    hostile = SyntheticLog().csv(folder / "<script>alert(1)</script>&.csv".replace("/", "_"))
+    hostile = SyntheticLog(motions=1).csv(folder / "<script>alert(1)</script>&.csv".replace("/", "_"))
     return render(recordings_page([hostile, JOURNAL], "tvist log report"))
 
 
@@ -114,7 +114,7 @@ def test_the_page_is_valid_and_small_and_loads_nothing(page):
 
 
 def test_the_same_files_give_the_same_page(page, tmp_path):
-    again = SyntheticLog().csv(tmp_path / "<script>alert(1)</script>&.csv".replace("/", "_"))
+    again = SyntheticLog(motions=1).csv(tmp_path / "<script>alert(1)</script>&.csv".replace("/", "_"))
     other = render(recordings_page([again, JOURNAL], "tvist log report"))
     assert re.sub(r"<dt>File</dt>\n<dd>.*", "", other) == re.sub(r"<dt>File</dt>\n<dd>.*", "", page)
 
