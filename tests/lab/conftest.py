@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tvist_lab.metrics import motions
 from tvist_lab.recordings import STATE_COLUMNS, Recording
 
 PERIOD = 0.002
@@ -16,7 +17,7 @@ def straight_step(ticks, start, stop, stroke):
     return stroke * np.clip((np.arange(ticks) - start) / (stop - start), 0.0, 1.0)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_recording():
     """Build a recording from arrays; what is not given rests."""
 
@@ -62,7 +63,7 @@ def make_recording():
     return make
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def one_motion(make_recording):
     """A motion of one joint from tick 100 to 500, published a tick later and shaped by so many ticks more."""
 
@@ -85,7 +86,7 @@ def event():
     return make
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def ring():
     """A damped sine on given axes from a tick on, zero before."""
 
@@ -96,3 +97,20 @@ def ring():
         return amplitude * wave[:, None] * (np.array(axis) / np.linalg.norm(axis))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def recorded(one_motion, ring):
+    """The same motion without and with shaping."""
+    ticks = 1500
+
+    def make(shaped_ticks, amplitude):
+        position = np.zeros((ticks, 3))
+        position[:, 0] = np.interp(np.arange(ticks), [100, 540], [0.5, 0.0])
+        qdd = np.zeros((ticks, 6))
+        qdd[101:200, 0], qdd[101:200, 1:3] = 2.0, 1.0
+        rung = ring(ticks, 501 + shaped_ticks, 10.0, 0.1, amplitude)
+        recording = one_motion(shaped_ticks, alpha=rung, truth=rung, position=position, target_qdd=qdd)
+        return recording, motions(recording)[0]
+
+    return make(0, 1.0), make(37, 0.1)

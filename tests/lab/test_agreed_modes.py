@@ -23,7 +23,7 @@ def rung(random, modes, rate, correlation):
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
-@pytest.mark.parametrize("count", [24, pytest.param(200, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("count", [10, pytest.param(200, marks=pytest.mark.nightly)])
 def test_two_modes_near_each_other_are_inside_their_intervals(count, correlation, measured):
     inside, found = [], 0
     for seed in range(count):

@@ -40,7 +40,7 @@ def test_every_table_of_numbers_has_an_origin():
 def test_three_arms_are_stilled_by_auto_out_of_the_box(tmp_path):
     """By the command that the reference page names, with fewer moves."""
     page = tmp_path / "robots.md"
-    command = ("robots", "ur3e", "ur10e", "ur20", "--measure", "--random", "10", "--json", "--markdown", page)
+    command = ("robots", "ur3e", "ur10e", "ur20", "--measure", "--random", "4", "--json", "--markdown", page)
     ended = finished("-m", "tvist_cli", *command)
     assert ended.returncode == 0, ended.stderr
     for one in json.loads(ended.stdout)["robots"]:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tvist_controller.api.line import load_calibration
-from tvist_lab.metrics import motions
 from tvist_lab.studies.workspace_map import WorkspaceMap
 from tvist_shaping import SHAPERS
 
@@ -39,19 +38,10 @@ def found():
     return WorkspaceMap((1, 2), ("shoulder", "elbow"), (angles, angles), (0.0,) * 6, told, true)
 
 
-@pytest.fixture
-def make(drawn, one_motion, ring, found):
+@pytest.fixture(scope="module")
+def make(drawn, recorded, found):
     """Make a figure by its name, from small data."""
     from tvist_lab.figures.compared import compared_figure
-
-    def recorded(shaped_ticks, amplitude):
-        position = np.zeros((TICKS, 3))
-        position[:, 0] = np.interp(np.arange(TICKS), [100, 540], [0.5, 0.0])
-        qdd = np.zeros((TICKS, 6))
-        qdd[101:200, 0], qdd[101:200, 1:3] = 2.0, 1.0
-        rung = ring(TICKS, 501 + shaped_ticks, 10.0, 0.1, amplitude)
-        recording = one_motion(shaped_ticks, alpha=rung, truth=rung, position=position, target_qdd=qdd)
-        return recording, motions(recording)[0]
 
     def judged(count, *, counts=True):
         return [
@@ -80,7 +70,6 @@ def make(drawn, one_motion, ring, found):
     calibration = load_calibration("ur5e_5kg")
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 6))
     f_d, zeta = np.linspace(7.0, 9.0, 5), np.linspace(0.2, 0.3, 5)
-    pair = recorded(0, 1.0), recorded(37, 0.1)
     known = SHAPERS.values()
     makers = {
         "figure_1": drawn.figure_1,
@@ -88,12 +77,12 @@ def make(drawn, one_motion, ring, found):
         "figure_4": drawn.figure_4,
         "figure_7": drawn.figure_7,
         "figure_8": drawn.figure_8,
-        "figure_12": lambda: drawn.motion_figure("Q1-Q2", *pair),
-        "observed": lambda: drawn.observed_figure("motion 1", pair[0]),
-        "figure_15": lambda: drawn.figure_15("Q1-Q2", *pair),
-        "figure_16": lambda: drawn.figure_16({"Q1-Q2": pair}),
-        "after_stop": lambda: drawn.after_stop_figure(*pair, "Q1-Q2"),
-        "ring_down": lambda: drawn.ring_down_figure("Q1-Q2", pair[0]),
+        "figure_12": lambda: drawn.motion_figure("Q1-Q2", *recorded),
+        "observed": lambda: drawn.observed_figure("motion 1", recorded[0]),
+        "figure_15": lambda: drawn.figure_15("Q1-Q2", *recorded),
+        "figure_16": lambda: drawn.figure_16({"Q1-Q2": recorded}),
+        "after_stop": lambda: drawn.after_stop_figure(*recorded, "Q1-Q2"),
+        "ring_down": lambda: drawn.ring_down_figure("Q1-Q2", recorded[0]),
         "catalogue": lambda: drawn.catalogue_figure(known),
         "sensitivity": lambda: drawn.sensitivity_figure([SHAPERS["zv"]], 0.0, np.linspace(-0.4, 0.6, 51)),
         "settling_against_delay": lambda: drawn.settling_against_delay_figure(known, 10.0, 0.1),
@@ -103,12 +92,12 @@ def make(drawn, one_motion, ring, found):
         "settling": lambda: drawn.settling_figure(leaderboard("leaderboard")),
         "robustness": lambda: drawn.robustness_figure(leaderboard("robustness")),
         "moves": lambda: drawn.residual_by_move_figure(judged(4)),
-        "one_move": lambda: drawn.vibration_figure(pair[0][0], pair[1][0], 3),
+        "one_move": lambda: drawn.vibration_figure(recorded[0][0], recorded[1][0], 3),
         "paths": lambda: drawn.path_shaping_figure(paths()),
         "identified": lambda: drawn.identified_figure(calibration, q, f_d, zeta, f_d, zeta),
         "map": lambda: drawn.workspace_map_figure(found, "f_d_hz", "an arm", 1),
         "map over two columns": lambda: drawn.workspace_map_figure(found, "zeta", "an arm", 2),
-        "compared": lambda: compared_figure("motion 1", [("one", pair[0]), ("other", pair[1])]),
+        "compared": lambda: compared_figure("motion 1", [("one", recorded[0]), ("other", recorded[1])]),
         "sweep": lambda: drawn.sweep_figure(entries(), ["5 kg", "1 kg"] * 2),
         "no move that counts": lambda: drawn.residual_by_move_figure(judged(2, counts=False)),
     }

@@ -20,26 +20,6 @@ def figures():
     return tvist_lab.figures
 
 
-@pytest.fixture
-def recorded(one_motion, ring):
-    """The same motion without and with shaping."""
-
-    def make(shaped_ticks, amplitude):
-        position = np.zeros((TICKS, 3))
-        position[:, 0] = np.interp(np.arange(TICKS), [100, 540], [0.5, 0.0])
-        qdd = np.zeros((TICKS, 6))
-        qdd[101:200, 0], qdd[101:200, 1:3] = 2.0, 1.0
-        recording = one_motion(
-            shaped_ticks,
-            alpha=ring(TICKS, 501 + shaped_ticks, 10.0, 0.1, amplitude),
-            position=position,
-            target_qdd=qdd,
-        )
-        return recording, motions(recording)[0]
-
-    return make(0, 1.0), make(37, 0.1)
-
-
 def texts(panel):
     return [text.get_text() for text in panel.texts]
 
@@ -141,13 +121,6 @@ def test_the_overview_says_by_its_own_curves_whether_the_tool_shakes_less_and_re
     assert without == f"without shaping: {before:.2f} m/s²"
     assert with_shaping == f"with shaping: {after:.2f} m/s², {100 * abs(after / before - 1):.0f} % {changed}"
     assert rest.endswith(f"{gained} with shaping")
-
-
-def test_a_saved_figure_is_an_equal_file_each_time_and_makes_its_folder(figures, tmp_path):
-    files = [figures.save(figures.figure_4(), tmp_path / name / "figure_4.png") for name in ("a", "b")]
-    first, second = (file.read_bytes() for file in files)
-    assert first == second
-    assert first.startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("zeta", [0.0, 0.34])

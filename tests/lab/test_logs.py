@@ -38,8 +38,7 @@ FORMATS = {
 }
 
 
-@pytest.mark.parametrize("form", FORMATS)
-@pytest.mark.parametrize("lag", [0.0, 0.025])
+@pytest.mark.parametrize(("form", "lag"), [("commas", 0.0), *((form, 0.025) for form in FORMATS)])
 def test_motions_and_modes_are_found_in_every_format_by_the_logs_own_clock(tmp_path, form, lag):
     log = SyntheticLog(lag=lag)
     results = analyze(read(FORMATS[form](log, tmp_path)))
@@ -50,7 +49,7 @@ def test_motions_and_modes_are_found_in_every_format_by_the_logs_own_clock(tmp_p
     assert [result.residual_vibration_m_s2 for result in results] == pytest.approx([1.0, 1.0], rel=0.15)
 
 
-@pytest.mark.parametrize("rate", [100.0, 125.0, 250.0, 500.0])
+@pytest.mark.parametrize("rate", [100.0, 125.0])
 def test_slow_logs_are_measured_too(tmp_path, rate):
     log = SyntheticLog(rate=rate, lag=0.025)
     assert [within(result) for result in analyze(read(log.csv(tmp_path / "log.csv")))] == [True, True]
@@ -91,8 +90,10 @@ def test_what_a_log_lacks_is_null_with_a_reason_and_the_rest_is_measured(tmp_pat
     assert blind.cycle_ms is not None
 
 
-@pytest.mark.parametrize("lag", [0.0, 0.012, 0.025, 0.04])
-@pytest.mark.parametrize("mode", [(9.0, 0.12, 1.0), (7.0, 0.3, 1.5)])
+@pytest.mark.parametrize(
+    ("lag", "mode"),
+    [(0.0, MODE), (0.012, (7.0, 0.3, 1.5)), (0.025, MODE), (0.04, (7.0, 0.3, 1.5))],
+)
 def test_without_measured_angles_the_lag_shows_in_the_accelerometer(tmp_path, lag, mode):
     log = SyntheticLog(lag=lag, modes=(mode,)).without("actual_q")
     results = analyze(read(log.csv(tmp_path / "log.csv")))
@@ -106,7 +107,7 @@ def test_of_two_modes_the_strongest_at_the_stop_counts(tmp_path):
 
 
 def test_a_rotated_tool_changes_no_figure_since_gravity_is_what_the_sensor_shows_at_rest(tmp_path):
-    log = SyntheticLog()
+    log = SyntheticLog(motions=1)
     before = analyze(read(log.csv(tmp_path / "log.csv")))
     log.columns["actual_TCP_pose"][:, 3:] = [0.3, -1.0, 2.0]
     after = analyze(read(log.csv(tmp_path / "other.csv")))
@@ -199,12 +200,15 @@ REFUSED = {
     "only a header": (broken(lambda lines: lines[:1]), "no rows"),
     "time in days": (
         broken(
-            lambda lines: [
-                lines[0],
-                *(f"{5e9 * n},{line.split(',', 1)[1]}" for n, line in enumerate(lines[1:])),
-            ]
+            lambda lines: (
+                lines[:1] + [f"{5e9 * n},{line.split(',', 1)[1]}" for n, line in enumerate(lines[1:])]
+            )
         ),
         "it must be in seconds",
+    ),
+    "a number that no robot has": (
+        broken(lambda lines: with_cell(lines, "1e300")),
+        r"line 301, column target_q_3: 1e\+300",
     ),
     "one row": (broken(lambda lines: lines[:2]), "1 row"),
     "decimal commas": (broken(lambda lines: [line.replace(".", ",") for line in lines]), "decimal comma"),
@@ -243,21 +247,19 @@ def test_missing_files_and_folders_without_a_bag_are_refused(tmp_path):
         read(tmp_path)
 
 
-def compared(first, second):
-    return compare(Measured.of(first), Measured.of(second))
-
-
 def test_motions_that_correspond_are_compared_and_others_are_said(tmp_path):
-    loud, quiet = SyntheticLog(), SyntheticLog(modes=((9.0, 0.12, 0.25),), seed=2)
-    both = compared(read(loud.csv(tmp_path / "a.csv")), read(quiet.csv(tmp_path / "b.csv", " ")))
+    def measured_of(log):
+        return Measured.of(read(log.csv(tmp_path / "log.csv")))
+
+    loud = measured_of(SyntheticLog())
+    both = compare(loud, measured_of(SyntheticLog(modes=((9.0, 0.12, 0.25),), seed=2)))
     assert [(motion.a, motion.b) for motion in both.motions] == [(1, 1), (2, 2)]
     for motion in both.motions:
         assert motion.impact_percent["residual_vibration"] == pytest.approx(-75.0, abs=8.0)
-    one = SyntheticLog(motions=1)
-    short = compared(read(loud.csv(tmp_path / "a.csv")), read(one.csv(tmp_path / "c.csv")))
+    short = compare(loud, measured_of(SyntheticLog(motions=1)))
     assert [(motion.a, motion.b) for motion in short.motions] == [(1, 1)]
     assert (short.only_in_a, short.only_in_b) == ((2,), ())
-    seven = compared(read(tmp_path / "a.csv"), read(SyntheticLog(joints=7).csv(tmp_path / "d.csv")))
+    seven = compare(loud, measured_of(SyntheticLog(joints=7)))
     assert (seven.motions, seven.only_in_a, seven.only_in_b) == ((), (1, 2), (1, 2))
 
 
@@ -267,12 +269,13 @@ def test_a_log_at_rest_has_no_motion(tmp_path):
 
 
 @pytest.mark.parametrize("form", ["commas", "packets of 1116 bytes", "bag"])
-def test_damaged_files_are_measured_or_refused_and_never_end_in_another_error(tmp_path, form):
+@pytest.mark.parametrize("count", [8, pytest.param(200, marks=pytest.mark.nightly)])
+def test_damaged_files_are_measured_or_refused_and_never_end_in_another_error(tmp_path, form, count):
     log = SyntheticLog(motions=1, rest=0.8, rate=100.0)
     good = log.rosbag(tmp_path / "bag") / "bag.mcap" if form == "bag" else FORMATS[form](log, tmp_path)
     content = good.read_bytes()
     path = tmp_path / f"damaged{good.suffix}"
-    for seed in range(40):
+    for seed in range(count):
         random = np.random.default_rng(seed)
         data = bytearray(content)
         first, past = sorted(random.integers(0, len(data), 2))
@@ -291,13 +294,6 @@ def test_damaged_files_are_measured_or_refused_and_never_end_in_another_error(tm
                 assert all(
                     value is not None or name in result.notes for name, value in result.as_dict().items()
                 )
-
-
-def test_numbers_that_no_robot_has_are_refused_with_line_and_column(tmp_path):
-    path, lines = lines_of(tmp_path)
-    path.write_text("\n".join(with_cell(lines, "1e300")) + "\n")
-    with pytest.raises(RecordingError, match=r"line 301, column target_q_3: 1e\+300"):
-        read(path)
 
 
 def test_a_packet_that_lost_bytes_is_left_out_and_the_next_ones_are_read(tmp_path):
@@ -324,7 +320,7 @@ def test_a_csv_may_be_packed_by_gzip_and_one_made_to_fill_the_memory_is_refused(
 
 
 def test_any_names_units_and_separators_are_read(tmp_path):
-    log = SyntheticLog(lag=0.025)
+    log = SyntheticLog(lag=0.025, motions=1)
     expected = analyze(read(log.csv(tmp_path / "log.csv")))
     one = {
         "t": 1e3 * log.columns["timestamp"],
@@ -378,15 +374,17 @@ def test_a_target_that_copies_the_measured_angles_at_rest_does_not_move_there(tm
 def test_three_modes_near_each_other_are_found_in_their_order(tmp_path):
     modes = ((12.0, 0.04, 1.0), (9.2, 0.025, 0.6), (15.0, 0.05, 0.4))
     for without in ((), ("target_q",)):
-        for result in analyze(read(SyntheticLog(modes=modes).without(*without).csv(tmp_path / "log.csv"))):
+        for result in analyze(
+            read(SyntheticLog(modes=modes, motions=1).without(*without).csv(tmp_path / "log.csv"))
+        ):
             assert [mode["f_d_hz"] for mode in result.modes] == pytest.approx([m[0] for m in modes], rel=0.02)
             assert [mode["zeta"] for mode in result.modes] == pytest.approx([m[1] for m in modes], rel=0.3)
             assert result.f_d_hz == result.modes[0]["f_d_hz"]
 
 
 def test_an_arm_that_still_rings_is_not_called_noise(tmp_path):
-    ringing = analyze(read(SyntheticLog(modes=((9.0, 0.01, 2.0),)).csv(tmp_path / "a.csv")))[0]
-    noisy = analyze(read(SyntheticLog(noise=0.2).csv(tmp_path / "b.csv")))[0]
+    ringing = analyze(read(SyntheticLog(modes=((9.0, 0.01, 2.0),), motions=1).csv(tmp_path / "a.csv")))[0]
+    noisy = analyze(read(SyntheticLog(noise=0.2, motions=1).csv(tmp_path / "b.csv")))[0]
     assert "still rang" in ringing.notes["still_after_ms"]
     assert "noise" in noisy.notes["still_after_ms"]
 

@@ -12,20 +12,10 @@ ARRAYS = ("reference_q", "target_q", "target_qd", "target_qdd", "target_moment",
 def state(tick, **fields):
     values = {name: [0.1 * tick] * 2 for name in (*ARRAYS, "actual_moment")}
     values |= {
-        "actual_TCP_pose": [0.0] * 6,
-        "actual_TCP_speed": [0.0] * 6,
-        "actual_tool_accelerometer": [0.0] * 3,
-        "estimated_f_d": [6.7],
-        "estimated_zeta": [0.34],
-    }
-    numbers = {
-        "robot_mode": 7,
-        "safety_mode": 1,
-        "runtime_state": 1,
-        "speed_scaling": 1.0,
-        "shaper_delay": 0.07,
-    }
-    values |= {**numbers, "missed_ticks": 0, "setpoint_sequence": None}
+        "actual_TCP_pose": [0.0] * 6, "actual_TCP_speed": [0.0] * 6, "actual_tool_accelerometer": [0.0] * 3,
+        "estimated_f_d": [6.7], "estimated_zeta": [0.34], "robot_mode": 7, "safety_mode": 1, "runtime_state": 1,
+        "speed_scaling": 1.0, "shaper_delay": 0.07, "missed_ticks": 0, "setpoint_sequence": None,
+    }  # fmt: skip
     return State(**{**values, "tick": tick, "timestamp": 0.002 * tick, **fields})
 
 

@@ -147,7 +147,7 @@ ANALYSED = {"modes": 2, "offset": True, "evidence": SIGNIFICANT}
 
 
 @pytest.mark.parametrize(
-    ("count", "least", "most"), [(60, 0.85, 1.0), pytest.param(500, 0.90, 0.99, marks=pytest.mark.nightly)]
+    ("count", "least", "most"), [(40, 0.85, 1.0), pytest.param(500, 0.90, 0.99, marks=pytest.mark.nightly)]
 )
 def test_the_intervals_contain_the_truth_as_often_as_they_say(count, least, most, measured):
     fits = draws(count, **ANALYSED)

@@ -13,7 +13,6 @@ from polars.testing import assert_frame_equal
 from tvist_controller import calibrations
 from tvist_lab.figures import study_figure
 from tvist_lab.runners import Failed, Processes, TaskError
-from tvist_lab.runners.cluster import Cluster
 from tvist_lab.study.arms import scattered
 from tvist_lab.study.axes import Axes, SweptRobot
 from tvist_lab.study.case import Case, arm_seed
@@ -383,12 +382,12 @@ class Locked(Axes):
 
 def test_a_task_that_cannot_be_pickled_and_one_that_fails_name_their_moves_and_the_others_go_on(tmp_path):
     tasks = tasks_of(tmp_path, "shapers = ['none']\nmoves = 4\npayloads = [5]")
-    bad = run(Locked(tasks.spec, tasks.robots), tmp_path / "x", Cluster(processes=2), quietly).rows
+    bad = run(Locked(tasks.spec, tasks.robots), tmp_path / "x", Processes(few=2, chunk=1), quietly).rows
     assert bad["status"].to_list() == ["measured", "failed", "failed", "measured"]
     assert bad["move"].to_list() == [1, 2, 3, 4]
     assert "cannot be pickled" in bad["error"][1]
     assert bad["error"][2].startswith(("ValueError", "IndexError"))
-    good = run(tasks, tmp_path / "x", Cluster(processes=2), quietly)
+    good = run(tasks, tmp_path / "x", Processes(), quietly)
     assert good.resumed == 2
     rows = [{"row": place} | row for place, task in enumerate(tasks) for row in measure_each(task)]
     assert_frame_equal(good.rows, frame(rows, SCHEMA))

@@ -20,8 +20,8 @@ def run(runs: int, seed: int, *, baselines: bool) -> Experiment:
 
 @pytest.fixture(scope="session")
 def done() -> Experiment:
-    """Three runs of each motion with a seed that nothing was tuned with."""
-    return run(3, 77, baselines=False)
+    """Two runs of each motion with a seed that nothing was tuned with."""
+    return run(2, 77, baselines=False)
 
 
 @pytest.fixture(scope="session")

@@ -75,14 +75,8 @@ def test_the_baselines_are_judged_beside_it(with_baselines):
     result = as_dict(with_baselines)
     for methods in result["baselines"].values():
         assert set(methods) == {
-            "unshaped",
-            "shaped",
-            "equal_duration_double_s",
-            "zv_frozen_at_end",
-            "fixed_mzv",
-            "fixed_ei2",
-            "fixed_ei3",
-        }
+            "unshaped", "shaped", "equal_duration_double_s", "zv_frozen_at_end", "fixed_mzv", "fixed_ei2", "fixed_ei3",
+        }  # fmt: skip
         assert all(row["still_after_ms"] is not None for row in methods.values())
 
 

@@ -22,12 +22,12 @@ UR5E = load("ur5e")
 SEVEN = str(Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf")
 
 
-@pytest.mark.parametrize("number", range(12))
+@pytest.mark.parametrize("number", range(2))  # `python -m proof search` tries them by the hundred
 def test_whatever_is_sent_the_promises_hold(number):
     sequences.Sequence(UR5E, number).run()
 
 
-@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("number", range(2))
 def test_whatever_programs_do_the_promises_hold(number):
     programs.ProgramSequence(UR5E, number).run()
 

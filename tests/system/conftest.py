@@ -1,6 +1,7 @@
 """Served robots, each a process of its own, and sessions with them."""
 
 import gc
+import signal
 import subprocess
 import sys
 
@@ -9,6 +10,8 @@ from tests import forked
 from tests.conformance.conftest import live, lockstep, realtime  # noqa: F401  fixtures
 from tests.conformance.served import PATIENCE
 from tests.conformance.wire import Wire
+
+from tvist_cli import main
 
 from .bystander import Bystander
 
@@ -47,3 +50,19 @@ def start():
         process.kill()
         process.wait(PATIENCE)
         process.stdout.close()
+
+
+@pytest.fixture
+def called(monkeypatch, capfd, tmp_path):
+    """Run the program in this process, as the console script does; its exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)  # this process keeps its own
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["tvist", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main.main()
+        out, err = capfd.readouterr()
+        return ended.value.code, out, err
+
+    return run

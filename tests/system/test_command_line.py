@@ -60,6 +60,12 @@ def tvist(*arguments, **options):
     return python("-m", "tvist_cli", *arguments, **options)
 
 
+def begun(*arguments):
+    """The program, which goes on until it is interrupted."""
+    words = [sys.executable, "-m", "tvist_cli", *map(str, arguments)]
+    return forked.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
 @pytest.fixture(scope="module")
 def slow():
     """A robot in real time, but ten times slower, so that no busy machine overloads it."""
@@ -71,12 +77,7 @@ def slow():
 def recorded(lockstep, tmp_path_factory):
     """A recording that `tvist log record` made of a motion, and what it said; in lockstep no state is lost."""
     path = tmp_path_factory.mktemp("recorded") / "seen.mcap"
-    process = forked.Popen(
-        [sys.executable, "-m", "tvist_cli", "log", "record", path, "--endpoint", lockstep.endpoint, "--json"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = begun("log", "record", path, "--endpoint", lockstep.endpoint, "--json")
     try:
         assert "recording ur5e into" in process.stderr.readline()
         assert tvist("move", NEAR, "--endpoint", lockstep.endpoint).code == 0
@@ -235,22 +236,7 @@ class TestRecordAndAnalyze:
         self, realtime, tmp_path
     ):
         path = tmp_path / "short.mcap"
-        process = forked.Popen(
-            [
-                sys.executable,
-                "-m",
-                "tvist_cli",
-                "log",
-                "record",
-                path,
-                "--endpoint",
-                realtime.endpoint,
-                "--seconds",
-                "600",
-            ],
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        process = begun("log", "record", path, "--endpoint", realtime.endpoint, "--seconds", 600)
         assert "recording" in process.stderr.readline()
         with Wire(realtime.endpoint) as wire:
             wire.until(wire.state()["tick"] + 50)
@@ -260,21 +246,17 @@ class TestRecordAndAnalyze:
         assert f"s recorded into {path}" in err.splitlines()[-1]
         tvist("log", "analyze", path, "--json").assert_done()
 
-    def test_analyze_measures_the_motion(self, recorded):
-        said = tvist("log", "analyze", recorded[0], "--json").assert_done().json
-        (motion,) = said["motions"]
+    def test_analyze_measures_the_motion_and_draws_a_figure_of_it(self, recorded, tmp_path):
+        given = (recorded[0], "--figures", tmp_path / "drawn", "--json")
+        (motion,) = tvist("log", "analyze", *given).assert_done().json["motions"]
         assert motion["residual_vibration_m_s2"] is not None
         assert 0.3 < motion["stop_s"] - motion["start_s"] < 3.0
+        assert {path.name for path in (tmp_path / "drawn").iterdir()} == {"motion_1.png", "ring_down_1.png"}
 
     def test_analyze_prints_a_table_for_people(self, recorded):
         said = tvist("log", "analyze", recorded[0]).assert_done().out
         assert "RV m/s²" in said
         assert not said.startswith("{")
-
-    def test_analyze_draws_a_figure_of_each_motion(self, recorded, tmp_path):
-        tvist("log", "analyze", recorded[0], "--figures", tmp_path / "drawn").assert_done()
-        drawn = {path.name for path in (tmp_path / "drawn").iterdir()}
-        assert drawn == {"motion_1.png", "ring_down_1.png"}
 
     def test_what_was_recorded_from_outside_cannot_be_replayed_and_says_why(self, recorded):
         tvist("log", "replay", recorded[0]).assert_failed(1, "serve --record")
@@ -321,12 +303,7 @@ class TestMoveAndWatch:
             tvist("move", NEAR, "--endpoint", realtime.endpoint).assert_done()
             wire.listen("state")
             far = "3.0,-3.1,0.1,-1.5,0.1,0.1"
-            process = forked.Popen(
-                [sys.executable, "-m", "tvist_cli", "move", far, "--endpoint", realtime.endpoint, "--json"],
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True,
-            )
+            process = begun("move", far, "--endpoint", realtime.endpoint, "--json")
             wire.wait("state", lambda state: state["target_qd"][0] > 0.3)
             process.send_signal(signal.SIGINT)
             out, err = process.communicate(timeout=PATIENCE)
@@ -405,12 +382,7 @@ class TestMoveAndWatch:
         assert {state["type"] for state in states} == {"state"}
 
     def test_watch_ends_well_at_control_c(self, realtime):
-        process = forked.Popen(
-            [sys.executable, "-m", "tvist_cli", "watch", realtime.endpoint, "--json"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        process = begun("watch", realtime.endpoint, "--json")
         assert process.stdout.readline()
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=PATIENCE)

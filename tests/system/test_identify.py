@@ -15,23 +15,6 @@ KEYS = {"configurations", "ring_downs", "error_f_d_percent", "error_zeta_percent
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (("--model", "springs"), "springs"),
-        (("--model", "modal", "--ring-downs", "0"), "ring-downs"),
-        (("--model", "modal", "--payloads", "heavy"), "payloads"),
-        (("--model", "modal", "--payloads", "2,2"), "payloads"),
-        (("--payload", "heavy"), "payload"),
-        (("--payload", "20"), "rating of 5 kg"),
-        (("--description", "nope"), "nope"),
-        (("--output", "nowhere/mine.json"), "output"),
-    ],
-)
-def test_misuse_is_exit_code_2_and_a_sentence_that_names_it(arguments, named):
-    assert tvist("identify", *arguments).assert_failed(2, named).out == ""
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
         (("--model", "modal", "--ring-downs", "3"), "at least 4"),
         (("--payload", "--poses", "2"), "at least 3"),
     ],

@@ -1,11 +1,8 @@
 """Several robots in one process: each is reached, moves, stops and is recorded by itself."""
 
-import subprocess
-import sys
-
 import pytest
 import zenoh
-from tests.conformance.served import PATIENCE, Served, free_endpoint
+from tests.conformance.served import Served
 from tests.conformance.wire import Q1, Wire
 
 from tvist_client.check import check
@@ -168,36 +165,6 @@ def test_an_operator_moves_each_and_a_viewer_none(secured, ring, robot):
 def test_a_stranger_sees_neither(secured):
     with pytest.raises(zenoh.ZError), Wire(secured.endpoint, "ur5e-1"):
         pass
-
-
-class TestMisuse:
-    @pytest.mark.parametrize(
-        ("robots", "named"),
-        [
-            ("ur5e*0", "ur5e*0"),
-            ("ur5e*x", "ur5e*x"),
-            ("nope*2", "nope"),
-            ("ur5e*65", "64"),
-        ],
-    )
-    def test_a_list_that_is_none_is_one_sentence_and_exit_code_2(self, robots, named):
-        self.refused("--robots", robots, named=named)
-
-    def test_a_name_beside_several_is_refused(self):
-        self.refused("--robots", "ur5e*2", "--name", "mine", named="robots and name exclude each other")
-
-    def test_a_file_with_both_is_refused(self, tmp_path):
-        path = tmp_path / "robot.toml"
-        path.write_text('robots = "ur5e*2"\nrobot = "ur5e"\n', encoding="utf-8")
-        self.refused("--config", str(path), named="robots and robot exclude each other")
-
-    @staticmethod
-    def refused(*options, named):
-        command = [sys.executable, "-m", "tvist_cli", "serve", "--listen", free_endpoint(), *options]
-        ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
-        assert ended.returncode == 2
-        assert ended.stderr.count("\n") == 1, ended.stderr
-        assert named in ended.stderr
 
 
 def test_a_file_names_several_robots(tmp_path):

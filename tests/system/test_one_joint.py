@@ -71,17 +71,9 @@ def test_it_is_identified_at_its_own_poses(tmp_path):
     assert calibration.provenance.arm == fingerprint(load("one-joint"))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "named"),
-    [
-        (("identify", "--robot", "one-joint", "--payload"), 1, "no joint of a one-joint arm carries weight"),
-        (("evaluate", "--robot", "one-joint", "--random", "1", "--wrists"), 2, "wrists"),
-        (("evaluate", "--robot", "one-joint", "--random", "1", "--shaper", "auto"), 2, "needs 4 modes"),
-        (("identify", "--robot", "one-joint", "--at", "Q4"), 2, "Q1, Q2, Q3"),
-    ],
-)
-def test_what_it_cannot_do_is_a_sentence(arguments, code, named):
-    assert tvist(*arguments).assert_failed(code, named).out == ""
+def test_what_it_carries_is_not_identified():
+    ended = tvist("identify", "--robot", "one-joint", "--payload")
+    assert ended.assert_failed(1, "no joint of a one-joint arm carries weight").out == ""
 
 
 def test_the_lesson_prints_its_numbers_and_draws_its_figure(tmp_path):

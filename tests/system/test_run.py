@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from tests.conformance.served import NOISE, PATIENCE, finished, free_endpoint
 from tests.conformance.wire import Wire
 from tests.places import own_address
+from tests.system.test_wrong_invocations import assert_said
 
 from tvist_lab.recordings.mcap_file import read
 from tvist_plant.description import load
@@ -160,14 +161,11 @@ class TestInLockstep:
         ],
         ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
     )
-    def test_misuse_is_a_sentence_and_exit_code_2(self, tvist, tmp_path, arguments, words):
+    @pytest.mark.usefixtures("tvist")
+    def test_misuse_is_a_sentence_and_exit_code_2(self, called, tmp_path, arguments, words):
         (tmp_path / "several.toml").write_text("robots = 'ur5e*2'\n", encoding="utf-8")
         (tmp_path / "clock.toml").write_text("clock = 'lockstep'\n", encoding="utf-8")
-        code, out, err = tvist(*arguments)
-        assert (code, out) == (2, ""), err
-        assert err.startswith("tvist: ")
-        assert err.count("\n") == 1, err
-        assert all(word in err for word in words), err
+        assert_said(called(*arguments), 2, words)
 
     @pytest.mark.usefixtures("tvist")
     def test_control_c_ends_it_with_exit_code_130(self, tmp_path):

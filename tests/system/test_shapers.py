@@ -35,8 +35,3 @@ def test_people_get_a_table_with_a_line_on_each():
     for name, shaper in SHAPERS.items():
         assert f"{name} " in said
         assert shaper.description in said
-
-
-@pytest.mark.parametrize(("option", "value"), [("--zeta", 1.0), ("--zeta", "nan"), ("--f-d", 0)])
-def test_a_mode_that_is_none_is_refused_in_a_sentence(option, value):
-    tvist("shapers", option, value).assert_failed(2, option.strip("-").replace("-", "_"), "must be")

@@ -12,6 +12,7 @@ import polars as pl
 import pytest
 from distributed import Client
 from polars.testing import assert_frame_equal
+from tests.conformance.served import finished
 from tests.places import free_port
 
 SPEC = """
@@ -31,29 +32,19 @@ def spec(tmp_path_factory):
     return path
 
 
-def command(spec, folder, *options):
-    return [
-        sys.executable,
-        "-m",
-        "tvist_cli",
-        "study",
-        str(spec),
-        "--output",
-        str(folder),
-        "--json",
-        *options,
-    ]
+def words(spec, folder, *options):
+    return ["-m", "tvist_cli", "study", str(spec), "--output", str(folder), "--json", *options]
 
 
 def begun(*arguments):
     """Start a sweep in a session of its own, whose processes can all be found and signalled."""
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen(command(*arguments), start_new_session=True, **pipes)
+    return subprocess.Popen([sys.executable, *words(*arguments)], start_new_session=True, **pipes)
 
 
 def done(*arguments):
     """Run a sweep to its end; what it printed."""
-    ended = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=PATIENCE, check=False)
+    ended = finished(*words(*arguments))
     assert (ended.returncode, ended.stderr) == (0, ""), ended.stderr
     return json.loads(ended.stdout)
 
@@ -90,12 +81,17 @@ def rows_of(folder):
     return pl.read_parquet(folder / "sweep.parquet")
 
 
-def test_a_killed_sweep_continues_and_leaves_no_process(spec, whole, tmp_path):
+def test_a_killed_sweep_continues_and_leaves_no_process(spec, whole, tmp_path, monkeypatch):
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
     process = begun(spec, tmp_path / "x", "--processes", "2")
     wait_for_part(tmp_path / "x")
     process.kill()
     process.communicate(timeout=PATIENCE)
     wait_until(lambda: not session(process.pid))
+    # The next start removes these: tests/system/test_left_behind.py.
+    assert all(left.name.startswith("tvist-own-") for left in temporary.iterdir())
     result = done(spec, tmp_path / "x", "--processes", "1")
     assert result["tasks_done_before"] == 32
     assert result["run"]["tasks"] == 16
