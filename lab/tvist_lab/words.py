@@ -11,7 +11,7 @@ def counted(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
-def named(error: Exception) -> str:
+def named(error: BaseException) -> str:
     """Return an exception in one line: its type, and its message if it has one."""
     said = " ".join(str(error).split())
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
