@@ -83,7 +83,9 @@ def begun(study, folder):
 @pytest.mark.parametrize(
     ("study", "number", "to"),
     [
-        ("evaluate", signal.SIGHUP, os.kill),  # as a terminal does that is closed
+        ("evaluate", signal.SIGTERM, os.kill),
+        ("evaluate", signal.SIGHUP, os.killpg),  # as a terminal does that is closed
+        ("sweep", signal.SIGHUP, os.killpg),
         ("sweep", signal.SIGTERM, os.killpg),  # as a supervisor does
     ],
 )

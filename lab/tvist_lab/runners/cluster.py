@@ -116,7 +116,7 @@ def _check_alike(client: Client) -> None:
 
 @contextmanager
 def _local(processes: int) -> Iterator[LocalCluster]:
-    """Start processes that Control+C does not reach, so that this one can end them in order.
+    """Start processes that neither Control+C nor a closed terminal reaches, so that this one can end them in order.
 
     They inherit a mask from the thread that starts them, which inherits it from this one, as do those that replace a
     killed one. Starting the resource tracker removes the mask, so that it has to run before.
@@ -124,7 +124,7 @@ def _local(processes: int) -> Iterator[LocalCluster]:
     A Dask scheduler runs whatever it is sent: certificates of this run alone keep other users of this machine out.
     """
     multiprocessing.resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP, signal.SIGQUIT})
     try:
         cluster = LocalCluster(
             n_workers=processes,

@@ -23,8 +23,9 @@ def cores() -> int:
 
 def begin() -> None:
     """Let this process end when the one that hands out the work does, and not before."""
-    # Control+C reaches all processes of a terminal; the first one ends the others.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Control+C reaches all processes of a terminal, as does its end; the first one ends the others.
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
     end_with_parent()
 
 
