@@ -21,7 +21,7 @@ def option_values() -> dict[str, Values]:
 
     from tvist_plant.description import robots
     from tvist_server.profiles import ProfileName
-    from tvist_shaping import BUILT_IN
+    from tvist_shaping import BUILT_IN, SHAPERS
 
     robot, shaper = Values(robots(), "toml"), Values(BUILT_IN.names(), "py")
     return {
@@ -29,7 +29,7 @@ def option_values() -> dict[str, Values]:
         "robots": robot,
         "shaper": shaper,
         "shapers": shaper,
-        "sensitivity": shaper,
+        "sensitivity": Values(tuple(SHAPERS), "py"),
         "profile": Values(get_args(ProfileName)),
     }
 

@@ -95,8 +95,8 @@ def sentence(error: CycloptsError, commands: Sequence[str]) -> str:
             said = f"{_name(error)} is given twice: give it once"
         case ValidationError():
             said = f"{_name(error)} {error.exception_message}"
-        case MissingArgumentError() if error.keyword or not _positional(error):
-            said = f"{error.keyword or _name(error)} needs a value: {seek}"
+        case MissingArgumentError() if error.keyword:
+            said = f"{error.keyword} needs a value: {seek}"
         case MissingArgumentError():
             said = f"{_name(error)} is missing: {seek}"
         case UnusedCliTokensError():

@@ -83,10 +83,12 @@ def about(ran: "Ran", elapsed: float, folder: Path) -> dict[str, Any]:
 
 def say_effort(result: dict[str, Any]) -> None:
     """Say what a run took, if it did anything."""
+    from tvist_lab.words import counted
+
     run = result["run"]
     if run["tasks"]:
         say(
-            f"{run['tasks']} moves took {run['elapsed_s']:.0f} s on {run['workers']} processes; scheduling and "
+            f"{counted(run['tasks'], 'move')} took {run['elapsed_s']:.0f} s, {run['workers']} at a time; scheduling and "
             f"transfer took {run['scheduling_and_transfer_percent']:.1f} % of the tasks' own time"
         )
 

@@ -98,7 +98,7 @@ MISUSE = [
     (("serve", "--record", "x.mcap", "--keep", "0s"), ["keep is '0s'", "from 1s"]),
     (("serve", "--keep", "10min"), ["keep is 10min", "nothing is recorded"]),
     (("log", "export", "x.mcap", "--to", "xls"), ["to is 'xls'", "csv, parquet, npz, mat"]),
-    (("log", "export", "x.mcap"), ["--to"]),
+    (("log", "export", "x.mcap"), ["--to is missing"]),
     (("shaperbench", "--moves", "0"), ["moves is 0", "1 to 10000"]),
     (("evaluate", "--random", "0"), ["random is 0"]),
     (("evaluate", "--random", "2", "--modes", "9"), ["modes is 9", "1 to 6"]),
