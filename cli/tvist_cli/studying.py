@@ -88,7 +88,7 @@ def say_effort(result: dict[str, Any]) -> None:
     run = result["run"]
     if run["tasks"]:
         say(
-            f"{counted(run['tasks'], 'move')} took {run['elapsed_s']:.0f} s, {run['workers']} at a time; scheduling and "
+            f"{counted(run['tasks'], 'move')} took {run['elapsed_s']:.0f} s, {run['workers']} at once; scheduling and "
             f"transfer took {run['scheduling_and_transfer_percent']:.1f} % of the tasks' own time"
         )
 
