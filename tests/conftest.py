@@ -1,7 +1,6 @@
 """What all tests share: options, the order in which they run side by side, and figures that they measure."""
 
 import asyncio
-import os
 import signal
 
 import pytest
@@ -22,11 +21,6 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     if config.option.keep_durations and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Durations())
-
-
-def pytest_xdist_auto_num_workers(config):
-    """As many processes as processors, and one whose tests mostly wait: the one that has the clock."""
-    return len(os.sched_getaffinity(0)) + 1
 
 
 @pytest.hookimpl(wrapper=True)

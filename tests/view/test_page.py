@@ -8,6 +8,8 @@ from tests.conformance.wire import TICK, Wire
 
 from .browser import Page, browser
 
+pytestmark = pytest.mark.realtime
+
 Q3 = 2
 STOPPED = 1
 MS = PATIENCE * 1000.0
