@@ -7,7 +7,6 @@ fails.
 
 import logging
 import math
-import multiprocessing.resource_tracker
 import signal
 import time
 import warnings
@@ -25,7 +24,7 @@ from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 
 from tvist_lab.runners.interface import Failed, Outcome, Result, Task, TaskError
 from tvist_lab.runners.parcels import do, pack, unpack
-from tvist_lab.runners.processes import cores
+from tvist_lab.runners.processes import OF_TERMINAL, cores, start_tracker
 from tvist_server.own_folder import OwnFolder
 
 SHARE = 16
@@ -123,8 +122,8 @@ def _local(processes: int) -> Iterator[LocalCluster]:
 
     A Dask scheduler runs whatever it is sent: certificates of this run alone keep other users of this machine out.
     """
-    multiprocessing.resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP, signal.SIGQUIT})
+    start_tracker()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_TERMINAL)
     try:
         cluster = LocalCluster(
             n_workers=processes,

@@ -1,6 +1,7 @@
 """Processes of this machine for work of seconds: quick to start."""
 
 import multiprocessing
+import multiprocessing.resource_tracker
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
@@ -21,12 +22,27 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+OF_TERMINAL = {signal.SIGINT, signal.SIGHUP, signal.SIGQUIT}
+"""Signals that reach all processes of a terminal, from its keys or at its end; the first process ends the others."""
+
+
 def begin() -> None:
     """Let this process end when the one that hands out the work does, and not before."""
-    # Control+C reaches all processes of a terminal, as does its end; the first one ends the others.
-    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
+    for number in OF_TERMINAL:
         signal.signal(number, signal.SIG_IGN)
     end_with_parent()
+
+
+def start_tracker() -> None:
+    """Start the process by which multiprocessing cleans up, so that a closed terminal does not end it.
+
+    By itself it ignores Control+C alone; it inherits what this thread has blocked.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_TERMINAL)
+    try:
+        multiprocessing.resource_tracker.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @dataclass(frozen=True)
@@ -52,6 +68,7 @@ class Processes:
             for index, task in enumerate(tasks):
                 yield index, attempt(work, task)
             return
+        start_tracker()
         others = set(multiprocessing.active_children())
         pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), begin)
         done = False
