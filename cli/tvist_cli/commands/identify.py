@@ -94,7 +94,7 @@ def identify(
         raise Failure(
             f"{which} is for the polynomial model: leave it out, or give --model polynomial", code=2
         )
-    look.check(figures, output)
+    look.check(figures)
     if not output.absolute().parent.is_dir():  # said before half an hour of jogs
         raise Failure(f"output is {output}: its folder does not exist", code=2)
     endpoint, mass = _endpoint_and_mass(endpoint, payload)
