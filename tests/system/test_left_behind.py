@@ -55,7 +55,7 @@ def interrupted() -> None:
 @pytest.fixture
 def temporary(tmp_path, monkeypatch):
     """Where the programs that the test starts have their temporary files."""
-    folder = tmp_path / "temporary"
+    folder = tmp_path / "t"  # sockets in it have paths of at most 107 bytes
     folder.mkdir()
     monkeypatch.setenv("TMPDIR", str(folder))
     return folder
