@@ -18,7 +18,7 @@ KEPT = Path(__file__).with_name("durations.json")
 LEAST = 0.1
 """Shorter test functions are kept as one sum a file [s]."""
 OTHERS = "the others"
-QUICK, LONGEST = 2.0, 2.0
+QUICK, LONGEST = 1.5, 1.5
 """How long the cases of a quick test function may take together, and how long one [s]."""
 CLOCK = "clock"
 """The group of tests that need time to pass: one process has them all, so there is only one of them at a time."""
