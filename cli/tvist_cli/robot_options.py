@@ -28,6 +28,7 @@ def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Comman
         signature = inspect.signature(command)
         *own, _ = signature.parameters.values()
         options = [_option(field) for field in fields(ServeConfig) if not only or field.name in only]
+        # The parser reads the options of a function from here.
         command.__signature__ = signature.replace(parameters=own + options)  # type: ignore[attr-defined]
         return command
 

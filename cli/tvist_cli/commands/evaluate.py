@@ -11,7 +11,7 @@ from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import print_json, progress, typed
 from tvist_cli.report_file import write_report
 from tvist_cli.shapers_of import calibration_for, loaded
-from tvist_cli.simulated_arm import disturbed, masses_of, named
+from tvist_cli.simulated_arm import check_count, check_seed, disturbed, masses_of, named
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -183,10 +183,9 @@ def _check(
         raise Failure("give either --moves FILE or --random N", code=2)
     if wrists and moves is not None:
         raise Failure("--wrists needs --random: it does not change the moves of a file", code=2)
-    if random is not None and not 1 <= random <= 100_000:
-        raise Failure(f"random is {random}: must be 1 to 100000", code=2)
-    if not 0 <= seed < 2**63:
-        raise Failure(f"seed is {seed}: must be at least 0 and less than 2^63", code=2)
+    if random is not None:
+        check_count("random", random, 100_000)
+    check_seed(seed, bits=63)
     if not 1 <= modes <= 6:
         raise Failure(f"modes is {modes}: must be 1 to 6", code=2)
     if not -90.0 <= frequency_error <= 900.0:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import number, out, print_json, progress, table, typed, words
+from tvist_cli.simulated_arm import check_count, check_seed
 
 if TYPE_CHECKING:
     from tvist_lab.studies.arms.measure import Measured
@@ -43,12 +44,10 @@ def robots(
     from tvist_plant.description import DescriptionError, load
     from tvist_plant.description import robots as shipped
 
-    if not 1 <= random <= 10_000:
-        raise Failure(f"random is {random}: must be 1 to 10000", code=2)
+    check_count("random", random, 10_000)
     if not 0.0 <= vary <= VARIED:
         raise Failure(f"vary is {vary:g}: must be 0 to {VARIED:g} %", code=2)
-    if not 0 <= seed < 2**62:
-        raise Failure(f"seed is {seed}: must be at least 0 and less than 2^62", code=2)
+    check_seed(seed)
     if vary and not measure:
         raise Failure("vary needs --measure: it changes nothing in a list", code=2)
     with told(DescriptionError):

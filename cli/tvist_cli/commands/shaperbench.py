@@ -11,6 +11,7 @@ from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import out, print_json, progress, say, table, typed, write_json
 from tvist_cli.report_file import write_report
 from tvist_cli.shapers_of import load_given
+from tvist_cli.simulated_arm import check_count, check_seed
 
 if TYPE_CHECKING:
     from tvist_controller.own_shapers import OwnShaper
@@ -69,10 +70,8 @@ def shaperbench(
 
     look.check(figures, output, markdown, report)
     count = moves if moves is not None else QUICK if quick else MOVES
-    if not 1 <= count <= 10_000:
-        raise Failure(f"moves is {count}: must be 1 to 10000", code=2)
-    if not 0 <= seed < 2**62:
-        raise Failure(f"seed is {seed}: must be at least 0 and less than 2^62", code=2)
+    check_count("moves", count, 10_000)
+    check_seed(seed)
     description = load("ur5e")
     known = modal_calibration(calibration)
     against = None if against is None else [name.lower() for name in against]

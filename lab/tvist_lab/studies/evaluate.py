@@ -14,7 +14,7 @@ from tvist_lab.study.work import Row
 from tvist_protocol.calibration import Calibration
 
 MEASURED = (*OF_PEAKS, "still_after_unshaped_stop_ms", "quiet_after_unshaped_stop_ms")
-"""What is measured of each motion."""
+"""Measures of each motion."""
 RESAMPLED = 2000
 """Number of bootstrap samples for an interval."""
 MOVES = (

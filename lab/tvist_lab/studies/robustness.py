@@ -25,7 +25,7 @@ exceeds the carried one.
 PERCENTILES = {"median": 50.0, "p5": 5.0}
 """Percentiles over moves."""
 MEASURED = ("unshaped_peak_m_s2", "shaped_peak_m_s2", "waited_peak_m_s2", "delay_ms")
-"""What is measured of each motion."""
+"""Measures of each motion."""
 
 
 def jobs(

@@ -19,7 +19,7 @@ MEASURED = (
     "time_until_still_ms", "residual_m_s2", "in_motion_m_s2", "declared_delay_ms", "reference_acceleration_ratio",
     "reference_velocity_ratio", "cost_us",
 )  # fmt: skip
-"""What is measured of each motion."""
+"""Measures of each motion."""
 
 
 def draw(description: RobotDescription, count: int, seed: int) -> list[Move]:

@@ -160,7 +160,12 @@ def with_springs(factor: float) -> ArmVariant:
     )
 
 
-def _sprung(factor: float, description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
+def _sprung(
+    factor: float,
+    description: RobotDescription,
+    carried: Payload,
+    seed: int,  # noqa: ARG001  this arm is not drawn
+) -> FlexibleArm:
     return FlexibleArm(stiffer(description, factor), carried)
 
 

@@ -3,7 +3,7 @@
 import importlib.util
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -178,4 +178,4 @@ def read_study(path: Path) -> Study:
         found.check()
     except StudyError as error:
         raise StudyError(f"study {path}: {error}") from error
-    return Study(**{**vars(found), "file": content})
+    return replace(found, file=content)

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import out, print_json, progress, say, table, typed, words
-from tvist_cli.simulated_arm import UNIFORM, disturbed, masses_of, named
+from tvist_cli.simulated_arm import UNIFORM, check_count, check_seed, disturbed, masses_of, named
 
 if TYPE_CHECKING:
     from tvist_lab.figures import FigureFiles
@@ -66,7 +66,8 @@ def paths(
     from tvist_plant.description import load
 
     look.check(figures, markdown)
-    _check(random, seed)
+    check_count("random", random, 100_000)
+    check_seed(seed, bits=63)
     description, known = load(ROBOT), _calibration(calibration)
     masses = masses_of(payload, description)
     chosen = tuple(dict.fromkeys(name.lower() for name in shapers)) if shapers else SHAPERS
@@ -94,13 +95,6 @@ def paths(
         print_json(result)
     else:
         _print(result)
-
-
-def _check(random: int, seed: int) -> None:
-    if not 1 <= random <= 100_000:
-        raise Failure(f"random is {random}: must be 1 to 100000", code=2)
-    if not 0 <= seed < 2**63:
-        raise Failure(f"seed is {seed}: must be at least 0 and less than 2^63", code=2)
 
 
 def _calibration(name: str) -> "Calibration":

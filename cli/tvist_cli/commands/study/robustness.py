@@ -9,6 +9,7 @@ from tvist_cli.commands.shaperbench import methods_of, modal_calibration
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import number, print_json, progress, table, typed, write_json
+from tvist_cli.simulated_arm import check_count, check_seed
 
 if TYPE_CHECKING:
     from tvist_lab.study.work import Row
@@ -50,10 +51,8 @@ def robustness(
     from tvist_plant.description import load
 
     look.check(figures, output, markdown)
-    if not 1 <= moves <= 10_000:
-        raise Failure(f"moves is {moves}: must be 1 to 10000", code=2)
-    if not 0 <= seed < 2**62:
-        raise Failure(f"seed is {seed}: must be at least 0 and less than 2^62", code=2)
+    check_count("moves", moves, 10_000)
+    check_seed(seed)
     description = load("ur5e")
     known = modal_calibration(calibration)
     names = None if against is None else [name.lower() for name in against]
