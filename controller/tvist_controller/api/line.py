@@ -1,6 +1,6 @@
 """The control line for studies: the boxes of Figure 6, their parameters, and motions of the joints.
 
-The modules behind it may change; what studies lines imports nothing else of this package.
+The modules behind it may change; a study of moves imports nothing else of this package.
 """
 
 from tvist_controller.ahead import resting_after
