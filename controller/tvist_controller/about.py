@@ -23,7 +23,7 @@ def info_of(controller: Controller) -> Info:
     hold = controller.stepping.hold
     calibration = controller.filters.source.calibration
     own = (setup.calibration.name,) if setup.calibration is not None else ()
-    tvist = controller.cycle.tvist
+    tvist = controller.cycle.line.filter.tvist
     return Info(
         name=setup.name,
         protocol=PROTOCOL_VERSION,

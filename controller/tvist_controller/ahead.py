@@ -4,11 +4,11 @@ from functools import cached_property
 
 import numpy as np
 
-from tvist_controller.control.differentiator import Floats
+from tvist_controller.control.differentiator import STILL, Floats
 from tvist_controller.control.shaped_reference import ShapedReference
-from tvist_controller.cycle import STILL, rests
 from tvist_controller.line_filter import LineFilter
 from tvist_controller.trajectory import Trajectory
+from tvist_plant.plant import PERIOD
 
 MAX_AHEAD = 4000
 """Largest number of ticks that a motion is simulated ahead to find its end."""
@@ -46,7 +46,7 @@ class Ahead:
             self.samples.append(x_star)
             self.references.append(self._shaped.joints.position)
             settled = line_filter is None or line_filter.settled
-            self.rests = trajectory.standing and settled and rests(self._shaped.posture(x), target)
+            self.rests = trajectory.standing and settled and target.rests_at(self._shaped.posture(x), PERIOD)
 
     @cached_property
     def last(self) -> int:

@@ -14,7 +14,7 @@ from tvist_controller.command_row import Call, Row
 from tvist_controller.command_table import CommandTable, Order
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.counters import Counters
-from tvist_controller.cycle import ControlCycle, Sample
+from tvist_controller.cycle import ControlCycle
 from tvist_controller.declared_payload import DeclaredPayload
 from tvist_controller.events import Fields
 from tvist_controller.faults import Faults
@@ -34,6 +34,7 @@ from tvist_controller.refusal import RefusalError, check_content
 from tvist_controller.report import Report
 from tvist_controller.reporting import Reporter, truth_of
 from tvist_controller.safety_control import SafetyControl
+from tvist_controller.sample import Sample
 from tvist_controller.session import NoControlError, Session
 from tvist_controller.setpoints import Setpoints
 from tvist_controller.setup import Setup, body
@@ -77,7 +78,9 @@ class Controller:
             compensate_sag=setup.compensate_sag,
         )  # fmt: skip
         if setup.truth:
-            truth_of(self.cycle.plant)  # raises now rather than at the first tick if the plant has no truth
+            truth_of(
+                self.cycle.line.plant
+            )  # raises now rather than at the first tick if the plant has no truth
         self._seed = setup.seed
         self._reporter = Reporter(setup.description)
         self._wrench = ToolWrench(setup.description)
@@ -104,7 +107,7 @@ class Controller:
         )  # fmt: skip
         for part in parts:
             self._commands.add(part.rows)
-        self.report = self._report(self.cycle.standing)
+        self.report = self._report(self.cycle.sample)
         """Report of the last tick, or of the arm at rest if it has not ticked yet or was placed somewhere since."""
 
     @property
@@ -142,7 +145,7 @@ class Controller:
     def basis(self) -> PlanBasis:
         """The present state that plans for commands depend on."""
         on = self.filters.basis
-        tool = ToolBasis(self.motion.tcp, self.cycle.reference)
+        tool = ToolBasis(self.motion.tcp, self.cycle.sample.reference)
         return PlanBasis(on, self.motion.basis(on), tool, self.programs.statements.basis)
 
     def receive(
@@ -214,6 +217,7 @@ class Controller:
         except PlantError as error:
             self._faults.clear()
             sample = self.motion.recover(error, self._seed)
+            self._reporter.restart()
             self._payload.begin_anew()
         self._payload.watch(sample)
         self.filters.watch(sample)
@@ -221,7 +225,7 @@ class Controller:
         self.tick_number += 1
         events, self._events = self._events, []
         self.report = self._report(sample)
-        self.programs.steadiness.note(sample.measured.q, at_rest=self.cycle.at_rest)
+        self.programs.steadiness.note(sample.measured.q, at_rest=self.cycle.mode.at_rest)
         return self.report, events
 
     def _report(self, sample: Sample) -> Report:
@@ -229,8 +233,8 @@ class Controller:
         return self._reporter.report(
             self.tick_number,
             sample,
-            self.cycle.tvist,
-            self.cycle.drive_delay,
+            self.cycle.line.filter.tvist,
+            self.cycle.line.drives.delay,
             modes=(int(robot_mode), int(motion.safety_mode), int(motion.runtime)),
             speed=motion.motions.speed,
             setpoint_sequence=motion.streams.sequence,
@@ -275,7 +279,7 @@ class Controller:
         Raises:
             ValueError: The plant does not provide it.
         """
-        return self._reporter.truth(self.tick_number, self.cycle.plant)
+        return self._reporter.truth(self.tick_number, self.cycle.line.plant)
 
     def _emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
         """Store an event of the tick that is being computed, or of the next one between two ticks."""
@@ -329,7 +333,7 @@ class Controller:
         """Place the simulated arm somewhere at rest."""
         command, chosen = call.command, call.planned()
         check_content(command, self.setup.description)
-        q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
+        q = self.cycle.line.shaped.joints.position if command.q is None else np.array(command.q, dtype=float)
         carried = None if command.payload is None else body(command.payload)
         self._check_place(command, q)
         self.programs.end("simulation.reset")
@@ -343,9 +347,10 @@ class Controller:
         self.motion.put(command.mode)
         if command.mode is not None:
             self._stop_reasons.forget()
-        self.report = self._report(self.cycle.standing)
-        self._payload.begin_anew()
+        self._reporter.restart()
         self._reporter.forget_modes()
+        self.report = self._report(self.cycle.sample)
+        self._payload.begin_anew()
         self.programs.steadiness.forget()
         return Done(tick=self.tick_number)
 
@@ -353,7 +358,7 @@ class Controller:
         """Refuse to put the arm, or another payload on it, where two bodies would be nearer than permitted."""
         payloads = [] if command.payload is None else [body(command.payload)]
         if command.q is not None:
-            payloads = [self.motion.collisions.carried, *(payloads or [self.cycle.plant.payload])]
+            payloads = [self.motion.collisions.carried, *(payloads or [self.cycle.line.plant.payload])]
         met = self.motion.collisions.misplaced(q, *payloads)
         if met is not None:
             where = "payload" if command.q is None else "q"

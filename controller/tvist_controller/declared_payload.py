@@ -2,12 +2,12 @@
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.control.inverse_dynamics import SLEW
-from tvist_controller.cycle import Sample
 from tvist_controller.events import Emit
 from tvist_controller.filters import Filters
 from tvist_controller.motion import MotionControl
 from tvist_controller.payload_monitor import PayloadMonitor
 from tvist_controller.refusal import check_content, payload_of
+from tvist_controller.sample import Sample
 from tvist_controller.setup import body
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import SetPayload
@@ -58,7 +58,9 @@ class DeclaredPayload:
         carried = body(payload)
         self._motion.ahead.check_payload(carried, tvist)
         self.payload = payload
-        self._motion.cycle.declare(carried, max(round(call.command.transition_time / PERIOD), SLEW))
+        self._motion.cycle.line.dynamics.declare(
+            carried, max(round(call.command.transition_time / PERIOD), SLEW)
+        )
         self._filters.declare(payload, tvist)
         self._monitor.declare(carried)
         self._held = False

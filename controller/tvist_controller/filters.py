@@ -2,12 +2,13 @@
 
 from tvist_controller.calibrations import fits
 from tvist_controller.command_row import Call, Row
-from tvist_controller.cycle import Sample
 from tvist_controller.events import Emit
+from tvist_controller.line_mode import LineMode
 from tvist_controller.mode_source import ModeSource
 from tvist_controller.motion import MotionControl
 from tvist_controller.planning.basis import FilterBasis
 from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_controller.sample import Sample
 from tvist_protocol.commands import SetEstimator, SetShaper
 from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
@@ -35,7 +36,7 @@ class Filters:
     @property
     def basis(self) -> FilterBasis:
         """The present state that a new filter depends on."""
-        tvist = self._cycle.tvist
+        tvist = self._cycle.line.filter.tvist
         return FilterBasis(tvist.name, tvist.estimator.modes, self.source, self._declared)
 
     def use(self, chosen: PlannedFilter) -> None:
@@ -68,14 +69,14 @@ class Filters:
         """
         self._declared = payload
         if tvist is not None:
-            self._cycle.use(tvist, self._cycle.elastic)
+            self._cycle.use(tvist, self._cycle.line.drives.wanted)
             self._motion.motions.keep_rate()
         self._warn_of_payload()
 
     @property
     def _idle(self) -> bool:
         """True if there is no shaper, so that the modes do not matter."""
-        return self._cycle.tvist.name == "none"
+        return self._cycle.line.filter.tvist.name == "none"
 
     def _warn_of_payload(self) -> None:
         """Warn if a shaper uses modes that belong to another payload."""
@@ -107,9 +108,9 @@ class Filters:
         Args:
             sample: Signals of the latest tick.
         """
-        clipped = self._cycle.tvist.clipped
+        clipped = self._cycle.line.filter.tvist.clipped
         if clipped and not self._clipped:
-            name = self._cycle.tvist.name
+            name = self._cycle.line.filter.tvist.name
             why = (
                 f"{name} cannot meet its specification here: it needs a longer delay line, or leaves more vibration. "
                 "Choose another shaper for these poses, or a pose in which the arm is stiffer"
@@ -117,11 +118,11 @@ class Filters:
             self._emit("warning", code="out_of_range", why=why)
         self._clipped = clipped
         limited = sample.motors is not None and sample.motors.limited
-        if limited and not self._limited and not (self._cycle.stopping or self._cycle.at_rest):
+        if limited and not self._limited and self._cycle.mode not in {LineMode.STOPPING, LineMode.REST}:
             why = (
                 "the torque limits keep the motors from leading enough: the arm will vibrate more after this motion. "
                 "Move with less acceleration, or choose a shaper without feed-forward, such as auto"
             )
             self._emit("warning", code="limit_torque", why=why)
             self._limited = True
-        self._limited = self._limited and not self._cycle.at_rest
+        self._limited = self._limited and not self._cycle.mode.at_rest

@@ -6,6 +6,7 @@ import numpy as np
 
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.line_mode import LineMode
 from tvist_controller.motion import MotionControl
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import GENTLEST_STOP, GuidedTorqueRoom, arm_limits
@@ -30,7 +31,7 @@ class Guidance:
         self._motion, self._cycle = motion, motion.cycle
         self._limits = arm_limits(motion.cycle.description)
         self._reach = np.array(motion.cycle.description.limits.position)
-        self._torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.inverse_dynamics)
+        self._torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.line.dynamics)
         self._tcp, self._kinematics = motion.tcp, ToolKinematics(motion.cycle.description)
         self._kinematics.rehearse(PERIOD)
 
@@ -107,7 +108,7 @@ class Guidance:
             angular_acceleration: Angular deceleration [rad/s^2].
         """
         cycle = self._cycle
-        state, present, tool = cycle.newest, cycle.trajectory, self._tool
+        state, present, tool = cycle.line.shaped.joints.newest, cycle.trajectory, self._tool
         fastest, twist = float(np.abs(state.qd).max()), tool.jacobian(state.q) @ state.qd
         duration = max(
             float(np.linalg.norm(twist[:3])) / acceleration,
@@ -133,7 +134,7 @@ class Guidance:
 
     def _most(self, shaped: bool) -> MotionLimits:
         """Limits of a reference."""
-        return self._cycle.spared(self._limits) if shaped else self._limits
+        return self._cycle.line.filter.spared(self._limits) if shaped else self._limits
 
     def _check(self, trigger: str, shaped: bool) -> None:
         """Refuse a command that the present activity does not allow."""
@@ -144,7 +145,7 @@ class Guidance:
 
     def _continues(self, shaped: bool) -> bool:
         """Return whether a command continues the reference of the one before."""
-        return self._motion.activity is Activity.GUIDED and shaped != self._cycle.unshaped
+        return self._motion.activity is Activity.GUIDED and shaped == self._cycle.mode.shaped
 
     def _present(self, kind: type[G], shaped: bool) -> G | None:
         """Return the present trajectory, if it is of this kind and continues."""
@@ -156,31 +157,32 @@ class Guidance:
         cycle, present = self._cycle, self._cycle.trajectory
         if self._continues(shaped) and isinstance(present, Guided):
             return present.state
-        if cycle.at_rest:
-            q = cycle.reference if shaped else cycle.position
+        if cycle.mode.at_rest:
+            q = cycle.sample.reference if shaped else cycle.line.shaped.joints.position
             return q, np.zeros_like(q), np.zeros_like(q)
-        newest = cycle.newest
+        newest = cycle.line.shaped.joints.newest
         return newest.q, newest.qd, newest.qdd
 
     def _follow(self, trigger: str, trajectory: Guided, shaped: bool) -> int:
         """Carry out the transition; return the motion's number."""
         motion, cycle = self._motion, self._cycle
+        guard = None
         if motion.activity is not Activity.GUIDED:
-            motion.ahead.begin_guided()
+            guard = motion.ahead.guard_of_guided()
             motion.motions.stopped(f"{trigger} took over", None)
         if not shaped:
-            cycle.follow(trajectory)
+            cycle.begin(trajectory, LineMode.BYPASSED, guard)
         elif trajectory is not cycle.trajectory:
-            if cycle.at_rest:
-                cycle.tvist.aim(None)
-            cycle.start(trajectory)
+            if cycle.mode.at_rest:
+                cycle.line.filter.tvist.aim(None)
+            cycle.begin(trajectory, LineMode.GUARDED, guard)
         motion.go(trigger)
         return motion.motions.guide(trajectory)
 
     def _halt(self, trigger: str, stop: Guided, duration: float) -> None:
         """End the guided motion by a trajectory that comes to rest in some time [s]."""
         motion, fastest = self._motion, float(np.abs(stop.state[1]).max())
-        self._cycle.follow(stop)
+        self._cycle.begin(stop, LineMode.BYPASSED)
         motion.go(trigger)
         why, way = f"{trigger} was commanded", 0.5 * duration * fastest
         motion.motions.stopped(why, None, category=2, duration=duration, way=way)

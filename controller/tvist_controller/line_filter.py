@@ -16,13 +16,14 @@ class LineFilter:
 
     Args:
         tvist: The first filter.
-        limits: Limits of the motion to be shaped.
+        arm: Limits that suit every joint of the arm.
     """
 
-    def __init__(self, tvist: Filter, limits: MotionLimits) -> None:
+    def __init__(self, tvist: Filter, arm: MotionLimits) -> None:
         self.tvist = tvist
         """The latest chosen filter: in use, or about to be."""
-        self.limits = limits
+        self._arm = arm
+        self.limits = arm
         """Limits of the current motion."""
         self._fade: Fade | None = None
 
@@ -51,6 +52,20 @@ class LineFilter:
         """Factor by which the shaped acceleration may exceed the reference's, see `Filter.peak`."""
         fade = self._fade
         return self.tvist.peak if fade is None else max(self.tvist.peak, fade.old.peak, fade.new.peak)
+
+    def spared(self, limits: MotionLimits | None = None) -> MotionLimits:
+        """Return the limits of a reference whose shaped reference keeps these limits and those of the arm.
+
+        Args:
+            limits: The limits; None for those of the arm.
+        """
+        arm, (faster, harder) = self._arm, (1.0 + more for more in self.tvist.surplus)
+        limits = arm if limits is None else limits
+        return MotionLimits(
+            min(limits.velocity, arm.velocity / faster),
+            min(limits.acceleration, arm.acceleration / harder),
+            limits.jerk,
+        )
 
     def filter(self, reference: Floats) -> Floats:
         """Return the shaped sample, in a transition between two filters if there is one."""

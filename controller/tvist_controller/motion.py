@@ -10,18 +10,21 @@ import numpy as np
 from tvist_controller.activities import PUT, at_rest, runtime_of
 from tvist_controller.brakes import brake
 from tvist_controller.collision import CollisionModel
-from tvist_controller.cycle import ControlCycle, Sample
+from tvist_controller.cycle import ControlCycle
 from tvist_controller.events import Emit, Told
+from tvist_controller.line_mode import LineMode
 from tvist_controller.motions import Motions
 from tvist_controller.outlook import Outlook
 from tvist_controller.planning.basis import FilterBasis, MotionBasis
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.protection import Protection
 from tvist_controller.refusal import RefusalError, out_of_turn
+from tvist_controller.safety import StreamTorqueRoom
 from tvist_controller.safety_system import SafetySystem
+from tvist_controller.sample import Sample
 from tvist_controller.stops import StopPlan
 from tvist_controller.streaming import Streaming
-from tvist_controller.trajectory import MotionLimits
+from tvist_controller.trajectory import MotionLimits, SetpointStream
 from tvist_controller.way_ahead import WayAhead
 from tvist_plant.plant import PERIOD, PlantError
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
@@ -88,14 +91,14 @@ class MotionControl:
             return None
         cycle = self.cycle
         return MotionBasis(
-            q=cycle.reference,
+            q=cycle.sample.reference,
             speed=self.motions.wanted_speed,
             slowest=self.motions.slowest,
-            excess=cycle.tvist.excess,
-            surplus=cycle.tvist.surplus,
+            excess=cycle.line.filter.tvist.excess,
+            surplus=cycle.line.filter.tvist.surplus,
             tcp=self.tcp,
             carried=self.collisions.carried,
-            bodies=cycle.inverse_dynamics.bodies,
+            bodies=cycle.line.dynamics.bodies,
             filter=on,
         )
 
@@ -133,7 +136,7 @@ class MotionControl:
     @property
     def runtime(self) -> RuntimeState:
         """Whether something moves."""
-        return runtime_of(self.activity, slowing=self.motions.speed > 0.0 and not self.cycle.at_rest)
+        return runtime_of(self.activity, slowing=self.motions.speed > 0.0 and not self.cycle.mode.at_rest)
 
     @property
     def safety_mode(self) -> SafetyMode:
@@ -159,9 +162,9 @@ class MotionControl:
         """
         target, plan, cycle = after(self.activity, "brakes"), None, self.cycle
         self.activity = target or self.activity
-        if target is not None and not cycle.at_rest:
-            stop = brake(cycle.description, cycle.plant.payload, cycle.newest, PERIOD)
-            way = float(np.abs(stop.end - cycle.position).max())
+        if target is not None and not cycle.mode.at_rest:
+            stop = brake(cycle.description, cycle.line.plant.payload, cycle.line.shaped.joints.newest, PERIOD)
+            way = float(np.abs(stop.end - cycle.line.shaped.joints.position).max())
             plan = StopPlan(None, None, limited=False, duration=stop.duration, way=way)
             self.outlook.brake(stop)
         self._tell_end(plan, why, None, "safety_stop", 0)
@@ -192,7 +195,7 @@ class MotionControl:
         """
         why = f"{error}: the simulation put the arm at rest at its reference"
         self.abandon(why, "plant_failure")
-        self.cycle.reset(self.cycle.position, seed=seed)
+        self.cycle.reset(self.cycle.line.shaped.joints.position, seed=seed)
         self._protection.forget()
         if after(self.activity, "plant_failure") is not None:
             self.go("plant_failure")
@@ -226,8 +229,21 @@ class MotionControl:
             why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which allows {most:.3g}"
             raise RefusalError("limit_velocity", "velocity", why, most)
         self.activity = target
-        self.streams.begin(self.cycle.stream(period, limits), now)
-        self.ahead.begin()
+        self.streams.begin(self._stream(period, limits), now)
+
+    def _stream(self, period: float, limits: MotionLimits) -> SetpointStream:
+        """Let the line follow set-points, which come every `period` seconds, from rest."""
+        cycle, line = self.cycle, self.cycle.line
+        line.filter.tvist.aim(None)
+        stream = SetpointStream(
+            cycle.sample.reference,
+            period,
+            line.filter.spared(limits),
+            PERIOD,
+            reach=np.array(cycle.description.limits.position),
+            torque=StreamTorqueRoom(cycle.description, line.dynamics),
+        )
+        return cycle.begin(stream, LineMode.GUARDED, self.ahead.guard_of_stream())
 
     def end_stream(self) -> None:
         """Bring the stream to rest through the filter.
@@ -238,13 +254,13 @@ class MotionControl:
         stream = self.streams.stream
         if stream is None:
             raise out_of_turn("servo_stop", self.activity)
-        end = self.cycle.end_of(stream)
+        end = stream.end
         met = self.ahead.after_stream(end)
         if met is not None:
             self.interrupt(f"{met} before the stream came to rest through the filter", "collision")
             return
         self.go("servo_stop")
-        self.cycle.start(end)
+        self.cycle.begin(end, LineMode.GUARDED)
         self._end_stream("servo_stop")
 
     def stop(self, deceleration: float | None, why: str, code: Code | None = None) -> None:
@@ -285,7 +301,7 @@ class MotionControl:
         if target is None:
             return
         self.activity = target
-        plan = None if self.cycle.at_rest else self.outlook.stop(deceleration)
+        plan = None if self.cycle.mode.at_rest else self.outlook.stop(deceleration)
         if plan is not None and plan.limited:
             kept = "the motion's own" if plan.acceleration is None else f"{plan.acceleration:.3g} rad/s²"
             why = f"{why}; deceleration is {kept}, limited from {deceleration:.3g}"
@@ -300,7 +316,7 @@ class MotionControl:
         """Report a stop and what it has ended."""
         if kind is None and not self.motions.running and not self.streaming:
             return
-        duration, way = (0.0, 0.0) if self.cycle.at_rest else self.ahead.until_rest(plan)
+        duration, way = (0.0, 0.0) if self.cycle.mode.at_rest else self.ahead.until_rest(plan)
         told = Told(category=category, duration=duration, way=way)
         if kind is not None:
             self._emit(kind, code=code, why=why, **told)
@@ -334,9 +350,9 @@ class MotionControl:
             PlantError: The arm's state is no longer finite; call `recover`.
         """
         sample = self.cycle.step()
-        if self.cycle.refused is not None and self.activity is not Activity.STOPPING:
-            self.end("interruption", *self.cycle.refused)
-        if self.cycle.at_rest and self.activity.moving and (target := after(self.activity, "at_rest")):
+        if sample.refused is not None and self.activity is not Activity.STOPPING:
+            self.end("interruption", *sample.refused)
+        if self.cycle.mode.at_rest and self.activity.moving and (target := after(self.activity, "at_rest")):
             goes_on = self.activity is Activity.MOVING and self.motions.go_on()
             if not goes_on:
                 self.activity = target

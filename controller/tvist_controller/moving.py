@@ -5,7 +5,8 @@ from typing import Protocol
 
 import numpy as np
 
-from tvist_controller.cycle import STILL, ControlCycle
+from tvist_controller.control.differentiator import STILL
+from tvist_controller.cycle import ControlCycle
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.safety import acceleration_on_way, rate_of
 from tvist_controller.trajectory import PlannedMotion
@@ -59,12 +60,12 @@ class RunningMove:
         self._begin()
 
     def _begin(self) -> None:
-        self._cycle.start(self._trajectory)
-        self._cycle.tvist.aim(self._trajectory.path.end, quiet=self._trajectory.quiet)
+        self._cycle.begin(self._trajectory)
+        self._cycle.line.filter.tvist.aim(self._trajectory.path.end, quiet=self._trajectory.quiet)
 
     def _rate(self, speed: float, slowest: float | None) -> float:
         """Rate of its time [-]: lower if it was planned for a shaper that is less slow, peaked or uneven."""
-        tvist = self._cycle.tvist
+        tvist = self._cycle.line.filter.tvist
         room = min(_fitting(self._window, tvist.delay), _fitting(self._peak, tvist.peak))
         if tvist.surplus != self._surplus:
             (velocity, acceleration), (more_velocity, more_acceleration) = self._room, tvist.surplus
@@ -78,7 +79,7 @@ class RunningMove:
         """Number of its present part, from 0, and the length covered on it [m]; None on a part without length."""
         if self._trajectory.path.posture_of is None:
             return None
-        return self._parts - 1 - len(self.coming), float(self._cycle.along.newest.q[0])
+        return self._parts - 1 - len(self.coming), float(self._cycle.line.shaped.along.newest.q[0])
 
     @property
     def rate(self) -> float:
@@ -92,18 +93,18 @@ class RunningMove:
 
     def hold(self) -> None:
         """Slow down to a standstill within the torque limits, if that takes less time; see `PlannedMotion.hold`."""
-        if self._held or self._cycle.at_rest:  # at rest, it is between two parts
+        if self._held or self._cycle.mode.at_rest:  # at rest, it is between two parts
             return
         trajectory, cycle = self._trajectory, self._cycle
         most = trajectory.agility.acceleration
-        newest = cycle.along.newest
+        newest = cycle.line.shaped.along.newest
         speed = max(trajectory.velocity, float(np.abs(newest.qd).max()))
         left = trajectory.path.end - newest.q
         farthest = float(np.abs(left).max())
         way = left * min(speed * speed / (most * max(farthest, STILL)), 1.0)
         limits = np.array(cycle.description.limits.torque)
         room = PAUSE_SHARE * acceleration_on_way(
-            cycle.inverse_dynamics, trajectory.path, newest.q, way, speed, limits
+            cycle.line.dynamics, trajectory.path, newest.q, way, speed, limits
         )
         if not trajectory.steady:  # the slider is changing its speed already, and may use all
             room = most

@@ -9,6 +9,7 @@ import numpy as np
 from tvist_controller.ahead import MAX_AHEAD, Ahead
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.cycle import ControlCycle
+from tvist_controller.line_mode import LineMode
 from tvist_controller.stops import StopPlan, StopPlanner
 from tvist_controller.trajectory import Forecast, JointStop, PathStop, StuckError, Trajectory
 from tvist_plant.plant import PERIOD
@@ -31,7 +32,7 @@ class Outlook:
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
-        self.stops = StopPlanner(cycle.description, cycle.inverse_dynamics, PERIOD)
+        self.stops = StopPlanner(cycle.description, cycle.line.dynamics, PERIOD)
         """Planner of stops."""
         self._wanted = math.inf
 
@@ -53,12 +54,12 @@ class Outlook:
 
     def _ahead(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Ahead:
         """Start a simulation as in `foresee`, which the caller runs as far as needed."""
-        unshaped = self._cycle.unshaped
-        present, line_filter, shaped = self._cycle.fork()
-        trajectory = present if trajectory is None else trajectory.fork()
-        if tvist is not None and not unshaped:
+        cycle, line = self._cycle, self._cycle.line
+        trajectory = (trajectory or cycle.trajectory).fork()
+        line_filter = line.filter.fork() if cycle.mode.shaped else None
+        if tvist is not None and line_filter is not None:
             line_filter.use(tvist.fork())
-        return Ahead(trajectory, None if unshaped else line_filter, shaped)
+        return Ahead(trajectory, line_filter, line.shaped.fork())
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
         """Come to rest as quickly as permitted.
@@ -74,21 +75,21 @@ class Outlook:
             The stop; None if a stop that is already in progress is as quick, and continues.
         """
         cycle, wanted = self._cycle, math.inf if deceleration is None else deceleration
-        if (cycle.stopping or cycle.running_out) and wanted <= self._wanted:
+        if cycle.mode in {LineMode.STOPPING, LineMode.RUNNING_OUT} and wanted <= self._wanted:
             return None
         plan = self.plan_stop(deceleration)
         self._wanted = wanted
         if plan is None:
             return None
         if plan.trajectory is None:
-            cycle.run_out()
+            cycle.begin(cycle.trajectory, LineMode.RUNNING_OUT)
         else:
-            cycle.bypass(plan.trajectory)
+            cycle.begin(plan.trajectory, LineMode.STOPPING)
         return plan
 
     def brake(self, trajectory: Trajectory) -> None:
         """Follow the arm while its brakes bring it to rest; no stop replaces this."""
-        self._cycle.bypass(trajectory)
+        self._cycle.begin(trajectory, LineMode.STOPPING)
         self._wanted = math.inf
 
     def plan_stop(self, deceleration: float | None) -> StopPlan | None:
@@ -98,18 +99,24 @@ class Outlook:
 
     def _by_joints(self, deceleration: float | None) -> StopPlan | None:
         cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
-        stop = self.stops.by_joints(cycle.newest, deceleration, _anywhere if guard is None else guard.clear)
-        braking = cycle.stopping or present.acceleration > 0.0
+        stop = self.stops.by_joints(
+            cycle.line.shaped.joints.newest, deceleration, _anywhere if guard is None else guard.clear
+        )
+        braking = cycle.mode is LineMode.STOPPING or present.acceleration > 0.0
         if braking and (stop is None or stop.acceleration <= present.acceleration):
             return None
         if stop is None:  # no stop is clear and within the torque limits
             hardest = self.stops.highest
-            stop = self.stops.stop(cycle.newest, hardest) if guard is None else guard.fallback()
+            stop = (
+                self.stops.stop(cycle.line.shaped.joints.newest, hardest)
+                if guard is None
+                else guard.fallback()
+            )
         return self._plan(stop, deceleration, stop.duration, stop.end)
 
     def _on_path(self, forecast: Forecast, deceleration: float | None) -> StopPlan | None:
         cycle, forecast = self._cycle, self._shaped(forecast)
-        state, newest = cycle.along.published, cycle.along.position
+        state, newest = cycle.line.shaped.along.published, cycle.line.shaped.along.position
         stop = self.stops.on_path(state, newest, forecast, deceleration)
         lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
         ahead = None
@@ -128,24 +135,24 @@ class Outlook:
                 lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead.references[-1])
         if stop is not None:
             return self._plan(stop, deceleration, stop.duration, stop.end)
-        return None if cycle.stopping else lets_run_out
+        return None if cycle.mode is LineMode.STOPPING else lets_run_out
 
     def _plan(
         self, stop: JointStop | PathStop | None, wanted: float | None, duration: float, end: Floats
     ) -> StopPlan:
         kept = None if stop is None else stop.acceleration
-        way = float(np.abs(end - self._cycle.position).max())
+        way = float(np.abs(end - self._cycle.line.shaped.joints.position).max())
         return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
 
     def _shaped(self, forecast: Forecast) -> Forecast:
         """Return the forecast of a motion after the filter."""
         cycle = self._cycle
-        if cycle.stopping:
+        if cycle.mode is LineMode.STOPPING:
             return forecast
-        peak, direction = cycle.line_filter.peak, forecast.path.direction
-        known = peak == 1.0 and not cycle.line_filter.fading and forecast.steady > 0.0
+        peak, direction = cycle.line.filter.peak, forecast.path.direction
+        known = peak == 1.0 and not cycle.line.filter.fading and forecast.steady > 0.0
         if known:  # the filter's output is delayed, so it still contains earlier decelerations
-            steps = np.diff(cycle.line_filter.window() @ direction)
+            steps = np.diff(cycle.line.filter.window() @ direction)
             known = bool((np.diff(steps) >= -EVEN * float(direction @ direction)).all())
         return replace(
             forecast,

@@ -2,8 +2,9 @@
 
 from typing import NamedTuple
 
-from tvist_controller.cycle import ControlCycle, Sample
+from tvist_controller.cycle import ControlCycle
 from tvist_controller.overload import Overload
+from tvist_controller.sample import Sample
 from tvist_protocol.replies import Code
 
 
@@ -40,7 +41,7 @@ class Protection:
             moment = sample.measured.moment[joint]
             why = f"torque of joint {name} is {moment:.0f} N m, beyond its limit of {limit:g} for more than 10 ms"
             found.append(Danger(why, "limit_torque"))
-        fault = self._cycle.line_filter.fault
+        fault = self._cycle.line.filter.fault
         if fault is not None:  # the filter continues with old weights, because its shaper's function fails
             found.append(Danger(fault, None))
         return found

@@ -5,14 +5,14 @@ from msgspec import Struct
 
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.control.kinematics import ForwardKinematics
-from tvist_controller.cycle import Sample
+from tvist_controller.sample import Sample
 from tvist_controller.state_layout import Layout, width, write_state
 from tvist_plant.plant import PERIOD
 from tvist_protocol.codec import encode
 from tvist_protocol.stream import State
 
 Key = tuple[object, ...]
-NO_MOTORS: Floats = np.empty((0, 0))
+NOTHING: Floats = np.empty((0, 0))
 
 
 class Layouts:
@@ -36,6 +36,8 @@ class Report(Struct, gc=False):
     """Number of the tick."""
     sample: Sample
     """Signals along the control line."""
+    unshaped: Floats | None
+    """q, q̇ and q̈ without the filter at the tick of the target, shape (3, n); None if the target is that."""
     modes: tuple[int, int, int]
     """Robot mode, safety mode and runtime state."""
     speed: float
@@ -78,18 +80,19 @@ class Report(Struct, gc=False):
         motors, measured = sample.motors, sample.measured
         key = (
             width(tick), None if sequence is None else width(sequence), self.modes, self.missed, self.clipped,
-            sample.apart, motors is not None and motors.limited, motors is None, len(f_d),
+            self.unshaped is None, motors is not None and motors.limited, motors is None, len(f_d),
         )  # fmt: skip
         template, places, integers = self.layouts.of(key, self)
-        leading = NO_MOTORS if motors is None else np.array([motors.qd, motors.qdd, motors.torque])
+        leading = NOTHING if motors is None else np.array([motors.qd, motors.qdd, motors.torque])
+        unshaped = NOTHING if self.unshaped is None else self.unshaped
         return write_state(
             template, places, integers, tick, sequence or 0, tick * PERIOD, self.speed, self.delay, sample.signals,
-            sample.apart, measured.q, measured.qd, measured.moment, measured.accelerometer,
+            unshaped, measured.q, measured.qd, measured.moment, measured.accelerometer,
             self.kinematics.chain, self.kinematics.offset, f_d, self.zeta, leading,
         ).tobytes()  # fmt: skip
 
     def _make(self) -> State:
-        sample, unshaped, motors = self.sample, self.sample.unshaped, self.sample.motors
+        sample, unshaped, motors = self.sample, self.unshaped, self.sample.motors
         target, measured = sample.target, sample.measured
         motion = self.kinematics.motion(measured.q, measured.qd).tolist()
         robot_mode, safety_mode, runtime = self.modes
@@ -117,9 +120,9 @@ class Report(Struct, gc=False):
             shaper_delay=self.delay,
             missed_ticks=self.missed,
             shaper_clipped=self.clipped,
-            unshaped_q=None if unshaped is None else unshaped.q.tolist(),
-            unshaped_qd=None if unshaped is None else unshaped.qd.tolist(),
-            unshaped_qdd=None if unshaped is None else unshaped.qdd.tolist(),
+            unshaped_q=None if unshaped is None else unshaped[0].tolist(),
+            unshaped_qd=None if unshaped is None else unshaped[1].tolist(),
+            unshaped_qdd=None if unshaped is None else unshaped[2].tolist(),
             motor_qd=None if motors is None else motors.qd.tolist(),
             motor_qdd=None if motors is None else motors.qdd.tolist(),
             motor_moment=None if motors is None else motors.torque.tolist(),

@@ -1,8 +1,9 @@
 """Conversion of a tick's signals into messages for clients."""
 
 from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
-from tvist_controller.cycle import Sample
 from tvist_controller.report import Layouts, Report
+from tvist_controller.sample import Sample
+from tvist_controller.unshaped_reference import UnshapedReference
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 from tvist_plant.plant import PERIOD, ModalPlant, Plant, PlantTruth
@@ -25,6 +26,7 @@ class Reporter:
         self._kinematics = ForwardKinematics(description)
         self._layouts = Layouts()
         self._true_modes: dict[str, list[float]] = {}
+        self._unshaped = UnshapedReference()
 
     def report(
         self,
@@ -38,7 +40,7 @@ class Reporter:
         setpoint_sequence: int | None,
         missed_ticks: int,
     ) -> Report:
-        """Return the report of a tick.
+        """Return the report of a tick; every tick needs one.
 
         Args:
             tick: Number of the tick.
@@ -51,8 +53,8 @@ class Reporter:
             missed_ticks: Number of ticks that began too late.
         """
         return Report(
-            tick, sample, modes, speed, tvist.f_d, tvist.zeta, tvist.delay + drive_delay, tvist.clipped,
-            setpoint_sequence, missed_ticks, self._kinematics, self._layouts,
+            tick, sample, self._unshaped.of(sample), modes, speed, tvist.f_d, tvist.zeta, tvist.delay + drive_delay,
+            tvist.clipped, setpoint_sequence, missed_ticks, self._kinematics, self._layouts,
         )  # fmt: skip
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
@@ -87,6 +89,10 @@ class Reporter:
             static_link_deflection=_listed(truth.static_link_deflection),
             **self._true_modes,
         )
+
+    def restart(self) -> None:
+        """Forget what the arm did, since it was placed somewhere at rest."""
+        self._unshaped.join()
 
     def forget_modes(self) -> None:
         """Have the modes computed anew, since the arm was placed elsewhere."""

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.control.kinematics import tool_motion
-from tvist_controller.control.line_tick import STATIC, TORQUE, UNSHAPED_Q
+from tvist_controller.control.line_tick import TORQUE
 from tvist_protocol.codec import encode
 from tvist_protocol.stream import State
 
@@ -105,7 +105,7 @@ def write_state(
     speed: float,
     delay: float,
     signals: Floats,
-    apart: bool,
+    unshaped: Floats,
     q: Floats,
     qd: Floats,
     moment: Floats,
@@ -127,8 +127,8 @@ def write_state(
         timestamp: Time of the tick [s].
         speed: Share of the programmed speed [-].
         delay: Delay of the shaper and of the drives [s].
-        signals: Signals before the arm, shape (12, n), see `line_tick`.
-        apart: Whether there is a target without the filter.
+        signals: Signals before the arm, shape (9, n), see `line_tick`.
+        unshaped: Target without the filter, if there is one, shape (3, n) or (0, n).
         q: Measured angles, shape (n,) [rad].
         qd: Measured velocities, shape (n,) [rad/s].
         moment: Measured torques, shape (n,) [N m].
@@ -142,8 +142,7 @@ def write_state(
     numbers = np.empty(places.shape[0])
     numbers[0] = timestamp
     end = gather(numbers, speed, delay, signals, q, qd, moment, accelerometer, chain, tool, f_d, zeta)
-    if apart:
-        end = append(numbers, end, signals[UNSHAPED_Q:STATIC])
+    end = append(numbers, end, unshaped)
     append(numbers, end, motors)
     out, bits = template.copy(), numbers.view(np.uint64)
     for i in range(places.shape[0]):

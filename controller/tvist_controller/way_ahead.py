@@ -33,32 +33,32 @@ class WayAhead:
         self._outlook = outlook
         self.coming: Callable[[], Sequence[PlannedMotion]] = tuple
         """Returns the parts of the present motion that have not begun."""
-        room = StreamTorqueRoom(cycle.description, cycle.inverse_dynamics)
+        room = StreamTorqueRoom(cycle.description, cycle.line.dynamics)
         self._guard = LookAhead(collisions, outlook.stops, room)
         reach = np.array(cycle.description.limits.position)
         self._guide_guard = LookAhead(collisions, outlook.stops, room, reach=reach)
 
-    def begin(self) -> None:
-        """Start to monitor a stream that begins from rest."""
-        self._guard.begin(self._cycle.newest)
-        self._cycle.guard = self._guard
+    def guard_of_stream(self) -> LookAhead:
+        """Return the guard of a stream that begins from rest."""
+        self._guard.begin(self._cycle.line.shaped.joints.newest)
+        return self._guard
 
-    def begin_guided(self) -> None:
-        """Start to monitor a guided motion from the present state of motion, whatever that is.
+    def guard_of_guided(self) -> LookAhead:
+        """Return the guard of a guided motion from the present state of motion, whatever that is.
 
         Raises:
             RefusalError: There is no clear stop from here, as on a narrow path; nothing has changed.
         """
         cycle, guard, stops = self._cycle, self._guide_guard, self._outlook.stops
-        state = cycle.newest
+        state = cycle.line.shaped.joints.newest
         guard.begin(state)
-        if not cycle.at_rest:
+        if not cycle.mode.at_rest:
             stop = stops.by_joints(state, None, guard.clear)
             if stop is None and not guard.clear(stops.stop(state, stops.highest)):
                 why, code = guard.obstacle
                 raise RefusalError(code, "", f"the arm cannot leave its path here: {why}")
             guard.take(state, stops.stop(state, stops.highest) if stop is None else stop)
-        cycle.guard = guard
+        return guard
 
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
         """Time until the shaped reference rests [s], and the angle that the joint that turns most still turns [rad].
@@ -95,18 +95,18 @@ class WayAhead:
         """
         cycle = self._cycle
         coming = [part.path.whole for part in self.coming()]
-        if cycle.at_rest:
+        if cycle.mode.at_rest:
             return self._first(coming)
         trajectory = cycle.trajectory
         if (forecast := trajectory.forecast) is not None:
-            return self._first([forecast.path.way(cycle.along.position, forecast.end), *coming])
+            return self._first([forecast.path.way(cycle.line.shaped.along.position, forecast.end), *coming])
         if trajectory.foreseeable and (ahead := self._outlook.foresee(tvist)) is not None:
             return self._on(ahead)
         guard = self._guard if cycle.guard is None else cycle.guard
-        stop = self._outlook.stops.by_joints(cycle.newest, None, guard.clear)
+        stop = self._outlook.stops.by_joints(cycle.line.shaped.joints.newest, None, guard.clear)
         if stop is None:
             return guard.met
-        guard.take(cycle.newest, stop)
+        guard.take(cycle.line.shaped.joints.newest, stop)
         return None
 
     def _first(self, ways: Sequence[Way]) -> Meeting | None:
@@ -123,9 +123,9 @@ class WayAhead:
         Raises:
             RefusalError: There would be a collision; nothing has changed.
         """
-        collisions, q = self._collisions, self._cycle.position
+        collisions, q = self._collisions, self._cycle.line.shaped.joints.position
         before = collisions.carried
-        escaping = self._cycle.at_rest or collisions.meeting(q) is not None
+        escaping = self._cycle.mode.at_rest or collisions.meeting(q) is not None
         collisions.carry(payload)
         met = None if escaping else collisions.meeting(q)
         met = met or self.rest_of_way(tvist)
@@ -141,7 +141,7 @@ class WayAhead:
             RefusalError: There would be a collision.
         """
         cycle = self._cycle
-        if cycle.guard is None or cycle.stopping or not cycle.trajectory.foreseeable:
+        if not (cycle.mode.guarded and cycle.trajectory.foreseeable):
             return
         met = self.rest_of_way(tvist)
         if met is not None:
@@ -150,10 +150,10 @@ class WayAhead:
     def _tail_is_spacious(self, end: JointStop) -> bool:
         """Return whether there is room for any output of a filter from the references that it may still use."""
         cycle = self._cycle
-        if cycle.tvist.peak > 1.0:
+        if cycle.line.filter.tvist.peak > 1.0:
             return False
-        q = cycle.position
-        window = np.abs(cycle.line_filter.window() - q).max(axis=0)
+        q = cycle.line.shaped.joints.position
+        window = np.abs(cycle.line.filter.window() - q).max(axis=0)
         _, qd, qdd = end.at(0.0)
         return self._guard.is_spacious(q, window + self._guard.turned(qd, qdd, end.acceleration, end.jerk))
 

@@ -11,10 +11,11 @@ from tvist_controller.control.differentiator import Floats
 from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.control.line_tick import all_to_drives
 from tvist_controller.cycle import ControlCycle
+from tvist_controller.rehearsal import Still
 from tvist_controller.trajectory import Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Measurement, Plant, PlantTruth, Playable, Response, played
+from tvist_plant.plant import PERIOD, Plant, Playable, Response, played
 from tvist_shaping.base import Filter
 
 
@@ -67,7 +68,7 @@ class DrivenLine:
     def __init__(
         self, description: RobotDescription, passes: Filter, start: Floats, declared: Payload
     ) -> None:
-        self._drives = _Drives(description.joints)
+        self._drives = Still(description.joints)
         self._cycle = ControlCycle(
             description, passes, q=start, declared=declared, carried=declared, seed=0, plant=self._drives
         )
@@ -90,9 +91,9 @@ class DrivenLine:
             elastic: Elastic feed-forward for the drives; None for that of the paper's controller.
         """
         cycle = self._cycle
-        cycle.use(cycle.tvist, elastic)
+        cycle.use(cycle.line.filter.tvist, elastic)
         cycle.reset(start)
-        rest, delay = self._drives.last, cycle.drive_delay
+        rest, delay = self._drives.last, cycle.line.drives.delay
         if elastic is not None:
             return Driven(rest, *self._tick_by_tick(shaped, ticks, resting), delay)
         whole = np.empty((ticks, len(start)))
@@ -100,39 +101,18 @@ class DrivenLine:
         moving = min(len(shaped), ticks - resting)
         whole[resting : resting + moving] = shaped[:moving]
         targets, commands = np.empty((2, ticks, 3, len(start)))
-        all_to_drives(start, whole, PERIOD, *cycle.kernel_parts, targets, commands)
+        all_to_drives(start, whole, PERIOD, *cycle.line.kernel_parts, targets, commands)
         return Driven(rest, targets, commands, delay)
 
     def _tick_by_tick(self, shaped: Floats, ticks: int, resting: int) -> tuple[Floats, Floats]:
         targets, commands = np.empty((2, ticks, 3, shaped.shape[1]))
         for tick in range(ticks):
             if tick == resting:
-                self._cycle.start(Player(shaped))
+                self._cycle.begin(Player(shaped))
             target, command = self._cycle.step().target, self._drives.last
             targets[tick] = target.q, target.qd, target.qdd
             commands[tick] = command.q, command.qd, command.torque
         return targets, commands
-
-
-class _Drives:
-    """A plant that only keeps its command."""
-
-    payload = Payload()
-
-    def __init__(self, joints: int) -> None:
-        still = np.zeros(joints)
-        self.last = DriveCommand(still, still, still)
-        self._nothing = Measurement(still, still, still, np.zeros(3))
-
-    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:  # noqa: ARG002
-        return self.step(command)
-
-    def step(self, command: DriveCommand) -> Measurement:
-        self.last = command
-        return self._nothing
-
-    def truth(self) -> PlantTruth | None:
-        return None
 
 
 def respond(plant: Plant, driven: Driven, seed: int) -> Response:

@@ -45,7 +45,7 @@ def judge(description: RobotDescription, seed: int) -> ChangeOutcome:
     random = np.random.default_rng([seed, 14])
     robot = _under_way(description, seed, random)
     before = len(robot.references)
-    resting = robot.controller.cycle.at_rest
+    resting = robot.controller.cycle.mode.at_rest
     kind, fields = _draw(description, random)
     reply = robot.send(kind, **fields)
     later = int(random.integers(0, 600))

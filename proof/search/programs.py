@@ -89,7 +89,7 @@ class ProgramSequence(Sequence):
         controller = self.robot.controller
         for _ in range(count):
             self._playing = controller.programs.state == "PLAYING"
-            self._rested, self._declared = controller.cycle.at_rest, controller.declared
+            self._rested, self._declared = controller.cycle.mode.at_rest, controller.declared
             super()._tick(1)
 
     def _watch(self) -> None:

@@ -105,7 +105,7 @@ class Sequence:
         """Return the future references if no command comes, provided that the motion follows a line of the joints."""
         motion, cycle = self.robot.controller.motion, self.robot.controller.cycle
         path = cycle.trajectory.path
-        if cycle.at_rest or path is None or path.posture_of is not None:
+        if cycle.mode.at_rest or path is None or path.posture_of is not None:
             return None
         ahead = motion.outlook.foresee()
         return None if ahead is None else Undisturbed(ahead[1:], self.robot.controller.tick_number)
@@ -135,7 +135,9 @@ class Sequence:
         robot, limits = self.robot, self.description.limits
         q = np.array(robot.references[-3:])
         activity = robot.controller.motion.activity
-        self._braked = activity is Activity.BRAKING or (self._braked and not robot.controller.cycle.at_rest)
+        self._braked = activity is Activity.BRAKING or (
+            self._braked and not robot.controller.cycle.mode.at_rest
+        )
         if self._braked:
             self._ahead, self._excused = None, True  # brakes do not follow a path
         if not np.isfinite(q).all():
@@ -143,7 +145,7 @@ class Sequence:
         if len(q) == 3 and not self._braked:
             if (np.abs(q[-1]) > np.array(limits.position) + ROUNDING).any():
                 raise self._broken(f"a reference is at {q[-1].tolist()}, beyond a joint's range")
-            shaper = robot.controller.cycle.tvist.name
+            shaper = robot.controller.cycle.line.filter.tvist.name
             for what, share in zip(("velocity", "acceleration"), speeds(self.description, q), strict=True):
                 if share > WITHIN:
                     raise self._broken(f"a reference with {shaper} has {share:.4f} of the limit of {what}")
@@ -238,7 +240,7 @@ class Sequence:
 
     def stream(self) -> object:
         """Start a stream."""
-        self._sequence, self._at = 0, self.robot.controller.cycle.reference
+        self._sequence, self._at = 0, self.robot.controller.cycle.sample.reference
         self._towards = self._random.uniform(-3, 3, self.description.joints)
         self._pace = float(self._random.choice([0.004, 0.02]))
         return self._limited(c.ServoStart)
@@ -252,7 +254,7 @@ class Sequence:
     def payload(self) -> object:
         """Declare another payload."""
         payload = far_payload(self._random, self.description.limits.payload)
-        resting = self.robot.controller.cycle.at_rest
+        resting = self.robot.controller.cycle.mode.at_rest
         reply = self.robot.send(c.SetPayload, mass=payload.mass, com=payload.com, inertia=payload.inertia)
         if resting:  # at rest any payload may be declared, even one that leads to a meeting
             collisions = self.robot.controller.motion.collisions

@@ -125,7 +125,7 @@ class Subject:
         """Advance time by a number of ticks."""
         for _ in range(count):
             state, events = self.controller.tick()
-            self.references.append(self.controller.cycle.position)
+            self.references.append(self.controller.cycle.line.shaped.joints.position)
             self.actual.append(np.array(state.actual_q))
             self.events += events
 
@@ -144,7 +144,7 @@ class Subject:
         if motion.activity is Activity.MOVING and motion.motions.coming:
             return False
         still = len(q) > 2 and max(np.abs(q[-1] - q[-2]).max(), np.abs(q[-2] - q[-3]).max()) <= STILL
-        return cycle.at_rest or (still and cycle.trajectory.standing)
+        return cycle.mode.at_rest or (still and cycle.trajectory.standing)
 
 
 def torques(description: RobotDescription, payload: Declared, references: Floats) -> Floats:

@@ -6,9 +6,10 @@ import numpy as np
 from tvist_controller.controller import Controller
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.outlook import Outlook
+from tvist_controller.safety import StreamTorqueRoom
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.sink import Sink
-from tvist_controller.trajectory import MotionLimits
+from tvist_controller.trajectory import JointLine, MotionLimits, SetpointStream, quickest_motion
 from tvist_plant.description import RobotDescription, load
 from tvist_plant.plant import PERIOD, Measurement, Plant
 from tvist_protocol import commands as c
@@ -92,13 +93,37 @@ def calibration(mass: float = 5.0, robot: str = "UR5e", name: str = "test", **po
     )
 
 
-def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0, plant: Plant | None = None) -> ControlCycle:
+class Line(ControlCycle):
+    """A control line with short names for what tests look at."""
+
+    at_rest = property(lambda self: self.mode.at_rest)
+    tvist = property(lambda self: self.line.filter.tvist)
+    dynamics = property(lambda self: self.line.dynamics)
+    plant = property(lambda self: self.line.plant)
+    reference = property(lambda self: self.sample.reference)
+    along = property(lambda self: self.line.shaped.along)
+    position = property(lambda self: self.line.shaped.joints.position)
+    newest = property(lambda self: self.line.shaped.joints.newest)
+
+    def plan(self, target, limits: MotionLimits, speed: float = 1.0):
+        return quickest_motion(JointLine(self.reference, target), limits, H, speed)
+
+    def stream(self, stream_period: float, limits: MotionLimits) -> SetpointStream:
+        """Follow set-points from rest; no guard watches."""
+        spared, reach = self.line.filter.spared(limits), np.array(self.description.limits.position)
+        torque = StreamTorqueRoom(self.description, self.dynamics)
+        return self.begin(
+            SetpointStream(self.reference, stream_period, spared, H, reach=reach, torque=torque)
+        )
+
+
+def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0, plant: Plant | None = None) -> Line:
     payload = body(paper_payload(UR5E))
     tvist = TvistFilter(shaper(name), estimator or Polynomial(**POLYNOMIAL), joints=6)
-    return ControlCycle(UR5E, tvist, q=np.array(q), declared=payload, carried=payload, seed=seed, plant=plant)
+    return Line(UR5E, tvist, q=np.array(q), declared=payload, carried=payload, seed=seed, plant=plant)
 
 
-def stop(line: ControlCycle, deceleration: float | None):
+def stop(line: Line, deceleration: float | None):
     """Stop a line; what is done, or None where a stop goes on."""
     if not hasattr(line, "outlook"):
         line.outlook = Outlook(line)
@@ -120,7 +145,7 @@ class NoArm:
         return None
 
 
-def without_arm(*arguments, **named) -> ControlCycle:
+def without_arm(*arguments, **named) -> Line:
     """A `cycle` with nothing at its end."""
     return cycle(*arguments, plant=NoArm(), **named)
 
@@ -172,7 +197,7 @@ class Robot:
     def until_rest(self, most: int = 5000):
         for _ in range(most):
             self.tick()
-            if self.controller.cycle.at_rest:
+            if self.controller.cycle.mode.at_rest:
                 return self.states[-1]
         raise AssertionError("still moving")
 

@@ -98,8 +98,8 @@ def test_a_shaper_that_exceeds_more_slows_down_a_guided_motion(kind):
         if tick == 100:
             assert not isinstance(robot.send(c.SetShaper, name="zvddd"), Refused)
             cycle, arms = robot.controller.cycle, arm_limits(robot.description)
-            limits, spared = cycle.trajectory.limits, cycle.spared(arms)
-            assert not cycle.unshaped
+            limits, spared = cycle.trajectory.limits, cycle.line.filter.spared(arms)
+            assert cycle.mode.shaped
             assert limits.velocity == spared.velocity < arms.velocity
             assert limits.acceleration == spared.acceleration < arms.acceleration
         if tick % 50 == 0 and kind == "servo_j":

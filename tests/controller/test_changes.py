@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from tvist_controller.collision import CollisionModel
+from tvist_controller.control.differentiator import STILL
 from tvist_controller.control.inverse_dynamics import SLEW, InverseDynamics
-from tvist_controller.cycle import STILL
 from tvist_controller.outlook import Outlook
 from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import body, paper_payload
@@ -103,7 +103,7 @@ def test_a_motion_keeps_its_limits_and_its_target_through_changes_of_the_filter(
     line = a_line(first)
     limits = PAPER if seed % 2 else MotionLimits(*random.uniform((0.5, 1.0, 50.0), (3.0, 8.0, 1000.0)))
     target = Q1 + random.uniform(-1.0, 1.0, 6) * random.uniform(0.1, 2.0)
-    duration = line.start(line.plan(target, limits)).duration
+    duration = line.begin(line.plan(target, limits)).duration
     ticks = np.sort(random.integers(0, int(duration / H), 3))
     changes = {int(tick): a_filter(random) for tick in ticks}
     shaped = drive(line, first, changes, limits)
@@ -119,7 +119,7 @@ def test_of_changes_during_a_change_the_newest_is_what_remains():
     random = np.random.default_rng(0)
     first = a_filter(random, "none")
     line = a_line(first)
-    line.start(line.plan(Q3, PAPER))
+    line.begin(line.plan(Q3, PAPER))
     # The second one begins to fade in; the others come while it does, ten ticks apart.
     changes = {450 + 10 * k: a_filter(random, name) for k, name in enumerate(("zvd", "zv", "ei3", "ei"))}
     drive(line, first, changes, PAPER)
@@ -130,12 +130,12 @@ def test_of_changes_during_a_change_the_newest_is_what_remains():
 
 def test_a_change_that_has_not_begun_to_count_gives_way_to_the_next():
     line = a_line(TvistFilter(shaper("zvd"), Fixed([6.7], [0.1]), joints=6))
-    line.start(line.plan(Q3, PAPER))
+    line.begin(line.plan(Q3, PAPER))
     for _ in range(500):
         line.step()
     line.use(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
     line.use(newest := TvistFilter(shaper("ei3"), Fixed([6.7], [0.1]), joints=6))
-    assert line.line_filter._fade.new is newest
+    assert line.line.filter._fade.new is newest
 
 
 def test_a_stream_at_its_limit_keeps_it_through_a_change():
@@ -158,8 +158,8 @@ def test_a_stream_at_its_limit_keeps_it_through_a_change():
     shaped = np.array(shaped)
     own = np.abs(np.diff(shaped, 2, axis=0)) / H**2
     assert (own / alone.bound(2, PAPER.acceleration, len(shaped))).max() < 1.0 + TOLERANCE
-    assert line.line_filter._fade is None
-    line.start(line.end_of(stream))
+    assert line.line.filter._fade is None
+    line.begin(stream.end)
     while not line.at_rest:
         line.step()
     assert np.abs(line.position - line.reference).max() <= STILL
@@ -175,22 +175,22 @@ def test_paused_a_change_is_made_where_nothing_moves():
     robot.tick(5)
     held = robot.column("target_q")[-100:]
     assert (held == held[0]).all()
-    assert robot.controller.cycle.line_filter._fade is None
+    assert robot.controller.cycle.line.filter._fade is None
     robot.send(c.Resume)
     robot.until_rest()
     assert robot.kinds()[-1] == "motion_done"
-    assert robot.controller.cycle.position == pytest.approx(Q2, abs=STILL)
+    assert robot.controller.cycle.line.shaped.joints.position == pytest.approx(Q2, abs=STILL)
 
 
 def test_a_stop_during_a_change_is_a_stop_and_the_new_filter_is_in_force_after_it():
     line = a_line(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
-    line.start(line.plan(Q3, PAPER))
+    line.begin(line.plan(Q3, PAPER))
     new = TvistFilter(shaper("ei"), Fixed([6.7], [0.1]), joints=6)
     for tick in range(600):
         if tick == 500:
             line.use(new)
         line.step()
-    assert 0.0 < line.line_filter._fade.share < 1.0
+    assert 0.0 < line.line.filter._fade.share < 1.0
     before = line.newest
     stop(line, None)
     line.step()
@@ -198,25 +198,25 @@ def test_a_stop_during_a_change_is_a_stop_and_the_new_filter_is_in_force_after_i
     while not line.at_rest:
         line.step()
     assert line.tvist is new
-    assert line.line_filter._fade is None
+    assert line.line.filter._fade is None
     assert (line.tvist.filter(line.reference) == line.reference).all()
 
 
 def test_a_reset_during_a_change_leaves_nothing_of_it():
     line = a_line(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
-    line.start(line.plan(Q3, PAPER))
+    line.begin(line.plan(Q3, PAPER))
     for tick in range(600):
         if tick == 500:
             line.use(TvistFilter(shaper("ei"), Fixed([6.7], [0.1]), joints=6))
-            line.declare(body(paper_payload(UR5E, 1.0)))
+            line.dynamics.declare(body(paper_payload(UR5E, 1.0)))
         line.step()
     line.reset(Q2)
     fresh = a_line(TvistFilter(shaper("ei"), Fixed([6.7], [0.1]), joints=6))
-    fresh.declare(body(paper_payload(UR5E, 1.0)))
+    fresh.dynamics.declare(body(paper_payload(UR5E, 1.0)))
     fresh.reset(Q2)
     assert line.at_rest
     for each in (line, fresh):
-        each.start(each.plan(Q1, PAPER))
+        each.begin(each.plan(Q1, PAPER))
     for _ in range(300):
         one, other = line.step(), fresh.step()
         assert (one.target.q == other.target.q).all()
@@ -229,14 +229,14 @@ def test_another_payload_makes_no_step_in_torque_and_ends_as_if_it_had_always_be
     first, then = (body(paper_payload(UR5E, mass)) for mass in masses)
     changed, never, always = (without_arm() for _ in range(3))
     for line, payload in ((changed, first), (never, first), (always, then)):
-        line.declare(payload)
+        line.dynamics.declare(payload)
         line.reset(Q1)
         if moving:
-            line.start(line.plan(Q3, PAPER))
+            line.begin(line.plan(Q3, PAPER))
     torques = []
     for tick in range(700):
         if tick == 100:
-            changed.declare(then)
+            changed.dynamics.declare(then)
         torques.append([line.step().torque for line in (changed, never, always)])
     torque, old, new = np.swapaxes(np.array(torques), 0, 1)
     assert (torque[:100] == old[:100]).all()
@@ -253,17 +253,17 @@ def test_another_payload_makes_no_step_in_torque_and_ends_as_if_it_had_always_be
 @pytest.mark.parametrize("masses", [(5.0, 0.0), (0.0, 5.0)])
 def test_a_stop_while_the_payload_changes_is_safe_with_either(masses):
     line = without_arm()
-    line.declare(body(paper_payload(UR5E, masses[0])))
+    line.dynamics.declare(body(paper_payload(UR5E, masses[0])))
     line.reset(Q1)
-    line.start(line.plan(Q2 + np.array([0.0, 0.4, 0.0, 0.0, 0.0, 0.0]), MotionLimits(2.5, 6.0, 500.0)))
+    line.begin(line.plan(Q2 + np.array([0.0, 0.4, 0.0, 0.0, 0.0, 0.0]), MotionLimits(2.5, 6.0, 500.0)))
     for tick in range(200):
         if tick == 150:
-            line.declare(body(paper_payload(UR5E, masses[1])))
+            line.dynamics.declare(body(paper_payload(UR5E, masses[1])))
         line.step()
     state, planned = line.newest, Outlook(line).plan_stop(None).trajectory
     for mass in masses:
         dynamics = InverseDynamics(UR5E, body(paper_payload(UR5E, mass)))
-        present = line.inverse_dynamics.effort(state.q, state.qd, state.qdd)
+        present = line.dynamics.effort(state.q, state.qd, state.qdd)
         limit = np.maximum(TORQUE_SHARE * np.array(UR5E.limits.torque), present)
         states = planned.states(np.linspace(0.0, planned.duration, 49)[1:])
         assert (np.abs(dynamics.torques(*states)) <= limit + 1e-9).all()

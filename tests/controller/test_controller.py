@@ -6,6 +6,7 @@ import pytest
 
 from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
+from tvist_controller.line_mode import LineMode
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.streaming import TIMEOUT
 from tvist_protocol import commands as c
@@ -145,7 +146,7 @@ def test_a_payload_is_declared_and_the_arm_keeps_what_it_carries():
     moments = robot.tick().target_moment
     assert robot.send(c.SetPayload, mass=1.0, com=DISC.com, inertia=DISC.inertia) == Done()
     assert abs(robot.tick().target_moment[1]) < abs(moments[1])
-    assert robot.controller.cycle.plant.payload.mass == 5.0
+    assert robot.controller.cycle.line.plant.payload.mass == 5.0
     assert info_of(robot.controller).payload.mass == 1.0
 
 
@@ -197,7 +198,7 @@ def test_a_reset_without_a_pose_stays_where_it_is():
     moving(robot)
     robot.send(SimulationReset)
     assert robot.tick().target_q == pytest.approx(robot.states[-2].target_q, abs=1.5 * H * 2)
-    assert robot.controller.cycle.at_rest
+    assert robot.controller.cycle.mode.at_rest
 
 
 def test_a_reset_keeps_the_seed_that_was_chosen_last():
@@ -215,7 +216,7 @@ def test_a_reset_changes_what_is_carried_and_not_what_is_declared():
     robot.send(SimulationReset, payload=HEAVY)
     state = robot.tick()
     assert state.target_moment == declared
-    assert robot.controller.cycle.plant.payload.mass == HEAVY.mass
+    assert robot.controller.cycle.line.plant.payload.mass == HEAVY.mass
     assert robot.controller.declared == DISC
 
 
@@ -486,7 +487,7 @@ def test_a_client_that_goes_takes_its_lease_and_its_motion_with_it():
     motion = moving(robot)
     for other in (("b", "1f"), ("a", "2f"), ("a", "")):
         controller.client_gone(*other)
-        assert not controller.cycle.stopping
+        assert controller.cycle.mode is not LineMode.STOPPING
     controller.client_gone("a", "1f")
     robot.tick()
     assert [(e.kind, e.id) for e in robot.events[1:]] == [("lease_lost", None), ("motion_stopped", motion)]

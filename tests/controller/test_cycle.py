@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tvist_controller.cycle import STILL
+from tvist_controller.control.differentiator import STILL
+from tvist_controller.line_mode import LineMode
 from tvist_shaping.estimators.fixed import Fixed
 
 from .robots import FITTING, PAPER, Q1, Q2, Q3, H, cycle, without_arm
@@ -13,7 +14,7 @@ GRAVITY = np.array([0.0, 0.0, -9.81])
 
 def motion(line, target, limits=PAPER):
     """Shaped reference at every tick of a motion, and for a while after; ticks until it was said to rest."""
-    line.start(line.plan(np.array(target), limits))
+    line.begin(line.plan(np.array(target), limits))
     shaped, rested = [], None
     for tick in range(6000):
         line.step()
@@ -34,7 +35,7 @@ def alpha(line):
 def residual(name):
     """Largest acceleration from 10 ms to 0.3 s after the shaped reference rests."""
     line = cycle(name, estimator=Fixed([6.7], [0.34]))
-    line.start(line.plan(Q2, PAPER))
+    line.begin(line.plan(Q2, PAPER))
     while not line.at_rest:
         line.step()
     after = []
@@ -80,7 +81,7 @@ def test_moves_one_after_the_other_begin_where_the_reference_ended():
     """Not where the shaped reference was when it was said to rest, up to 1e-7 rad before."""
     line = without_arm()
     for target in (Q1 + 0.2, Q1 + 0.5):
-        line.start(line.plan(target, PAPER))
+        line.begin(line.plan(target, PAPER))
         line.step()
         while not line.at_rest:
             line.step()
@@ -99,7 +100,7 @@ def test_shaping_lasts_as_long_as_its_delay_says():
 
 def test_the_target_s_derivatives_are_central_differences_of_the_shaped_reference():
     line = without_arm()
-    line.start(line.plan(Q3, PAPER))
+    line.begin(line.plan(Q3, PAPER))
     samples = [line.step().target for _ in range(700)]
     q = np.array([target.q for target in samples])
     qd, qdd = np.array([target.qd for target in samples]), np.array([target.qdd for target in samples])
@@ -113,12 +114,12 @@ def test_what_a_stream_leaves_behind_comes_to_rest_through_the_filter():
     for k in range(300):
         stream.offer(k, Q1 + 0.2 * (1 - np.cos(2.0 * k * H)))
         line.step()
-    line.start(line.end_of(stream))
+    line.begin(stream.end)
     shaped = []
     while not line.at_rest:
         line.step()
         shaped.append(line.position)
-    assert not line.stopping
+    assert line.mode is not LineMode.STOPPING
     assert np.abs(np.diff(shaped, 2, axis=0)).max() / H**2 < 1.2 * PAPER.acceleration
     assert shaped[-1] == pytest.approx(line.reference, abs=STILL)
     assert len(shaped) * H > line.tvist.delay

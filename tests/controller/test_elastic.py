@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot, calibration, cut
+from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, calibration, cut
 
 from tvist_controller.calibrations import load
 from tvist_controller.control.differentiator import Target
@@ -14,7 +14,6 @@ from tvist_controller.control.elastic_lead import follow
 from tvist_controller.control.elastic_model import ElasticModel
 from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.control.kinematics import ForwardKinematics
-from tvist_controller.cycle import ControlCycle
 from tvist_controller.elastic_source import elastic_model
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.setup import Setup, body, paper_payload
@@ -33,26 +32,26 @@ def stage(description=UR5E, **how) -> ElasticFeedForward:
     return ElasticFeedForward(description, elastic_model(description, MODAL), H, **how)
 
 
-def line(shaper: str, q=Q1, *, mass=5.0, believed=None, description=UR5E, plant=None) -> ControlCycle:
+def line(shaper: str, q=Q1, *, mass=5.0, believed=None, description=UR5E, plant=None) -> Line:
     """A control line with a filter by name, as a server makes it."""
     declared = paper_payload(description, mass if believed is None else believed)
     setup = Setup(description, tuple(q), declared, MODAL, shaper=shaper)
     first = FilterPlanner(setup).first()
-    return ControlCycle(
+    return Line(
         description, first.tvist, elastic=first.elastic, q=np.array(q), declared=body(declared),
         carried=body(paper_payload(description, mass)), seed=1, plant=plant,
     )  # fmt: skip
 
 
-def move(cycle: ControlCycle, target, limits=PAPER):
+def move(cycle: Line, target, limits=PAPER):
     """Make a motion, and return its samples with 0.6 s of rest and the plant's truth for each."""
-    cycle.start(quickest_motion(JointLine(cycle.reference, np.array(target)), limits, H))
-    cycle.tvist.aim(np.array(target))
+    cycle.begin(quickest_motion(JointLine(cycle.sample.reference, np.array(target)), limits, H))
+    cycle.line.filter.tvist.aim(np.array(target))
     samples, truths, rest = [], [], 0
     while rest < 300:
         samples.append(cycle.step())
-        truths.append(cycle.plant.truth())
-        rest = rest + 1 if cycle.at_rest else 0
+        truths.append(cycle.line.plant.truth())
+        rest = rest + 1 if cycle.mode.at_rest else 0
     return samples, truths
 
 
@@ -175,7 +174,7 @@ def left_with(change) -> float:
     for name in ("none", "elastic"):
         cycle = line(name, Q1, description=description)
         if name == "elastic":
-            change(cycle.elastic)
+            change(cycle.line.drives.wanted)
         left[name] = ringing(move(cycle, Q3)[1])
     return left["elastic"] / left["none"]
 
@@ -233,7 +232,7 @@ def test_without_springs_it_is_refused_with_the_way_to_get_them():
 
 def test_the_drives_tick_counts_in_the_delay_that_is_published():
     robot = Robot(calibration=calibration(), shaper="elastic")
-    state, tvist = robot.tick(), robot.controller.cycle.tvist
+    state, tvist = robot.tick(), robot.controller.cycle.line.filter.tvist
     assert state.shaper_delay == pytest.approx(tvist.delay + H)
 
 
@@ -349,13 +348,13 @@ def test_a_lead_that_the_torque_does_not_permit_is_limited_and_told():
 
 def watched_commands(robot):
     """Commands that the drives get from now on."""
-    commands, step = [], robot.controller.cycle.plant.step
+    commands, step = [], robot.controller.cycle.line.plant.step
 
     def watched(command):
         commands.append(command)
         return step(command)
 
-    robot.controller.cycle.plant.step = watched
+    robot.controller.cycle.line.plant.step = watched
     return commands
 
 

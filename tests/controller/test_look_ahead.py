@@ -9,7 +9,7 @@ from proof.search import changes, streams
 from tvist_controller.about import info_of
 from tvist_controller.ahead import MAX_AHEAD, resting_after
 from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.cycle import STILL
+from tvist_controller.control.differentiator import STILL
 from tvist_controller.outlook import Outlook
 from tvist_controller.trajectory import StuckError
 from tvist_plant.description import Payload
@@ -25,7 +25,7 @@ from .robots import FITTING, PAPER, Q3, UR5E, H, Robot, without_arm
 def test_what_is_foreseen_is_what_happens_to_the_bit(name):
     random = np.random.default_rng(FITTING.index(name) if name in FITTING else 99)
     line = without_arm(name)
-    motion = line.start(line.plan(Q3, PAPER))
+    motion = line.begin(line.plan(Q3, PAPER))
     for moment in sorted(random.integers(2, 1100, 3)):
         while line.trajectory._ticks < moment and not line.at_rest and motion.rate == 1.0:
             line.step()
@@ -51,9 +51,9 @@ def test_a_pause_and_a_change_of_the_filter_are_foreseen_too():
     ahead = robot.controller.motion.outlook.foresee()
     for expected in ahead[2:]:
         robot.tick()
-        assert cycle_.position == pytest.approx(expected, abs=1e-12)
-    assert not cycle_.at_rest
-    assert np.abs(cycle_.position - ahead[-1]).max() < 1e-6
+        assert cycle_.line.shaped.joints.position == pytest.approx(expected, abs=1e-12)
+    assert not cycle_.mode.at_rest
+    assert np.abs(cycle_.line.shaped.joints.position - ahead[-1]).max() < 1e-6
 
 
 def test_a_motion_that_will_get_stuck_is_not_foreseen_and_a_stop_on_it_is_reported():
@@ -78,7 +78,7 @@ def test_a_motion_that_will_get_stuck_is_not_foreseen_and_a_stop_on_it_is_report
 
 def test_what_lasts_too_long_is_not_foreseen():
     line = without_arm()
-    line.start(line.plan(Q3, type(PAPER)(0.01, 0.1, 1.0)))
+    line.begin(line.plan(Q3, type(PAPER)(0.01, 0.1, 1.0)))
     line.step()
     assert MAX_AHEAD * H < 100.0
     assert Outlook(line).foresee() is None

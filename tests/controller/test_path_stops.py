@@ -100,11 +100,11 @@ def test_a_pause_between_two_parts_lasts_until_it_ends(again):
     robot = two_parts()
     robot.send(Pause)
     robot.tick(200)
-    assert robot.controller.cycle.at_rest
+    assert robot.controller.cycle.mode.at_rest
     assert robot.controller.motion.activity is Activity.PAUSED
     robot.send(again, **({"fault": "safeguard_stop"} if again is SimulationInject else {}))
     robot.tick(100)
-    assert robot.controller.cycle.at_rest
+    assert robot.controller.cycle.mode.at_rest
     robot.send(SimulationInject, fault="normal")
     robot.send(Resume)
     robot.until_rest()
@@ -142,5 +142,5 @@ def test_a_motion_slow_by_its_duration_is_paused_at_once(kind):
     assert np.abs(robot.references[-1] - before).max() > 1e-5
     robot.send(Stop)
     robot.tick(200)
-    assert robot.controller.cycle.at_rest
+    assert robot.controller.cycle.mode.at_rest
     assert [event.kind for event in robot.events if event.id is not None][-1] == "motion_stopped"

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from tests.controller.robots import Line
 
 from tvist_controller.collision import CollisionModel
-from tvist_controller.cycle import ControlCycle
 from tvist_controller.payload_monitor import TOLERATED, PayloadMonitor
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
@@ -38,9 +38,7 @@ class Watched:
 
     def __init__(self, q, declared, carried, description=ROBOT, seed=0):
         tvist = TvistFilter(shaper("zv"), Fixed([8.0], [0.2]), joints=6)
-        self.cycle = ControlCycle(
-            description, tvist, q=q, declared=disc(declared), carried=disc(carried), seed=seed
-        )
+        self.cycle = Line(description, tvist, q=q, declared=disc(declared), carried=disc(carried), seed=seed)
         self.monitor = PayloadMonitor(description, disc(declared))
         self.worst = 0.0
 
@@ -54,9 +52,9 @@ class Watched:
 
     def move(self, q, limits=LIMITS):
         """Warnings of a motion, of which the next begins at once."""
-        self.cycle.start(self.cycle.plan(q, limits))
+        self.cycle.begin(self.cycle.plan(q, limits))
         said = []
-        while not self.cycle.at_rest:
+        while not self.cycle.mode.at_rest:
             said.append(self.step())
         return [warning for warning in said if warning]
 
@@ -134,11 +132,11 @@ def test_it_is_told_at_rest_where_gravity_has_a_lever_and_not_upright():
 def test_a_new_declaration_starts_anew():
     watched = Watched(PAPER[0], 2.0, 5.0)
     assert watched.move(PAPER[1])
-    watched.cycle.declare(disc(5.0))
+    watched.cycle.line.dynamics.declare(disc(5.0))
     watched.monitor.declare(disc(5.0))
     assert watched.monitor.excess == (0.0, np.inf)
     assert not watched.move(PAPER[2])
-    watched.cycle.declare(disc(1.0))
+    watched.cycle.line.dynamics.declare(disc(1.0))
     watched.monitor.declare(disc(1.0))
     assert watched.move(PAPER[3]) or watched.move(PAPER[0])
 

@@ -124,7 +124,7 @@ def test_loading_and_stopping_are_for_anyone_and_playing_and_pausing_are_not(rob
     assert state(robot)[1] == "STOPPED"
     robot.tick(LONG)
     assert moves(robot)[-1] == "motion_stopped"
-    assert robot.controller.cycle.at_rest
+    assert robot.controller.cycle.mode.at_rest
 
 
 def test_a_move_that_cannot_be_made_ends_it_with_its_line(robot):
@@ -281,7 +281,7 @@ def test_a_safeguard_holds_the_motion_and_the_program_waits_with_it(robot):
 def test_a_safeguard_between_two_lines_has_the_next_one_wait(robot):
     play(robot, "paper.urp")
     until(robot, lambda: len(reached(robot)) == 1)
-    assert robot.controller.cycle.at_rest
+    assert robot.controller.cycle.mode.at_rest
     robot.send(SimulationInject, fault="safeguard_stop")
     robot.tick(100)
     assert state(robot)[1] == "PLAYING"

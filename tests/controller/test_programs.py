@@ -326,7 +326,7 @@ def test_set_tcp_set_payload_and_their_getters():
     assert said(robot)[:3] == ["p[0, 0, 0.1, 0, 0, 0]", "1", "[0, 0, 0.05]"]
     assert float(said(robot)[3]) == pytest.approx(0.1, abs=1e-6)
     assert robot.controller.declared.mass == 1.0
-    assert robot.controller.cycle.inverse_dynamics.changing  # for a second
+    assert robot.controller.cycle.line.dynamics.changing  # for a second
 
 
 def test_kinematics_of_programs_agree_with_each_other():
@@ -391,7 +391,7 @@ def test_pausing_a_guided_motion_stops_it_and_playing_goes_on():
     robot.tick(200)
     assert robot.send(ProgramPause) == Done()
     robot.tick(300)
-    assert robot.controller.cycle.at_rest
+    assert robot.controller.cycle.mode.at_rest
     assert robot.send(ProgramPlay) == Done()
     robot.tick(100)
     assert robot.states[-1].target_qd[0] == pytest.approx(0.1, abs=1e-3)

@@ -55,10 +55,10 @@ def test_servoc_that_was_paused_and_goes_on_can_be_paused_again():
     assert robot.send(ProgramPlay) == Done()
     robot.tick(50)
     assert playing(robot)
-    assert not robot.controller.cycle.at_rest
+    assert not robot.controller.cycle.mode.at_rest
     assert robot.send(ProgramPause) == Done()
     robot.tick(100)
-    assert robot.controller.cycle.at_rest
+    assert robot.controller.cycle.mode.at_rest
     assert robot.send(ProgramPlay) == Done()
     finish(robot)
     assert said(robot) == ["1"]

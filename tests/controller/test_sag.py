@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot, cut
+from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, cut
 
 from tvist_controller.control.inverse_dynamics import SLEW
-from tvist_controller.cycle import ControlCycle
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import Payload, load
 from tvist_plant.flexible_arm import FlexibleArm
@@ -20,9 +19,9 @@ CLOSE = 1e-4
 """What is allowed between measured and target angles at rest [rad]."""
 
 
-def line(description=UR5E, mass=5.0, q=Q1, *, compensated=True, name="none", **changes) -> ControlCycle:
+def line(description=UR5E, mass=5.0, q=Q1, *, compensated=True, name="none", **changes) -> Line:
     payload = changes.pop("payload", body(paper_payload(description, mass)))
-    return ControlCycle(
+    return Line(
         description,
         TvistFilter(shaper(name), Fixed((10.0,), (0.2,)), joints=description.joints),
         q=np.array(q),
@@ -36,13 +35,13 @@ def line(description=UR5E, mass=5.0, q=Q1, *, compensated=True, name="none", **c
 
 def commands_of(cycle):
     """Commands to the drives from now on, and the references that they belong to."""
-    found, made = [], cycle._feed_forward.command
+    found, made = [], cycle.line.drives.command
 
     def watched(target, *arguments, **options):
         found.append((made(target, *arguments, **options), target))
         return found[-1][0]
 
-    cycle._feed_forward.command = watched
+    cycle.line.drives.command = watched
     return found
 
 
@@ -52,8 +51,8 @@ def off_target(sample):
 
 def play(cycle, trajectory, rest=0):
     samples = []
-    cycle.start(trajectory)
-    while not cycle.at_rest:
+    cycle.begin(trajectory)
+    while not cycle.mode.at_rest:
         samples.append(cycle.step())
     return samples + [cycle.step() for _ in range(rest)]
 
@@ -73,25 +72,25 @@ def test_a_resting_arm_is_on_its_target_in_any_posture_with_any_payload(arm):
     for _ in range(40):
         q, payload = random.uniform(-3.1, 3.1, 6), random_payload(random)
         for cycle in (compensated, plain):
-            cycle.declare(payload)
+            cycle.line.dynamics.declare(payload)
             cycle.reset(q, carried=payload)
-        assert off_target(compensated.standing) < CLOSE
+        assert off_target(compensated.sample) < CLOSE
         for _ in range(50):
             still = compensated.step()
         assert off_target(still) < CLOSE
-        sagged = max(sagged, off_target(plain.standing))
+        sagged = max(sagged, off_target(plain.sample))
     assert sagged > 10 * CLOSE
 
 
 @pytest.mark.parametrize("joints", [1, 2, 5])
 def test_so_is_an_arm_with_fewer_joints(joints):
     arm = cut(joints)
-    assert off_target(line(arm, q=arm.poses["Q3"]).standing) < CLOSE
+    assert off_target(line(arm, q=arm.poses["Q3"]).sample) < CLOSE
 
 
 def test_an_arm_whose_axes_are_vertical_has_nothing_to_compensate():
     arm = load("one-joint")
-    with_it, without = (line(arm, q=arm.poses["Q1"], compensated=on).standing for on in (True, False))
+    with_it, without = (line(arm, q=arm.poses["Q1"], compensated=on).sample for on in (True, False))
     np.testing.assert_array_equal(with_it.measured.q, without.measured.q)
 
 
@@ -106,7 +105,7 @@ def test_friction_leaves_the_arm_on_its_target_a_fifth_of_a_second_after_a_move(
 
 def test_the_arm_starts_in_static_equilibrium():
     cycle = line(UR5E.clean(), q=Q3)
-    first = cycle.standing.measured
+    first = cycle.sample.measured
     for _ in range(500):
         sample = cycle.step()
         assert np.abs(sample.measured.q - first.q).max() < 1e-10
@@ -140,7 +139,7 @@ def test_in_motion_the_lead_moves_without_steps_and_as_little_as_the_twist_that_
 def test_a_payload_that_is_declared_at_rest_moves_the_motors_gently_to_their_new_lead():
     cycle = line(mass=0.0)
     found = commands_of(cycle)
-    cycle.declare(body(paper_payload(UR5E, 5.0)))
+    cycle.line.dynamics.declare(body(paper_payload(UR5E, 5.0)))
     for _ in range(SLEW + 20):
         cycle.step()
     lead, velocity, acceleration = leads(found)

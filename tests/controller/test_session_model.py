@@ -292,7 +292,7 @@ class Sessions(RuleBasedStateMachine):
             taken = (
                 self.activity is Activity.STREAMING and self.lease is not None and token == self.lease.token
             )
-            q = self.robot.cycle.reference + offset * np.eye(6)[0]
+            q = self.robot.cycle.sample.reference + offset * np.eye(6)[0]
             self.robot.receive_setpoint(c.Setpoint(token=token, sequence=self.sequence, q=tuple(q.tolist())))
             assert self.robot.counters.setpoints_refused == refused + (not taken)
             if taken:
@@ -362,7 +362,7 @@ class Sessions(RuleBasedStateMachine):
             assert self.activity is Activity.GUIDED
             self.happen("interruption")
         if self.robot.motion.activity is not self.activity:
-            assert self.robot.cycle.at_rest
+            assert self.robot.cycle.mode.at_rest
             self.happen("at_rest")
         assert self.robot.motion.activity is self.activity
         assert sorted(kind for kind in kinds if kind in TOLD) == sorted(self.told)

@@ -271,7 +271,7 @@ class Steps(RuleBasedStateMachine):
         self.look()
 
     def here(self):
-        return tuple(self.robot.cycle.reference.tolist())
+        return tuple(self.robot.cycle.sample.reference.tolist())
 
     def teardown(self):
         """What reached the robot, with its tick, is all that an equal run needs."""

@@ -87,20 +87,20 @@ def test_a_move_whose_torque_would_pass_a_limit_is_slower_and_says_so():
 @pytest.mark.parametrize("name", ["zv", "ei3"])
 def test_after_a_stop_a_move_is_what_it_is_of_a_fresh_line(name):
     line = without_arm(name)
-    line.start(line.plan(Q3, PAPER))
+    line.begin(line.plan(Q3, PAPER))
     run(line, 431)
     stop(line, None)
     end = until_rest(line)[-1, 0]
     run(line, 3)
     fresh = without_arm(name, q=end)
     for moved in (line, fresh):
-        moved.start(moved.plan(Q2, PAPER))
+        moved.begin(moved.plan(Q2, PAPER))
     assert (until_rest(line) == until_rest(fresh)).all()
 
 
 def test_a_stop_while_the_shaper_lets_a_finished_trajectory_out_is_a_stop_too():
     line = without_arm("ei3")
-    motion = line.start(line.plan(Q1 + 0.1, PAPER))
+    motion = line.begin(line.plan(Q1 + 0.1, PAPER))
     while not motion.finished:
         run(line, 1)
     assert not line.at_rest
@@ -113,7 +113,7 @@ def test_a_stop_while_the_shaper_lets_a_finished_trajectory_out_is_a_stop_too():
 def test_a_harder_stop_takes_over_from_a_gentle_one():
     def way(*decelerations):
         line = without_arm()
-        line.start(line.plan(Q2, PAPER))
+        line.begin(line.plan(Q2, PAPER))
         run(line, 450)
         for deceleration in decelerations:
             stop(line, deceleration)
@@ -127,7 +127,7 @@ def test_a_harder_stop_takes_over_from_a_gentle_one():
 
 def test_a_harder_stop_keeps_the_acceleration_within_its_limit():
     line = without_arm()
-    line.start(line.plan(Q2, PAPER))
+    line.begin(line.plan(Q2, PAPER))
     run(line, 450)
     stop(line, 2.0)
     run(line, 30)
@@ -138,7 +138,7 @@ def test_a_harder_stop_keeps_the_acceleration_within_its_limit():
 def test_a_repeated_stop_changes_nothing():
     def stopped(times):
         line = without_arm()
-        line.start(line.plan(Q2, PAPER))
+        line.begin(line.plan(Q2, PAPER))
         run(line, 300)
         out = []
         for _ in range(times):
@@ -205,7 +205,7 @@ def test_with_negative_impulses_a_motion_is_done_only_where_nothing_more_comes_o
     robot.send(c.SetShaper, name=name)
     robot.send(c.MoveJ, q=tuple(Q3 + way * (Q1 - Q3)) if way > 0.5 else tuple(Q1 + way))
     robot.until_rest()
-    rested = robot.controller.cycle.position
+    rested = robot.controller.cycle.line.shaped.joints.position
     robot.tick(300)
     assert np.abs(robot.column("target_q")[-250:] - rested).max() < 1e-7
 
@@ -238,14 +238,14 @@ def test_a_stop_is_not_ahead_of_a_motion_that_negative_impulses_let_turn_back(na
         robot.tick(3)
         assert isinstance(robot.send(c.MoveJ, q=target, velocity=0.5, acceleration=2.0, jerk=50.0), Accepted)
         robot.tick(moment)
-        if robot.controller.cycle.at_rest:
+        if robot.controller.cycle.mode.at_rest:
             break
         free = robot.controller.motion.outlook.foresee()[2:, 0]
         robot.send(c.Stop)
         stopped = []
         for _ in free:
             robot.tick()
-            stopped.append(robot.controller.cycle.position[0])
+            stopped.append(robot.controller.cycle.line.shaped.joints.position[0])
         assert (np.array(stopped) - free).max() <= 1e-9, moment
     assert moment > 20
 
@@ -258,8 +258,8 @@ def test_a_move_that_has_barely_begun_stands_as_soon_as_it_is_stopped(shaper):
         robot = Robot(shaper=shaper, calibration=calibration())
         robot.send(c.MoveJ, q=tuple(Q3.tolist()))
         robot.tick(ticks)
-        before = robot.controller.cycle.position
+        before = robot.controller.cycle.line.shaped.joints.position
         robot.send(c.Stop, deceleration=deceleration)
         stopped = robot.controller.tick_number
         assert robot.until_rest().tick - stopped <= 25
-        assert np.abs(robot.controller.cycle.position - before).max() < 1e-3
+        assert np.abs(robot.controller.cycle.line.shaped.joints.position - before).max() < 1e-3

@@ -104,7 +104,7 @@ class Server:
             controller.tick_number,
             controller.motion.activity,
             controller.motion.motions.speed,
-            controller.cycle.reference.tolist(),
+            controller.cycle.sample.reference.tolist(),
             None if lease is None else (lease.client, lease.token),
         )
 

@@ -11,6 +11,7 @@ from tvist_controller.collision import CollisionModel
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import body, paper_payload
+from tvist_controller.trajectory import JointLine, quickest_motion
 from tvist_lab.studies.evaluate import MEASURED, interval, methods, report
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import baselines
@@ -161,11 +162,11 @@ class TestLine:
         cycle = ControlCycle(ur5e, recipe.make(ur5e, 5.0), q=start, declared=carried, carried=carried, seed=3)
         for _ in range(4):
             cycle.step()
-        cycle.start(cycle.plan(target, PAPER))
+        cycle.begin(quickest_motion(JointLine(start, target), PAPER, PERIOD))
         felt = []
-        while not cycle.at_rest:
+        while not cycle.mode.at_rest:
             cycle.step()
-            felt.append(cycle.plant.truth().specific_force)
+            felt.append(cycle.line.plant.truth().specific_force)
         tvist = recipe.make(ur5e, 5.0)
         tvist.reset(start)
         reference = point_to_point(start, target)

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from tvist_controller.api.line import ControlCycle, body, load_calibration, paper_payload
+from tvist_controller.api.line import (
+    ControlCycle,
+    JointLine,
+    body,
+    load_calibration,
+    paper_payload,
+    quickest_motion,
+)
 from tvist_lab.study.line import PAPER, REST, ControlLine, point_to_point
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe
@@ -34,11 +41,11 @@ def by_ticks(description, recipe, move, seed):
         elastic=recipe.elastic(description, tvist),
     )  # fmt: skip
     samples = [cycle.step() for _ in range(RESTING)]
-    forces = [cycle.plant.truth().specific_force] * RESTING
-    cycle.start(cycle.plan(np.array(move.target), PAPER))
-    while not cycle.at_rest:
+    forces = [cycle.line.plant.truth().specific_force] * RESTING
+    cycle.begin(quickest_motion(JointLine(start, np.array(move.target)), PAPER, PERIOD))
+    while not cycle.mode.at_rest:
         samples.append(cycle.step())
-        forces.append(cycle.plant.truth().specific_force)
+        forces.append(cycle.line.plant.truth().specific_force)
     return samples, np.array(forces)
 
 

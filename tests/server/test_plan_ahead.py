@@ -167,7 +167,7 @@ def test_one_client_s_commands_keep_their_order(served):
     assert journaled[-2:] == ["stop", "stop"], "once more in their turn"
     served.tick(30)
     assert [event.kind for event in served.sink.events if event.id] == ["motion_started", "motion_stopped"]
-    assert served.host.controller.cycle.at_rest
+    assert served.host.controller.cycle.mode.at_rest
 
 
 @pytest.mark.parametrize("stop", [c.Stop(), ProgramStop()])
@@ -183,7 +183,7 @@ def test_no_motion_that_was_sent_before_a_stop_outlives_it(served, waiting, stop
     served.empty(ticks=3)
     served.tick(60)
     controller = served.host.controller
-    assert controller.cycle.at_rest
+    assert controller.cycle.mode.at_rest
     assert not controller.motion.activity.moving
 
 

@@ -9,6 +9,7 @@ from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.planner import Planner
 from tvist_controller.programs.socket_traffic import SocketNews
+from tvist_controller.rehearsal import rehearse
 from tvist_controller.setup import Setup
 from tvist_controller.sink import Sink
 from tvist_protocol.codec import encode
@@ -66,6 +67,8 @@ class ServedRobot:
         # When a client advances time, nothing is late, and plans are made when they are needed.
         self._plans = None if lockstep else PlansOfPrograms(_planner(setup))
         self.controller = Controller(setup, order=None if self._plans is None else self._plans.order)
+        if self._realtime:
+            rehearse(self.controller.cycle)
         info_of(self.controller)  # computes the slowest part of the description once, before the first tick
         self.recorder = None
         if record is not None:

@@ -11,10 +11,10 @@ from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.calibrations.modal import drivetrain, mass_matrix, modal_estimator
 from tvist_controller.choices import choose_filter, wanted_modes
 from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.control.differentiator import central_differences
+from tvist_controller.control.differentiator import STILL, central_differences
 from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.cycle import STILL, ControlCycle
+from tvist_controller.cycle import ControlCycle
 from tvist_controller.elastic_source import elastic_feed_forward
 from tvist_controller.mode_source import ModeSource
 from tvist_controller.own_shapers import OwnShaper, RecordedShaper

@@ -11,6 +11,9 @@ from tvist_controller._compiled import compiled_for_ticks
 
 Floats = npt.NDArray[np.float64]
 
+STILL = 1e-7
+"""A reference that changes by less than this between two ticks is at rest [rad]."""
+
 
 class Target(Struct, frozen=True, eq=False, gc=False):
     """Shaped reference with its derivatives, all at the same tick."""
@@ -21,6 +24,17 @@ class Target(Struct, frozen=True, eq=False, gc=False):
     """q̇*, shape (n,) [rad/s]."""
     qdd: Floats
     """q̈*, shape (n,) [rad/s^2]."""
+
+    def rests_at(self, reference: Floats, period: float) -> bool:
+        """Return whether the shaped reference of the next tick has come to rest at a reference.
+
+        Args:
+            reference: Reference before shaping, shape (n,) [rad].
+            period: Tick [s].
+        """
+        # The central differences' equivalent of q*ᵢ - q*ᵢ₋₁.
+        step = period * (self.qd - 0.5 * period * self.qdd)
+        return bool(max(np.abs(step).max(), np.abs(reference - self.q).max()) <= STILL)
 
 
 def central_differences(references: Floats, period: float) -> tuple[Floats, Floats, Floats]:
@@ -95,9 +109,15 @@ class Differentiator:
     @property
     def published(self) -> Target:
         """State of motion one tick before the newest reference, where central differences are accurate to order h²."""
-        rates = np.empty((2, len(self._middle)))
-        differentiate(self._before, self._middle, self._last, self._period, rates)
-        return Target(self._middle, *rates)
+        return Target(*self.rows)
+
+    @property
+    def rows(self) -> Floats:
+        """Position, velocity and acceleration of `published`, shape (3, n)."""
+        rows = np.empty((3, len(self._middle)))
+        rows[0] = self._middle
+        differentiate(self._before, self._middle, self._last, self._period, rows[1:])
+        return rows
 
     @property
     def position(self) -> Floats:

@@ -5,6 +5,7 @@ from msgspec import Struct
 from tvist_controller.control.differentiator import Floats, Target
 from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.control.joint_controllers import JointControllers
+from tvist_controller.control.line_tick import Q_R, STATIC, TORQUE
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 
@@ -79,10 +80,8 @@ class DriveFeedForward:
     def command(
         self,
         target: Target,
-        torque: Floats,
-        gravity: Floats,
+        signals: Floats,
         carried: Floats,
-        plain: DriveCommand,
         *,
         may_begin: bool = True,
         may_go_on: bool = True,
@@ -91,19 +90,17 @@ class DriveFeedForward:
 
         Args:
             target: Shaped reference and its derivatives.
-            torque: τ* of the rigid arm, shape (n,) [N m].
-            gravity: The part of the torque that balances gravity, shape (n,) [N m].
+            signals: Torques of the rigid arm for it and the command of the paper's joint controllers, see `line_tick`.
             carried: Inertial parameters of the payload, see `InverseDynamics.carried`.
-            plain: Command of the paper's joint controllers for the target.
             may_begin: Whether the reference is smooth enough to begin with elastic feed-forward.
             may_go_on: Whether it is smooth enough to go on with it, as a stop is.
         """
         self._fade(may_begin if self._share == 0 else may_go_on)
-        elastic = self._elastic
+        elastic, plain = self._elastic, DriveCommand(*signals[Q_R:])
         if elastic is None or self._share == 0:
             self.reference = None
             return plain
-        command = elastic.command(target, torque, carried, self._joints.sag(gravity))
+        command = elastic.command(target, signals[TORQUE], carried, self._joints.sag(signals[STATIC]))
         if self._share < FADE:
             command = self._blend(plain, command)
         self.reference = MotorReference(command.qd, elastic.qdd, command.torque, elastic.limited)

@@ -10,11 +10,9 @@ from tvist_controller.control.differentiator import Floats, differentiate
 from tvist_controller.control.joint_controllers import command_drives
 from tvist_plant.chain import collect_gravity, torques
 
-(
-    REFERENCE, Q, QD, QDD, TORQUE, UNSHAPED_Q, UNSHAPED_QD, UNSHAPED_QDD, STATIC, Q_R, QD_R, TORQUE_FF, SIGNALS,
-) = range(13)  # fmt: skip
-"""Rows of the signals of a tick: the newest reference q, the target q*, q̇* and q̈* with its torque τ*, the same target
-without the filter, the part of τ* that balances gravity, and the command q_r, q̇_r and τ_ff; their number.
+REFERENCE, Q, QD, QDD, TORQUE, STATIC, Q_R, QD_R, TORQUE_FF, SIGNALS = range(10)
+"""Rows of the signals of a tick: the newest reference q, the target q*, q̇* and q̈* with its torque τ*, the part of τ*
+that balances gravity, and the command q_r, q̇_r and τ_ff; their number.
 """
 
 
@@ -23,9 +21,7 @@ def to_drives(
     before: Floats,
     middle: Floats,
     last: Floats,
-    unshaped_before: Floats,
-    unshaped_middle: Floats,
-    unshaped_last: Floats,
+    reference: Floats,
     period: float,
     chain: Floats,
     gravity: float,
@@ -39,21 +35,17 @@ def to_drives(
         before: First reference, shape (n,) [rad].
         middle: Second reference q*.
         last: Third reference, which is that of this tick.
-        unshaped_before: First reference without the filter, shape (n,) [rad].
-        unshaped_middle: Second one.
-        unshaped_last: Third one.
+        reference: Reference of this tick before shaping, shape (n,) [rad].
         period: Tick [s].
         chain: Links of the rigid arm with its declared payload, shape (n+1, 22).
         gravity: Gravitational acceleration [m/s^2].
         bodies: Scratch, shape (n+1, 28).
         joints: Parameters of the joint controllers, shape (8, n); their wind-up is changed.
-        signals: Result, shape (12, n), see `SIGNALS`.
+        signals: Result, shape (9, n), see `SIGNALS`.
     """
     rates, torque, static = signals[QD:TORQUE], signals[TORQUE], signals[STATIC]
     for j in range(middle.shape[0]):
-        signals[REFERENCE, j], signals[Q, j] = unshaped_last[j], middle[j]
-        signals[UNSHAPED_Q, j] = unshaped_middle[j]
-    differentiate(unshaped_before, unshaped_middle, unshaped_last, period, signals[UNSHAPED_QD:STATIC])
+        signals[REFERENCE, j], signals[Q, j] = reference[j], middle[j]
     differentiate(before, middle, last, period, rates)
     torques(chain, middle, rates[0], rates[1], gravity, bodies, torque)
     collect_gravity(bodies, gravity, static)
@@ -90,7 +82,7 @@ def all_to_drives(
     before, middle = start, start
     for k in range(shaped.shape[0]):
         last = shaped[k]
-        to_drives(before, middle, last, before, middle, last, period, chain, gravity, bodies, joints, signals)
+        to_drives(before, middle, last, last, period, chain, gravity, bodies, joints, signals)
         for j in range(n):
             targets[k, 0, j], targets[k, 1, j], targets[k, 2, j] = middle[j], signals[QD, j], signals[QDD, j]
             for row in range(3):

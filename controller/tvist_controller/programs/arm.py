@@ -253,7 +253,7 @@ class ProgramArm:
             return
         shaped = self._access.shape_guided and (
             motion.activity is Activity.REST
-            or (motion.activity is Activity.GUIDED and not motion.cycle.unshaped)
+            or (motion.activity is Activity.GUIDED and motion.cycle.mode.shaped)
         )
         self._number, self._outcome, self._own = None, None, True
         try:

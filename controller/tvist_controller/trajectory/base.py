@@ -2,6 +2,7 @@
 
 import copy
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
@@ -50,6 +51,14 @@ class Trajectory(ABC):
     @abstractmethod
     def finished(self) -> bool:
         """Whether the last sample was the final one, after which all samples are equal."""
+
+    def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:  # noqa: B027  most need not
+        """Leave room for a filter that comes into use now; only references without a plan have to.
+
+        Args:
+            spared: Returns the limits of a reference whose shaped reference keeps the limits that it is given and
+                those of the arm; for None, only the latter.
+        """
 
     @property
     def standing(self) -> bool:

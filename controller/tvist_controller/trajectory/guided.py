@@ -1,6 +1,7 @@
 """Base of the references that a client guides: each of its commands replaces the one before."""
 
 from abc import abstractmethod
+from collections.abc import Callable
 
 from tvist_controller.trajectory.base import Trajectory
 from tvist_controller.trajectory.limits import Floats, MotionLimits
@@ -26,6 +27,10 @@ class Guided(Trajectory):
     @abstractmethod
     def adopt(self, limits: MotionLimits) -> None:
         """Keep other limits of the joints from now on; `pace` must follow."""
+
+    def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:
+        """See `Trajectory.adapt`."""
+        self.adopt(spared(None))
 
     @abstractmethod
     def pace(self, speed: float, slowest: float | None) -> None:

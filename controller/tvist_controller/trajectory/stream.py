@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
@@ -104,14 +105,21 @@ class SetpointStream(Trajectory):
         self.limited += self._limiter.limited
         return reference
 
-    def slow_down(self, limits: MotionLimits) -> None:
-        """Keep lower limits from now on."""
+    def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:
+        """Keep lower limits from now on, if the filter needs that; see `Trajectory.adapt`."""
+        limits = spared(self.limits)
         if limits != self.limits:
             state, self.limits = self.state, limits
             reach = np.broadcast_to(self._reach, state[0].shape)
             self._limiter = Limiter(
                 state[0], limits, self._period, reach=reach, torque=self._torque, state=state
             )
+
+    @property
+    def end(self) -> JointStop:
+        """How it comes to rest inside its own limits."""
+        limits = self.limits
+        return JointStop(*self.state, acceleration=limits.acceleration, jerk=limits.jerk, period=self._period)
 
     @property
     def finished(self) -> bool:

@@ -109,7 +109,7 @@ def cycle_tick() -> Run:
 
     def run() -> float:
         cycle.reset(start)
-        cycle.start(cycle.plan(target, LIMITS))
+        cycle.begin(quickest_motion(JointLine(start, target), LIMITS, PERIOD))
         return us_per_tick(go)
 
     return run

@@ -173,12 +173,12 @@ def largest_deflection(description: RobotDescription) -> Bent:
         seed=0,
     )
     motion = quickest_motion(JointLine(start, end), LIMITS, PERIOD)
-    cycle.start(motion)
+    cycle.begin(motion)
     stop, after = round(motion.duration / PERIOD), round(WATCHED / PERIOD)
     gears, links = [], []
     for _ in range(stop + 4 * after):
         cycle.step()
-        truth = truth_of(cycle.plant)
+        truth = truth_of(cycle.line.plant)
         gears.append(truth.gear_deflection)
         links.append(truth.link_deflection)
     g, s = np.array(gears) - gears[-1], np.array(links) - links[-1]

@@ -167,7 +167,7 @@ class ProgramWatch(Sink):
     def state(self, state: State) -> None:
         """Take a tick's state, which its events precede."""
         self.tick = state.tick
-        at_rest = self._controller.cycle.at_rest
+        at_rest = self._controller.cycle.mode.at_rest
         if self.moves:
             self._watch_rest(self.moves[-1], at_rest=at_rest)
         if self.reason is None:
@@ -202,7 +202,7 @@ class ProgramWatch(Sink):
 
     def _acceleration(self) -> float:
         """Magnitude of the tool's acceleration, without gravity [m/s²]."""
-        truth = truth_of(self._controller.cycle.plant)
+        truth = truth_of(self._controller.cycle.line.plant)
         up = truth.flange_rotation[2]  # the world's z axis, in the frame of the flange
         return float(np.linalg.norm(truth.specific_force - GRAVITY * up))
 

@@ -5,8 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from tvist_controller.control.differentiator import Floats
-from tvist_controller.cycle import STILL
+from tvist_controller.control.differentiator import STILL, Floats
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import integer, is_pose, number, numbers, pose, positive, shown
 from tvist_controller.programs.arm import ProgramArm, Turns
@@ -200,7 +199,7 @@ class MotionFunctions:
 
     @property
     def _reference(self) -> Floats:
-        return self._access.motion.cycle.reference
+        return self._access.motion.cycle.sample.reference
 
     @property
     def _here(self) -> list[float]:

@@ -33,7 +33,7 @@ class PoseFunctions:
     def __init__(self, access: Access, kinematics: ProgramKinematics) -> None:
         self._access, self._kinematics = access, kinematics
         self._joints = access.description.joints
-        self._dynamics = InverseDynamics(access.description, access.motion.cycle.inverse_dynamics.payload)
+        self._dynamics = InverseDynamics(access.description, access.motion.cycle.line.dynamics.payload)
 
     def get_inverse_kin(
         self, x: object, qnear: object, position_error: object, orientation_error: object, tcp: object
@@ -77,7 +77,7 @@ class PoseFunctions:
 
     def get_mass_matrix(self, q: object, include_rotors_inertia: object) -> Array:
         """Return the inertia matrix of the joints with the declared payload [kg m^2]."""
-        self._dynamics.believe(self._access.motion.cycle.inverse_dynamics.bodies)
+        self._dynamics.believe(self._access.motion.cycle.line.dynamics.bodies)
         matrix = self._dynamics.inertia(self._posture(q))
         matrix = np.triu(matrix) + np.triu(matrix, 1).T
         if include_rotors_inertia:

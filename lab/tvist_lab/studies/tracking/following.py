@@ -98,7 +98,7 @@ def follow(setup: Setup, wanted: Floats, plant: Plant | None = None) -> Followed
         send(wanted[tick])
         _tick(controller)
         actual[tick] = controller.latest.actual_q
-    return Followed(actual, controller.cycle.tvist.mean_delay if setup.shape_servo else 0.0)
+    return Followed(actual, controller.cycle.line.filter.tvist.mean_delay if setup.shape_servo else 0.0)
 
 
 def _tick(controller: Controller) -> None:

@@ -1,0 +1,45 @@
+"""The boxes of the paper's Figure 6 after the trajectory generator, in the picture's order."""
+
+import numpy as np
+from msgspec import Struct
+
+from tvist_controller.control.differentiator import Floats
+from tvist_controller.control.drive_feed_forward import DriveFeedForward
+from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.control.line_tick import SIGNALS, to_drives
+from tvist_controller.control.shaped_reference import ShapedReference
+from tvist_controller.line_filter import LineFilter
+from tvist_plant.plant import PERIOD, Plant
+
+
+class Boxes(Struct, frozen=True, eq=False):
+    """Filter, differentiator, inverse dynamics, joint controllers and arm. Only the control line changes them."""
+
+    filter: LineFilter
+    """TVIST: shaper, estimator and fractional-delay filter, from the reference to the shaped one."""
+    shaped: ShapedReference
+    """Shaped reference and its derivatives."""
+    dynamics: InverseDynamics
+    """Torques of the rigid arm with its declared payload."""
+    drives: DriveFeedForward
+    """Joint controllers: what the drives are sent for a target."""
+    plant: Plant
+    """The arm."""
+
+    @property
+    def kernel_parts(self) -> tuple[Floats, float, Floats, Floats]:
+        """Links, gravity, scratch and joint controllers, as `line_tick` takes them."""
+        dynamics = self.dynamics
+        return dynamics.chain, dynamics.gravitation, dynamics.scratch, self.drives.rows
+
+    def to_drives(self, reference: Floats) -> Floats:
+        """Return the signals from the shaped reference to the drives, shape (9, n), see `line_tick`.
+
+        Args:
+            reference: Reference of this tick before shaping, shape (n,) [rad].
+        """
+        window = self.shaped.joints.window
+        signals = np.empty((SIGNALS, len(reference)))
+        chain, gravitation, scratch, rows = self.kernel_parts
+        to_drives(*window, reference, PERIOD, chain, gravitation, scratch, rows, signals)
+        return signals

@@ -1,0 +1,69 @@
+"""What the control line does, as a table: which of its parts are at work in each mode, and which mode may follow."""
+
+from enum import Enum
+
+
+class LineMode(Enum):
+    """Mode of the control line; a row gives `label`, `shaped`, `guarded` and the modes that may follow."""
+
+    REST = (
+        "the shaped reference rests",
+        True, False, "REST", "SHAPED", "GUARDED", "BYPASSED",
+    )  # fmt: skip
+    SHAPED = (
+        "a planned motion, shaped",
+        True, False, "REST", "SHAPED", "BYPASSED", "RUNNING_OUT", "STOPPING",
+    )  # fmt: skip
+    GUARDED = (
+        "a stream or a guided motion, shaped",
+        True, True, "REST", "GUARDED", "BYPASSED", "STOPPING",
+    )  # fmt: skip
+    BYPASSED = (
+        "a guided motion, not shaped",
+        False, True, "REST", "BYPASSED", "STOPPING",
+    )  # fmt: skip
+    RUNNING_OUT = (
+        "a planned motion that ends by itself, since no stop is quicker",
+        True, False, "REST", "STOPPING",
+    )  # fmt: skip
+    STOPPING = (
+        "a stop, not shaped",
+        False, False, "REST", "STOPPING",
+    )  # fmt: skip
+
+    def __init__(self, label: str, shaped: bool, guarded: bool, *followed_by: str) -> None:
+        self.label = label
+        """The mode in words."""
+        self.shaped = shaped
+        """Whether references go through the filter; else they are the shaped ones, and its delay line is dropped."""
+        self.guarded = guarded
+        """Whether a shaped reference is played only if a stop leads on from it that meets nothing."""
+        self.followed_by = followed_by
+        """Names of the modes that may begin while it lasts."""
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the shaped reference rests."""
+        return self is LineMode.REST
+
+
+def check_change(before: LineMode, after: LineMode) -> None:
+    """Check that a mode may follow another one.
+
+    Raises:
+        ValueError: The table does not have this change.
+    """
+    if after.name not in before.followed_by:
+        raise ValueError(f"the line cannot change from {before.name} to {after.name}")
+
+
+def diagram() -> str:
+    """Return the table as a Mermaid state diagram; changes back to the same mode are left out."""
+    rows = [f"    {mode.name}: {mode.name}<br>{mode.label}" for mode in LineMode]
+    rows += [
+        f"    {mode.name} --> {after}"
+        for mode in LineMode
+        for after in mode.followed_by
+        if after != mode.name
+    ]
+    return "\n".join(("```mermaid", "stateDiagram-v2", *rows, "```"))
