@@ -20,7 +20,7 @@ def loaded(shaper: str) -> "tuple[str, tuple[OwnShaper, ...]]":
     Raises:
         Failure: The file contains no such shaper.
     """
-    from tvist_controller.own_shapers import is_file
+    from tvist_controller.own_files import is_file
 
     if not is_file(shaper):
         return shaper.lower(), ()

@@ -40,7 +40,7 @@ from tvist_controller.setpoints import Setpoints
 from tvist_controller.setup import Setup, body
 from tvist_controller.stop_reasons import StopReasons
 from tvist_plant.fingerprint import fingerprint
-from tvist_plant.plant import PERIOD, Plant, PlantError
+from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.info import StopReason
 from tvist_protocol.io import Io
@@ -55,7 +55,7 @@ class Controller:
 
     Args:
         setup: Initial setup.
-        plant: Plant to control; None for the flexible arm that the setup describes.
+        plant: Plant to control; None for the setup's own, or else the flexible arm that it describes.
         order: Has commands of programs planned beside the ticks; None to plan them in the ticks.
 
     Raises:
@@ -63,8 +63,11 @@ class Controller:
     """
 
     def __init__(self, setup: Setup, plant: Plant | None = None, order: Order | None = None) -> None:
+        plant = setup.made_plant() if plant is None else plant
+        setup = setup.standing(plant)
         setup.check()
         self.setup = setup
+        """Initial setup; of an arm that cannot be placed, with the posture in which it stood."""
         self.tick_number = 0
         self.counters = Counters()
         self._events: list[Event] = []
@@ -332,6 +335,11 @@ class Controller:
     def _reset(self, call: Call[SimulationReset]) -> Reply:
         """Place the simulated arm somewhere at rest."""
         command, chosen = call.command, call.planned()
+        if not isinstance(self.cycle.line.plant, Placeable):
+            name = type(self.cycle.line.plant).__name__
+            raise RefusalError(
+                "unknown_type", "type", f"the plant {name} cannot be put anywhere: it has no reset"
+            )
         check_content(command, self.setup.description)
         q = self.cycle.line.shaped.joints.position if command.q is None else np.array(command.q, dtype=float)
         carried = None if command.payload is None else body(command.payload)

@@ -3,21 +3,16 @@
 from typing import TypeVar
 
 from tvist_controller.control.differentiator import Floats, Target
-from tvist_controller.control.drive_feed_forward import DriveFeedForward
 from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.control.line_tick import TORQUE, Q
-from tvist_controller.control.shaped_reference import ShapedReference
 from tvist_controller.line_boxes import Boxes
-from tvist_controller.line_filter import LineFilter
 from tvist_controller.line_mode import LineMode, check_change
 from tvist_controller.look_ahead import LookAhead, Obstacle
-from tvist_controller.safety import arm_limits
 from tvist_controller.sample import Sample
 from tvist_controller.trajectory import Rest, StuckError, Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import PERIOD, Plant, check_measurement
+from tvist_plant.plant import PERIOD, Plant, check_measurement, placed, posture_of
 from tvist_shaping.base import Filter
 
 T = TypeVar("T", bound=Trajectory)
@@ -55,13 +50,8 @@ class ControlCycle:
         compensate_sag: bool = False,
     ) -> None:
         self.description = description
-        self.line = Boxes(
-            LineFilter(tvist, arm_limits(description)),
-            ShapedReference(q, PERIOD),
-            InverseDynamics(description, declared),
-            DriveFeedForward(description, PERIOD, compensate_sag=compensate_sag),
-            FlexibleArm(description, carried) if plant is None else plant,
-        )
+        arm = FlexibleArm(description, carried) if plant is None else plant
+        self.line = Boxes.of(description, tvist, q, declared, arm, compensate_sag=compensate_sag)
         """The boxes after the trajectory generator."""
         self.line.drives.use(elastic)
         self.trajectory: Trajectory = Rest(q)
@@ -69,7 +59,7 @@ class ControlCycle:
         self.mode = LineMode.REST
         """What the line does."""
         self.guard: LookAhead | None = None
-        """Check of each shaped reference of a guarded motion, which stops of that motion pass, too; else None."""
+        """What checks the references and the stops of a guarded motion; None without one."""
         self.sample = self.reset(q, carried=carried, seed=seed)
         """Signals of the last tick, or of the arm where it was put at rest since."""
         check_measurement(self.sample.measured, description.joints, self.line.plant)
@@ -129,11 +119,8 @@ class ControlCycle:
         Raises:
             ValueError: The mode cannot follow the present one, or it is guarded, and there is no guard.
         """
-        check_change(self.mode, mode)
-        guard = guard or self.guard
-        if mode.guarded and guard is None:
-            raise ValueError(f"mode {mode.name} of the line needs a guard")
-        path, line = trajectory.path, self.line
+        guard, path, line = guard or self.guard, trajectory.path, self.line
+        check_change(self.mode, mode, guarded=guard is not None)
         if not mode.shaped:
             if path is None:
                 line.shaped.enter(None, line.shaped.joints.position)
@@ -186,11 +173,11 @@ class ControlCycle:
         """Place the arm somewhere at rest, in static equilibrium; the whole line restarts.
 
         Args:
-            q: Joint angles, shape (n,) [rad].
+            q: Joint angles, shape (n,) [rad]; of an arm that cannot be placed, the line begins where that stands.
             carried: New carried payload; None for the present one.
             seed: Seed of the arm's noise and gear errors.
         """
-        line = self.line
+        line, q = self.line, posture_of(self.line.plant, q)
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
         line.dynamics.settle()
         line.filter.begin(line.filter.tvist, q)
@@ -199,7 +186,7 @@ class ControlCycle:
         signals = line.to_drives(q)
         target = Target(*signals[Q:TORQUE])
         command = line.drives.command(target, signals, line.dynamics.carried)
-        measured = line.plant.reset(command, payload=carried, seed=seed)
+        measured = placed(line.plant, command, payload=carried, seed=seed)
         self.sample = Sample(
             self.mode, q, line.shaped.joints.window, target, signals, command.torque, measured
         )

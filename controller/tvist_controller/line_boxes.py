@@ -1,5 +1,7 @@
 """The boxes of the paper's Figure 6 after the trajectory generator, in the picture's order."""
 
+from typing import Self
+
 import numpy as np
 from msgspec import Struct
 
@@ -9,7 +11,10 @@ from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.control.line_tick import SIGNALS, to_drives
 from tvist_controller.control.shaped_reference import ShapedReference
 from tvist_controller.line_filter import LineFilter
+from tvist_controller.safety import arm_limits
+from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import PERIOD, Plant
+from tvist_shaping.base import Filter
 
 
 class Boxes(Struct, frozen=True, eq=False):
@@ -25,6 +30,26 @@ class Boxes(Struct, frozen=True, eq=False):
     """Joint controllers: what the drives are sent for a target."""
     plant: Plant
     """The arm."""
+
+    @classmethod
+    def of(
+        cls,
+        description: RobotDescription,
+        tvist: Filter,
+        q: Floats,
+        declared: Payload,
+        plant: Plant,
+        *,
+        compensate_sag: bool = False,
+    ) -> Self:
+        """Return the boxes of a robot; see `ControlCycle` for the arguments."""
+        return cls(
+            LineFilter(tvist, arm_limits(description)),
+            ShapedReference(q, PERIOD),
+            InverseDynamics(description, declared),
+            DriveFeedForward(description, PERIOD, compensate_sag=compensate_sag),
+            plant,
+        )
 
     @property
     def kernel_parts(self) -> tuple[Floats, float, Floats, Floats]:

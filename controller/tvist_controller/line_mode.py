@@ -47,14 +47,21 @@ class LineMode(Enum):
         return self is LineMode.REST
 
 
-def check_change(before: LineMode, after: LineMode) -> None:
+def check_change(before: LineMode, after: LineMode, *, guarded: bool) -> None:
     """Check that a mode may follow another one.
 
+    Args:
+        before: Present mode.
+        after: Next mode.
+        guarded: Whether there is a guard.
+
     Raises:
-        ValueError: The table does not have this change.
+        ValueError: The table does not have this change, or the mode needs a guard.
     """
     if after.name not in before.followed_by:
         raise ValueError(f"the line cannot change from {before.name} to {after.name}")
+    if after.guarded and not guarded:
+        raise ValueError(f"mode {after.name} of the line needs a guard")
 
 
 def diagram() -> str:

@@ -8,6 +8,7 @@ from typing import Unpack
 import numpy as np
 
 from tvist_controller.activities import PUT, at_rest, runtime_of
+from tvist_controller.arm_power import ArmPower
 from tvist_controller.brakes import brake
 from tvist_controller.collision import CollisionModel
 from tvist_controller.cycle import ControlCycle
@@ -26,7 +27,7 @@ from tvist_controller.stops import StopPlan
 from tvist_controller.streaming import Streaming
 from tvist_controller.trajectory import MotionLimits, SetpointStream
 from tvist_controller.way_ahead import WayAhead
-from tvist_plant.plant import PERIOD, PlantError
+from tvist_plant.plant import PERIOD, Placeable, PlantError
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import Code
 from tvist_protocol.stream import EventKind
@@ -59,6 +60,7 @@ class MotionControl:
         self.ahead = WayAhead(cycle, self.outlook, collisions)
         """Collision check of that motion."""
         self._protection = Protection(cycle)
+        self._power = ArmPower(cycle.line.plant)
         self.motions = Motions(cycle, self.safety, emit)
         """Motions by number, and their speed."""
         self.ahead.coming = lambda: self.motions.coming
@@ -153,6 +155,9 @@ class MotionControl:
             RefusalError: The arm is moving, or is in a protective stop.
         """
         self.go("power_on" if release_brakes else "power")
+        if self.cycle.mode.at_rest and not isinstance(self.cycle.line.plant, Placeable):
+            # Without power the arm may have been moved, and its brakes stop it where they do.
+            self.cycle.reset(self.cycle.line.shaped.joints.position)
 
     def brake(self, why: str) -> None:
         """Stop with category 0: the power is off, and the brakes close at once.
@@ -161,6 +166,7 @@ class MotionControl:
             why: The reason, for people.
         """
         target, plan, cycle = after(self.activity, "brakes"), None, self.cycle
+        self._power.stop()
         self.activity = target or self.activity
         if target is not None and not cycle.mode.at_rest:
             stop = brake(cycle.description, cycle.line.plant.payload, cycle.line.shaped.joints.newest, PERIOD)
@@ -184,7 +190,7 @@ class MotionControl:
         self._protection.forget()
 
     def recover(self, error: PlantError, seed: int) -> Sample:
-        """Place an arm whose state has become non-finite at rest at its reference, in a protective stop.
+        """Make a protective stop of an arm that has failed: it is placed at rest at its reference, if it can be.
 
         Args:
             error: The plant's error.
@@ -193,14 +199,18 @@ class MotionControl:
         Returns:
             A tick of the line with the new state.
         """
-        why = f"{error}: the simulation put the arm at rest at its reference"
+        cycle, simulated = self.cycle, isinstance(self.cycle.line.plant, Placeable)
+        why = f"{error}: the simulation put the arm at rest at its reference" if simulated else str(error)
+        again = not simulated and self.activity in {Activity.PROTECTIVE_STOP, Activity.POWER_OFF}
         self.abandon(why, "plant_failure")
-        self.cycle.reset(self.cycle.line.shaped.joints.position, seed=seed)
+        self._power.stop()
+        sample = cycle.reset(cycle.line.shaped.joints.position, seed=seed)
         self._protection.forget()
         if after(self.activity, "plant_failure") is not None:
             self.go("plant_failure")
-        self._emit("protective_stop", code="plant_failure", why=why)
-        return self.cycle.step()
+        if not again:  # an arm that does not answer fails in every tick
+            self._emit("protective_stop", code="plant_failure", why=why)
+        return cycle.step() if simulated else sample
 
     def check(self, trigger: str) -> Activity:
         """Return the activity that a trigger leads to.
@@ -212,6 +222,10 @@ class MotionControl:
         if target is None:
             raise out_of_turn(trigger, self.activity)
         self.safety.check(trigger, self.activity)
+        if target.moving and not self.activity.moving and not self._power.condition.ready:
+            raise RefusalError(
+                "wrong_mode", "", "the drives of the arm are not ready: wait until they hold it"
+            )
         return target
 
     def go(self, trigger: str) -> None:
@@ -349,6 +363,7 @@ class MotionControl:
         Raises:
             PlantError: The arm's state is no longer finite; call `recover`.
         """
+        self._power.follow(self.activity.robot_mode)
         sample = self.cycle.step()
         if sample.refused is not None and self.activity is not Activity.STOPPING:
             self.end("interruption", *sample.refused)
@@ -360,6 +375,10 @@ class MotionControl:
         if self.activity.robot_mode is RobotMode.RUNNING:
             for danger in self._protection.dangers(sample):
                 self.protect(danger.why, danger.code)
+        trouble = self._power.trouble(self.activity.robot_mode, sample.measured.timestamp)
+        if trouble is not None and self.safety.latched is None:
+            self.safety.latched = "fault"
+            self.brake(trouble)
         return sample
 
     def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:

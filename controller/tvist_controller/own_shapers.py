@@ -4,20 +4,14 @@ Only the command line, a configuration and a state file can name files. A client
 of loaded shapers, and a recording never causes a file to be run.
 """
 
-import hashlib
-import re
-import sys
-import traceback
 from dataclasses import dataclass, field
 from functools import lru_cache
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 from msgspec import Struct
 
-from tvist_plant.user_file import read_bytes
+from tvist_controller.own_files import OwnFileError, run_file
 from tvist_shaping.errors import ShaperFailureError, ShapingError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.fir_shaper import FirShaper
@@ -27,10 +21,9 @@ from tvist_shaping.shaper import Shaper
 
 _POSTURES, _MARGIN = 64, 1.1
 """Number of postures in which an arm's modes are looked at, and the factor beyond them that a shaper has to support."""
-_FILE = re.compile(r"(?P<file>.*\.py)(?::(?P<attribute>.*))?", re.DOTALL)
 
 
-class OwnShaperError(ValueError):
+class OwnShaperError(OwnFileError):
     """A file contains no such shaper; the message gives the file, the name and the reason."""
 
 
@@ -80,11 +73,6 @@ class OwnShaper:
         return _load_again, (self.place, self.sha256)
 
 
-def is_file(shaper: str) -> bool:
-    """Whether a shaper is given as FILE.py:NAME rather than by its name."""
-    return _FILE.fullmatch(shaper) is not None
-
-
 def load_own(place: str) -> OwnShaper:
     """Run a file and check the shaper that it contains under a name.
 
@@ -96,25 +84,8 @@ def load_own(place: str) -> OwnShaper:
             shaper, or the shaper fails for a mode.
         UserFileError: The file is not text, or is larger than 4 MiB.
     """
-    named = _FILE.fullmatch(place)
-    if named is None:
-        raise OwnShaperError(
-            f"shaper is {place!r}: must be FILE.py:NAME, a Python file and the name of a shaper in that file"
-        )
-    file, attribute = named["file"], named["attribute"]
-    if not attribute:
-        raise OwnShaperError(f"shaper {place}: the name of the shaper is missing: give {file}:NAME")
-    try:
-        content = read_bytes(file, "shaper")
-    except OSError as error:
-        raise OwnShaperError(f"shaper {place}: {file} cannot be read: {error.strerror}") from error
-    sha256 = hashlib.sha256(content).hexdigest()
-    module = _run(content, place, file, sha256)
-    if attribute not in vars(module):
-        there = ", ".join(name for name, value in vars(module).items() if _may_be_one(value, module.__name__))
-        known = f"it contains {there}" if there else "it contains no shaper"
-        raise OwnShaperError(f"shaper {place}: {file} does not contain {attribute}; {known}")
-    found = vars(module)[attribute]
+    own = run_file(place, "shaper", OwnShaperError, _may_be_one)
+    found, attribute = own.found, own.attribute
     try:
         shaper = _shaper(found, attribute, place)
         Registry([shaper])
@@ -122,7 +93,7 @@ def load_own(place: str) -> OwnShaper:
         raise OwnShaperError(f"shaper {place} {error.why}") from error
     except ShapingError as error:
         raise OwnShaperError(f"shaper {place}: {error}") from error
-    return OwnShaper(file, attribute, sha256, shaper)
+    return OwnShaper(own.file, attribute, own.sha256, shaper)
 
 
 def check_for(own: OwnShaper, estimator: Estimator, joints: int) -> None:
@@ -147,24 +118,6 @@ def check_for(own: OwnShaper, estimator: Estimator, joints: int) -> None:
         raise OwnShaperError(f"shaper {own.place} {error.why}") from error
 
 
-def _run(content: bytes, place: str, file: str, sha256: str) -> ModuleType:
-    module = ModuleType(f"tvist_own_shaper_{sha256[:16]}")
-    module.__file__ = str(Path(file).resolve())
-    sys.modules[module.__name__] = module  # dataclasses and others look their own module up there
-    try:
-        exec(compile(content, module.__file__, "exec"), module.__dict__)  # noqa: S102  it is what the user asked for
-    except (Exception, SystemExit) as error:
-        frames = [
-            frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == module.__file__
-        ]
-        line = error.lineno if isinstance(error, SyntaxError) else frames[-1].lineno if frames else None
-        where = "" if line is None else f" in line {line}"
-        said = " ".join(str(error.msg if isinstance(error, SyntaxError) else error).split())
-        words = f"{type(error).__name__}: {said}" if said else type(error).__name__
-        raise OwnShaperError(f"shaper {place}: running {file} raises {words}{where}") from error
-    return module
-
-
 def _shaper(found: object, attribute: str, place: str) -> AnyShaper:
     if isinstance(found, Shaper | FirShaper):
         check_shaper(found)
@@ -178,9 +131,8 @@ def _shaper(found: object, attribute: str, place: str) -> AnyShaper:
     return shaper_of(found, name=attribute)
 
 
-def _may_be_one(value: object, module: str) -> bool:
-    own = callable(value) and not isinstance(value, type) and getattr(value, "__module__", None) == module
-    return own or isinstance(value, Shaper | FirShaper)
+def _may_be_one(value: object, *, own: bool) -> bool:
+    return (own and callable(value) and not isinstance(value, type)) or isinstance(value, Shaper | FirShaper)
 
 
 @lru_cache(maxsize=8)

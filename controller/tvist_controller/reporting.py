@@ -6,7 +6,7 @@ from tvist_controller.sample import Sample
 from tvist_controller.unshaped_reference import UnshapedReference
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
-from tvist_plant.plant import PERIOD, ModalPlant, Plant, PlantTruth
+from tvist_plant.plant import PERIOD, ModalPlant, Plant, PlantTruth, Truthful
 from tvist_protocol.stream import Truth
 from tvist_shaping.base import Filter
 
@@ -105,7 +105,7 @@ def truth_of(plant: Plant) -> PlantTruth:
     Raises:
         ValueError: The plant does not provide it.
     """
-    truth = plant.truth()
+    truth = plant.truth() if isinstance(plant, Truthful) else None
     if truth is None:
         raise ValueError(
             f"truth is on, but the plant {type(plant).__name__} cannot report it: turn truth off"

@@ -10,9 +10,11 @@ import numpy as np
 
 from tvist_controller.collision import CollisionModel
 from tvist_controller.mode_source import ModeSource, first_source
+from tvist_controller.own_plants import OwnPlant
 from tvist_controller.own_shapers import OwnShaper
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
+from tvist_plant.plant import Placeable, Plant, posture_of
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
@@ -52,6 +54,8 @@ class Setup:
     """Shapers from files, available by name beside those that come with the package."""
     compensate_sag: bool = False
     """Whether the drives lead by the twist of the gears under gravity, so that the arm rests on its target."""
+    plant: OwnPlant | None = None
+    """Plant that is not part of the package; None for the flexible arm of the description."""
     shape_servo: bool = False
     """Whether `servoj`, `speedj` and `speedl` of programs are shaped where they begin at rest."""
     instance: str = ""
@@ -97,6 +101,28 @@ class Setup:
         """Return the initial estimator of the lowest mode."""
         return self.source().estimator(1, self.payload)
 
+    def made_plant(self) -> Plant | None:
+        """Make the plant; None for the flexible arm of the description.
+
+        Raises:
+            OwnPlantError: It cannot be made.
+        """
+        return (
+            None
+            if self.plant is None
+            else self.plant.make(self.description, body(self.carried or self.payload))
+        )
+
+    def standing(self, plant: Plant | None) -> "Setup":
+        """Return the setup for a plant, which begins where it stands if it cannot be placed.
+
+        Raises:
+            ValueError: It has another number of joints.
+        """
+        if plant is None or isinstance(plant, Placeable):
+            return self
+        return replace(self, q=tuple(posture_of(plant, np.array(self.q)).tolist()))
+
     def to_builtins(self) -> dict[str, Any]:
         """Convert the setup to maps and lists for a recording."""
         return {
@@ -114,16 +140,20 @@ class Setup:
             "own_shapers": [msgspec.to_builtins(own.recorded) for own in self.own_shapers],
             "compensate_sag": self.compensate_sag,
             "shape_servo": self.shape_servo,
+            **({} if self.plant is None else {"plant": msgspec.to_builtins(self.plant.recorded)}),
             **({"instance": self.instance} if self.instance else {}),
         }
 
     @classmethod
-    def from_builtins(cls, content: dict[str, Any], own_shapers: Sequence[OwnShaper] = ()) -> "Setup":
+    def from_builtins(
+        cls, content: dict[str, Any], own_shapers: Sequence[OwnShaper] = (), plant: OwnPlant | None = None
+    ) -> "Setup":
         """Restore a setup from a recording.
 
         Args:
             content: Result of `to_builtins`.
             own_shapers: Shapers from files that the recording names, loaded again.
+            plant: The plant that it names, found again.
 
         Raises:
             ValueError: A part is missing or invalid.
@@ -139,6 +169,7 @@ class Setup:
                     mode=msgspec.convert(content["mode"], ResetMode),
                     calibration=None if calibration is None else calibration_of(calibration),
                     own_shapers=tuple(own_shapers),
+                    plant=plant,
                 ),
                 **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
                 # Recordings from before these options existed do not have them.

@@ -15,7 +15,7 @@ from tvist_controller.rehearsal import Still
 from tvist_controller.trajectory import Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Plant, Playable, Response, played
+from tvist_plant.plant import PERIOD, Placeable, Playable, Response, played
 from tvist_shaping.base import Filter
 
 
@@ -115,7 +115,7 @@ class DrivenLine:
         return targets, commands
 
 
-def respond(plant: Plant, driven: Driven, seed: int) -> Response:
+def respond(plant: Placeable, driven: Driven, seed: int) -> Response:
     """Let a plant follow what its drives get, from rest.
 
     Args:

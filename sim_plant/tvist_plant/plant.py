@@ -1,7 +1,8 @@
 """Interface between a controller and a plant: drive commands in, measurements out, one control period at a time.
 
-A controller requires only `Plant`. Abilities that only some plants have are interfaces of their own, which a plant
-implements by having the method: `Pushable`, `Breakable`, `ModalPlant`.
+A controller requires only `Plant`, and that it is `Placeable` or `Standing`. Other abilities that only some plants have
+are interfaces of their own, too, which a plant implements by having the method: a simulation can be pushed and broken,
+and knows the truth; a real arm has power, brakes, faults and a clock.
 """
 
 from dataclasses import dataclass
@@ -39,6 +40,8 @@ class Measurement:
     """Motor torques on the joint side, shape (n,) [N m]."""
     accelerometer: Floats
     """Specific force in the flange frame, with noise, shape (3,) [m/s^2]."""
+    timestamp: float | None = None
+    """Time at which the plant measured, by its own clock [s]; None if it has none."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +82,13 @@ class Response:
     """Orientation of the flange, shape (T, 3, 3)."""
 
 
+@runtime_checkable
 class Plant(Protocol):
     """An arm with its drives, simulated or real.
 
-    A controller owns its plant: no other code steps or resets it, and controllers do not share plants. The controller
-    resets the plant when it starts, takes a few steps at rest, and resets it again; from then on it calls `step` once
-    in every control period of `PERIOD` seconds.
+    A controller owns its plant: no other code steps or resets it, and controllers do not share plants. When it starts,
+    it places the plant if that is `Placeable`, and otherwise begins where the arm stands (`Standing`); from then on it
+    calls `step` once in every control period of `PERIOD` seconds, with power or without.
 
     An implementation guarantees:
 
@@ -99,6 +103,25 @@ class Plant(Protocol):
     def payload(self) -> Payload:
         """Carried payload, as far as it is known; it determines how far the arm moves when the brakes close."""
 
+    def step(self, command: DriveCommand) -> Measurement:
+        """Move the arm by one control period.
+
+        Args:
+            command: Set-points for the end of the period; the drives go linearly from the previous ones to these.
+
+        Returns:
+            Measurements at the end of the period.
+
+        Raises:
+            PlantError: A simulated state is no longer finite, or a real arm does not answer. The controller makes a
+                protective stop, and places the plant if it can.
+        """
+
+
+@runtime_checkable
+class Placeable(Plant, Protocol):
+    """A plant that can be put anywhere at rest, as simulated ones can: `simulation.reset` needs it."""
+
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
         """Put the arm at rest under a command without motion, as if it had stood there for a long time.
 
@@ -112,21 +135,90 @@ class Plant(Protocol):
                 Once its controller has started, a plant must not raise this.
         """
 
-    def step(self, command: DriveCommand) -> Measurement:
-        """Move the arm by one control period.
 
-        Args:
-            command: Set-points for the end of the period; the drives go linearly from the previous ones to these.
+@runtime_checkable
+class Standing(Plant, Protocol):
+    """A plant that stands somewhere by itself, as a real arm does; every plant is this or `Placeable`."""
 
-        Returns:
-            Measurements at the end of the period.
+    def measure(self) -> Measurement:
+        """Return the present measurements without moving the arm; at a failure, the last ones."""
 
-        Raises:
-            PlantError: The state is no longer finite. The controller makes a protective stop and resets the plant.
-        """
+
+@runtime_checkable
+class Truthful(Protocol):
+    """A plant that knows what a real robot cannot measure."""
 
     def truth(self) -> PlantTruth | None:
         """Return what a real robot cannot measure, after the last step or reset; None if that is unknown."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What a plant says of its own power."""
+
+    ready: bool
+    """Whether the drives hold the arm: they have power, and the brakes are released."""
+    fault: str | None = None
+    """What is wrong with it, in words; None if nothing is."""
+
+
+@runtime_checkable
+class Powered(Protocol):
+    """A plant whose power and brakes are switched, and which may switch itself off."""
+
+    def switch(self, *, power: bool, brakes: bool) -> None:
+        """Ask for another state, which may take a while: `condition` tells when the drives hold the arm.
+
+        Args:
+            power: Whether the drives are to have power.
+            brakes: Whether the brakes are to hold the arm.
+        """
+
+    @property
+    def condition(self) -> Condition:
+        """Its present condition. If it is not ready while the robot runs, the robot stops."""
+
+
+@runtime_checkable
+class Stoppable(Protocol):
+    """A plant with a stop of its own, for stops that do not go through the control line."""
+
+    def stop(self) -> None:
+        """Stop with category 0: no power, brakes closed."""
+
+
+@runtime_checkable
+class Pacing(Protocol):
+    """A plant that gives the tick, as a controller does whose states arrive every 2 ms."""
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until the next control period begins; return False if it does not within the timeout [s]."""
+
+
+def posture_of(plant: Plant, q: Floats) -> Floats:
+    """Return where a controller begins with a plant, shape (n,) [rad]: at q if it can be placed, else where it stands.
+
+    Raises:
+        ValueError: The measurement has the wrong shape, or the plant can neither be placed nor measured.
+    """
+    if isinstance(plant, Placeable):
+        return q
+    measured = _standing(plant).measure()
+    check_measurement(measured, len(q), plant)
+    return measured.q.copy()
+
+
+def placed(plant: Plant, command: DriveCommand, *, payload: Payload | None, seed: int) -> Measurement:
+    """Place a plant under a command if that is possible, and return its measurements; see `Placeable.reset`."""
+    if isinstance(plant, Placeable):
+        return plant.reset(command, payload=payload, seed=seed)
+    return _standing(plant).measure()
+
+
+def _standing(plant: Plant) -> Standing:
+    if isinstance(plant, Standing):
+        return plant
+    raise ValueError(f"the plant {type(plant).__name__} has neither reset nor measure: it needs one of them")
 
 
 @runtime_checkable
@@ -189,7 +281,8 @@ def played(plant: Plant, commands: Floats) -> Response:
     """
     rows = []
     for command in commands:
-        measured, truth = plant.step(DriveCommand(*command)), plant.truth()
+        measured = plant.step(DriveCommand(*command))
+        truth = plant.truth() if isinstance(plant, Truthful) else None
         if truth is None:
             raise ValueError(f"the plant {type(plant).__name__} does not provide the truth")
         own = (measured.q, measured.qd, measured.moment, measured.accelerometer)

@@ -8,7 +8,8 @@ import pytest
 from tests.controller.robots import PAPER, Q1, Q2, Q3, H, Robot, calibration, setup
 
 from tvist_controller.about import info_of
-from tvist_controller.own_shapers import OwnShaper, OwnShaperError, is_file, load_own
+from tvist_controller.own_files import is_file
+from tvist_controller.own_shapers import OwnShaper, OwnShaperError, load_own
 from tvist_controller.planner import Planner
 from tvist_controller.setup import Setup
 from tvist_lab.recordings.mcap_file import read

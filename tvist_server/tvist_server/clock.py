@@ -16,7 +16,7 @@ from tvist_server.jobs import Do, Jobs
 from tvist_server.lateness import Lateness, Punctuality
 from tvist_server.overload import Overload
 from tvist_server.punctual import PRIORITY, bind, take_priority
-from tvist_server.schedule import Schedule
+from tvist_server.schedule import Followed, Schedule
 
 log = logging.getLogger(__name__)
 
@@ -39,10 +39,17 @@ class Mailbox:
     Args:
         host: The controller.
         patience: Returns how long a step may wait for a socket that a program reads [s].
+        pace: Waits until the arm begins its next tick, at most the time that it is given [s], and returns whether it
+            has; None if a clock gives the tick.
     """
 
-    def __init__(self, host: Host, patience: Callable[[], float] = float) -> None:
-        self.host = host
+    def __init__(
+        self,
+        host: Host,
+        patience: Callable[[], float] = float,
+        pace: Callable[[float], bool] | None = None,
+    ) -> None:
+        self.host, self.pace = host, pace
         self._patience = patience
         self.jobs = Jobs()
         self.ending = False
@@ -141,7 +148,7 @@ class Lockstep(Clock):
 
 
 class Realtime(Clock):
-    """Ticks at every period of the monotonic clock, for all robots in one thread, by a `Schedule`.
+    """Ticks at every period of the monotonic clock, for all robots in one thread, by a `Schedule`; or of one arm's.
 
     Args:
         robots: Robots to tick.
@@ -189,15 +196,18 @@ class Realtime(Clock):
             self._asked.set()
         robots, overloads, now, sleep = self._robots, self._overloads, time.monotonic, time.sleep
         alone, handed_on = len(robots) == 1, -HAND_ON_EVERY
-        schedule = Schedule(len(robots), self._period, now())
+        schedule, pace = Schedule(len(robots), self._period, now()), robots[0].pace
+        begin = schedule.begin if pace is None else Followed(self._period, now()).begin
         while self._running:
-            wait = schedule.due - now()
-            if wait > 0.0:
+            if pace is not None:
+                if not pace(LONGEST_SLEEP):
+                    continue
+            elif (wait := schedule.due - now()) > 0.0:
                 sleep(min(wait, LONGEST_SLEEP))
                 if wait > LONGEST_SLEEP:
                     continue
             begun = now()
-            number, late, missed = schedule.begin(begun)
+            number, late, missed = begin(begun)
             robot = robots[number]
             robot.lateness.note(late)
             if missed:

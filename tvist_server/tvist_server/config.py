@@ -10,6 +10,7 @@ from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from tvist_controller import calibrations
+from tvist_controller.own_plants import load_plant
 from tvist_controller.setup import Setup, check_rating, paper_payload
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
@@ -89,6 +90,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     shape_servo: bool = False
     """Shape servoj, speedj and speedl of programs too, where they begin at rest. Without this option they bypass the
     shaper, since their client usually closes a loop, to which the shaper would add its delay."""
+    plant: str | None = None
+    """The arm to move: FILE.py:NAME, which runs that file, or the name of an installed plant, such as mujoco [the
+    simulated flexible arm of the robot file]. NAME takes a RobotDescription and a Payload, and makes a plant."""
     calibration: str | None = None
     """Name of a calibration that comes with the package, or path of a calibration file; none for a robot that is yet to
     be identified [the one that comes with the package for this robot]."""
@@ -287,6 +291,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 truth=self.truth,
                 compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
                 shape_servo=self.shape_servo,
+                plant=None if self.plant is None else load_plant(self.plant),
             )
             setup = shaped_by(setup, _either(self.shaper, profile.shaper))
             if self.state is not None:

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
-from tvist_controller.own_shapers import check_for, is_file, load_own
+from tvist_controller.own_files import is_file
+from tvist_controller.own_shapers import check_for, load_own
 from tvist_controller.setup import Setup
 from tvist_plant.user_file import read_bytes, read_toml
 from tvist_protocol.content import checked, parse_json

@@ -12,6 +12,7 @@ from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.rehearsal import rehearse
 from tvist_controller.setup import Setup
 from tvist_controller.sink import Sink
+from tvist_plant.plant import Pacing
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Refused, Reply
@@ -60,13 +61,13 @@ class ServedRobot:
         hosts: AllowedHosts | None = None,
         keep: int | None = None,
     ) -> None:
-        self.setup = setup
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
         self._realtime = not lockstep
         # When a client advances time, nothing is late, and plans are made when they are needed.
         self._plans = None if lockstep else PlansOfPrograms(_planner(setup))
         self.controller = Controller(setup, order=None if self._plans is None else self._plans.order)
+        self.setup = setup = self.controller.setup
         if self._realtime:
             rehearse(self.controller.cycle)
         info_of(self.controller)  # computes the slowest part of the description once, before the first tick
@@ -89,7 +90,10 @@ class ServedRobot:
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
         """Gateway for the sockets of programs."""
         self._host = Host(self.controller, *sinks, black_box, self._publisher, ports=self.sockets)
-        self.driven = Mailbox(self._host, self.sockets.patience)
+        plant = self.controller.cycle.line.plant
+        self.driven = Mailbox(
+            self._host, self.sockets.patience, plant.wait if isinstance(plant, Pacing) else None
+        )
         """The robot as seen by the clock."""
         self._plan_ahead = (
             None if lockstep else PlanAhead(self._host, _planner(setup), self.driven.post, self._complete)

@@ -10,6 +10,23 @@ so more moments would allow fewer robots.
 """
 
 
+class Followed:
+    """Ticks that begin when the arm says so; those that it has left out are counted.
+
+    Args:
+        period: Period of its ticks [s].
+        start: Present time [s].
+    """
+
+    def __init__(self, period: float, start: float) -> None:
+        self._period, self._before = period, start
+
+    def begin(self, now: float) -> tuple[int, float, int]:
+        """Take the next tick, which begins now; see `Schedule.begin`."""
+        gap, self._before = now - self._before, now
+        return 0, max(0.0, gap - self._period), max(0, int(gap / self._period) - 1)
+
+
 class Schedule:
     """Absolute deadlines, a period apart for each robot, and staggered so that robots do not wait for each other.
 

@@ -116,6 +116,7 @@ class Server:
                 prepare(starting.note)
             for setup in setups:
                 self.robots.append(_robot(setup, config, observe, several=several))
+            _check_paces(config, self.robots)
             self._couriers, self._clocks = _drivers(config, self.robots)
             self._interfaces: list[UrInterfaces] = []
             self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
@@ -339,6 +340,24 @@ def _interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> UrInter
         lockstep=lockstep,
         programs=config.program_folder(setup.name),
     )
+
+
+def _check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
+    """Check that an arm that gives the tick is alone, and that nothing else is to give it.
+
+    Raises:
+        ConfigError: It is not.
+    """
+    if not any(robot.driven.pace for robot in robots):
+        return
+    if config.clock != "realtime" or config.speed != 1.0:
+        wanted = f"clock is {config.clock}" if config.clock != "realtime" else f"speed is {config.speed:g}"
+        raise ConfigError(f"{wanted}, but the plant {config.plant} gives the tick: leave it out")
+    if len(robots) > 1:
+        raise ConfigError(
+            f"plant is {config.plant}, which gives the tick, and there are {len(robots)} robots: serve each by a "
+            "process of its own (workers), or alone"
+        )
 
 
 def _drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Courier], list[Clock]]:

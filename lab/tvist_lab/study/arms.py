@@ -12,7 +12,7 @@ from tvist_lab.mujoco_arm import MujocoArm
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.imperfections import Imperfections, YieldingBase
-from tvist_plant.plant import Plant
+from tvist_plant.plant import Placeable
 
 SUBSTEPS = 8
 """Number of integrator steps per period for an arm with imperfections, which are integrated explicitly."""
@@ -32,7 +32,7 @@ class ArmVariant:
     """Name in JSON."""
     label: str
     """What distinguishes it, for people."""
-    make: Callable[[RobotDescription, Payload, int], Plant]
+    make: Callable[[RobotDescription, Payload, int], Placeable]
     """Creates a plant that provides the truth from description, carried payload and seed."""
 
 

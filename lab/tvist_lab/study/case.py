@@ -15,7 +15,7 @@ from tvist_lab.study.line import PAPER, ControlLine, point_to_point
 from tvist_lab.study.moves import Move
 from tvist_lab.study.streams import stopped_stream
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.plant import PERIOD, Plant
+from tvist_plant.plant import PERIOD, Placeable
 
 LIMITS = {"gentle": PAPER, "industrial": MotionLimits(velocity=3.0, acceleration=8.0, jerk=2000.0)}
 """Limits of moves by name: the paper's, and those of quick handling."""
@@ -85,7 +85,7 @@ class World:
         self.line = ControlLine(case.description, start, self._body(case.declared.mass))
 
     @cached_property
-    def arms(self) -> Mapping[str, Plant]:
+    def arms(self) -> Mapping[str, Placeable]:
         """The arms by their names."""
         carried, case = self._body(self._case.move.mass), self._case
         return MappingProxyType(

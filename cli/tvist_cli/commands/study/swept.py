@@ -59,7 +59,7 @@ def _robot(path: Path, spec: "Spec", place: int, named: "str | NamedRobot") -> "
 def _recipe(
     path: Path, spec: "Spec", shaper: str, calibration: str | None, arm: "RobotDescription"
 ) -> "Recipe":
-    from tvist_controller.own_shapers import is_file
+    from tvist_controller.own_files import is_file
     from tvist_controller.refusal import RefusalError
     from tvist_lab.study.recipes import Recipe, RecipeError
     from tvist_shaping.errors import ShapingError

@@ -1,0 +1,61 @@
+"""The power, brakes and condition of a plant that has them; simulated arms have none, and are always ready."""
+
+from tvist_plant.plant import PERIOD, Condition, Plant, Powered, Stoppable
+from tvist_protocol.modes import RobotMode
+
+STALE = 10
+"""Number of ticks after which measurements whose time does not pass are stale."""
+
+
+class ArmPower:
+    """Tells a plant what power and brakes it is to have, and the robot what the plant says of them.
+
+    Args:
+        plant: The plant.
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        self._powered = plant if isinstance(plant, Powered) else None
+        self._stoppable = plant if isinstance(plant, Stoppable) else None
+        self._told: RobotMode | None = None
+        self._was_ready = False
+        self._measured: float | None = None
+        self._same = 0
+
+    @property
+    def condition(self) -> Condition:
+        """Present condition of the plant."""
+        return Condition(ready=True) if self._powered is None else self._powered.condition
+
+    def follow(self, mode: RobotMode) -> None:
+        """Switch power and brakes as the robot mode asks, if that has changed."""
+        if mode is self._told:
+            return
+        self._told, self._was_ready = mode, False
+        if self._powered is not None:
+            self._powered.switch(power=mode >= RobotMode.POWER_ON, brakes=mode is not RobotMode.RUNNING)
+
+    def stop(self) -> None:
+        """Let the plant make its own stop, if it has one."""
+        if self._stoppable is not None:
+            self._stoppable.stop()
+
+    def trouble(self, mode: RobotMode, timestamp: float | None) -> str | None:
+        """Return why the robot cannot go on, in words; None if it can. To be called after every tick.
+
+        Args:
+            mode: Present robot mode.
+            timestamp: Time of the plant's measurement [s]; None if it has none.
+        """
+        self._same = self._same + 1 if timestamp is not None and timestamp == self._measured else 0
+        self._measured = timestamp
+        if self._same >= STALE:
+            return f"the arm has not measured anything for {1e3 * STALE * PERIOD:g} ms"
+        if self._powered is None:
+            return None
+        condition = self._powered.condition
+        if condition.fault is not None:
+            return f"the arm reports: {condition.fault}"
+        lost = self._was_ready and not condition.ready and mode is RobotMode.RUNNING
+        self._was_ready = condition.ready and mode is RobotMode.RUNNING
+        return "the arm has switched off its drives" if lost else None
