@@ -190,27 +190,33 @@ class MotionControl:
         self._protection.forget()
 
     def recover(self, error: PlantError, seed: int) -> Sample:
-        """Make a protective stop of an arm that has failed: it is placed at rest at its reference, if it can be.
+        """Go on after the arm has failed: a simulated one is placed at rest at its reference, in a protective stop.
+
+        One that cannot be placed gets no power until the safety system is restarted.
 
         Args:
             error: The plant's error.
             seed: Seed of the noise and gear errors.
 
         Returns:
-            A tick of the line with the new state.
+            Signals with the new state.
         """
         cycle, simulated = self.cycle, isinstance(self.cycle.line.plant, Placeable)
         why = f"{error}: the simulation put the arm at rest at its reference" if simulated else str(error)
-        again = not simulated and self.activity in {Activity.PROTECTIVE_STOP, Activity.POWER_OFF}
         self.abandon(why, "plant_failure")
-        self._power.stop()
         sample = cycle.reset(cycle.line.shaped.joints.position, seed=seed)
         self._protection.forget()
+        if not simulated:
+            self._power.stop()
+            self.activity = Activity.POWER_OFF
+            if self.safety.latched is None:  # while an arm does not answer, every tick fails
+                self.safety.latched = "fault"
+                self._emit("safety_stop", code="plant_failure", why=why, category=0)
+            return sample
         if after(self.activity, "plant_failure") is not None:
             self.go("plant_failure")
-        if not again:  # an arm that does not answer fails in every tick
-            self._emit("protective_stop", code="plant_failure", why=why)
-        return cycle.step() if simulated else sample
+        self._emit("protective_stop", code="plant_failure", why=why)
+        return cycle.step()
 
     def check(self, trigger: str) -> Activity:
         """Return the activity that a trigger leads to.

@@ -8,7 +8,7 @@ from typing import Any
 from msgspec.structs import fields
 
 from tvist_controller.api.line import OwnShaper, RecordedShaper, Setup
-from tvist_controller.api.robot import Controller, Presence, SocketNews
+from tvist_controller.api.robot import Controller, OwnPlant, Presence, RecordedPlant, SocketNews
 from tvist_lab.recordings.mcap_file import RecordingFile
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked
@@ -61,7 +61,10 @@ def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> R
 
 
 def replay_file(
-    content: RecordingFile, output: Path | None = None, own_shapers: Sequence[OwnShaper] = ()
+    content: RecordingFile,
+    output: Path | None = None,
+    own_shapers: Sequence[OwnShaper] = (),
+    plant: OwnPlant | None = None,
 ) -> Replay:
     """Replay a recording with its own setup.
 
@@ -70,10 +73,11 @@ def replay_file(
         output: MCAP file for the replay's own recording.
         own_shapers: Shapers from files that the robot was served with, loaded again. A note reports each file that
             has changed since.
+        plant: Plant that the robot was served with, found again.
 
     Raises:
-        ReplayError: The recording does not contain its robot's setup, or begins too late; or a shaper from a file is
-            missing or not needed.
+        ReplayError: The recording does not contain its robot's setup, or begins too late; or a shaper from a file or a
+            plant is missing or not needed.
         ValueError: The recorded setup is invalid.
     """
     if not content.start:  # empty in recordings made by another program
@@ -88,7 +92,8 @@ def replay_file(
     if (content.dropped or {}).get("journal"):
         raise ReplayError("the recorder dropped messages of the journal, so an equal run is not possible")
     used, notes = _used(content.start, own_shapers)
-    setup = Setup.from_builtins(content.start, used)
+    notes += _same_plant(content.start, plant)
+    setup = Setup.from_builtins(content.start, used, plant)
     if content.behaviour != THIS_BEHAVIOUR:
         notes.append(
             f"the recording is of behaviour {content.behaviour}, and this is {THIS_BEHAVIOUR}: the last bits of states "
@@ -126,6 +131,29 @@ def _used(start: dict[str, Any], given: Sequence[OwnShaper]) -> tuple[list[OwnSh
         name, own = next(iter(by_name.items()))
         raise ReplayError(f"the robot was served without the shaper {name} of {own.place}: leave it out")
     return used, notes
+
+
+def _same_plant(start: dict[str, Any], given: OwnPlant | None) -> list[str]:
+    """Check that the plant is the recorded one; return a note if its file has changed."""
+    try:
+        recorded = checked(start["plant"], RecordedPlant) if "plant" in start else None
+    except ProtocolError as error:
+        raise ReplayError(f"plant of the recording's start: {error.why}") from error
+    if recorded is None:
+        if given is not None:
+            raise ReplayError(f"the robot was served without the plant {given.place}: leave it out")
+        return []
+    if given is None:
+        raise ReplayError(
+            f"the robot was served with the plant {recorded.place}, which the recording does not contain: give "
+            f"--plant {recorded.place}, or where it is now"
+        )
+    changed = given.sha256 != recorded.sha256
+    return (
+        [f"{given.place} is not what it was when the recording was made: states may differ"]
+        if changed
+        else []
+    )
 
 
 def _write(setup: Setup, content: RecordingFile, done: Replay, output: Path) -> None:

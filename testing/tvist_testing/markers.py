@@ -35,6 +35,11 @@ def shaper(shaper: str) -> Part:
     return {"shaper": _text("tvist_shaper", shaper)}
 
 
+def plant(plant: str) -> Part:
+    """Arm to move instead of the simulated one: FILE.py:NAME, or the name of an installed plant, such as "mujoco"."""
+    return {"plant": _text("tvist_plant", plant)}
+
+
 def state(
     start: str | None = None,
     *,
@@ -101,6 +106,7 @@ MARKERS: dict[str, Callable[..., Part]] = {
     "tvist_robot": robot,
     "tvist_payload": payload,
     "tvist_shaper": shaper,
+    "tvist_plant": plant,
     "tvist_state": state,
     "tvist_faults": faults,
     "tvist_program": program,

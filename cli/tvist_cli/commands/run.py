@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 
 OPTIONS = {
-    "robot", "profile", "payload", "overload", "shaper", "shape_servo", "start", "seed", "record", "truth", "listen",
-    "ur", "ur_allow",
+    "robot", "profile", "payload", "overload", "shaper", "shape_servo", "plant", "start", "seed", "record", "truth",
+    "listen", "ur", "ur_allow",
 }  # fmt: skip
 """Options of `tvist serve` that one robot which ends with its program can do with."""
 

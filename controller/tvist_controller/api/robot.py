@@ -7,6 +7,7 @@ from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.loopback import LoopbackHost
+from tvist_controller.own_plants import OwnPlant, RecordedPlant
 from tvist_controller.presence import Presence
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.programs.socket_traffic import SocketNews
@@ -17,7 +18,9 @@ __all__ = [
     "Controller",
     "Host",
     "LoopbackHost",
+    "OwnPlant",
     "Presence",
+    "RecordedPlant",
     "ScriptCompiler",
     "Sink",
     "SocketNews",

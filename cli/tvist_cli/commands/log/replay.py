@@ -17,6 +17,7 @@ def replay(
     output: Path | None = None,
     *,
     shaper: list[str] | None = None,
+    plant: str | None = None,
     publish: bool = False,
     listen: list[str] | None = None,
     name: str | None = None,
@@ -35,6 +36,8 @@ def replay(
         output: MCAP file to write the second run to.
         shaper: FILE.py:NAME, repeatable: your own shaper that the robot was served with. A recording names the file,
             but replay runs it only if it is given here.
+        plant: FILE.py:NAME, or the name of an installed plant: the arm that the robot was served with. An arm that is
+            not simulated cannot do the same again.
         publish: Serve the recording at its own time. All commands of clients are refused.
         listen: With --publish, Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
         name: With --publish, name of the robot on the network [that of the recording].
@@ -51,30 +54,31 @@ def replay(
     if not publish:
         if given := [key for key, value in own_server.items() if value is not None]:
             raise Failure(f"--{given[0]} needs --publish", code=2)
-        _run_again(file, output, shaper or [], json=json)
+        _run_again(file, output, shaper or [], plant, json=json)
         return
-    if output is not None or shaper:
-        raise Failure(
-            "--publish runs nothing again: leave out " + ("--shaper" if output is None else "the output"),
-            code=2,
-        )
+    unused = {"the output": output, "--shaper": shaper, "--plant": plant}
+    if words := [word for word, given in unused.items() if given]:
+        raise Failure(f"--publish runs nothing again: leave out {words[0]}", code=2)
     publish_recording(
         file, listen=listen or [DEFAULT_ENDPOINT], name=name, speed=1.0 if speed is None else speed, loop=loop,
         security=security, insecure=insecure, json=json,
     )  # fmt: skip
 
 
-def _run_again(file: Path, output: Path | None, shaper: list[str], *, json: bool) -> None:
+def _run_again(file: Path, output: Path | None, shaper: list[str], plant: str | None, *, json: bool) -> None:
+    from tvist_controller.own_plants import OwnPlantError, load_plant
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read
     from tvist_lab.replay import ReplayError, replay_file
     from tvist_server.recording import RecorderError
 
     own = [load_given(place) for place in shaper]
+    with told(OwnPlantError, code=2):
+        arm = None if plant is None else load_plant(plant)
     with told(RecordingError, ReplayError, RecorderError, ValueError):
         content = read(file)
         compile_if_new()
-        again = replay_file(content, output, own)
+        again = replay_file(content, output, own, arm)
     for note in again.notes:
         say(note)
     if json:

@@ -1,0 +1,147 @@
+"""An arm that stands somewhere, has power, brakes and faults of its own, and cannot be placed."""
+
+import numpy as np
+import pytest
+from tests.own_arm import STANDS, SWITCHES, OwnArm
+
+from tvist_controller.arm_power import STALE
+from tvist_controller.controller import Controller
+from tvist_protocol import commands as c
+from tvist_protocol.modes import RobotMode, SafetyMode
+from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.simulation import SimulationReset
+
+from .robots import UR5E, NoArm, Robot, setup
+
+TARGET = tuple(np.add(STANDS, [0.3, -0.2, 0.2, 0.0, 0.1, 0.0]).tolist())
+
+
+def ready():
+    """A robot that has switched its arm on."""
+    plant = OwnArm(UR5E, UR5E.payload)
+    robot = Robot(plant=plant)
+    robot.tick(SWITCHES + 1)
+    return plant, robot
+
+
+def modes(robot):
+    state = robot.states[-1]
+    return RobotMode(state.robot_mode), SafetyMode(state.safety_mode)
+
+
+def test_it_is_not_stepped_before_the_first_tick_and_the_line_begins_where_it_stands():
+    plant = OwnArm(UR5E, UR5E.payload)
+    controller = Controller(setup(), plant)
+    assert plant._ticks == 0
+    assert controller.setup.q == tuple(STANDS)
+    assert controller.latest.actual_q == list(STANDS) == controller.latest.target_q
+    assert (plant.q == STANDS).all()
+
+
+def test_it_moves_once_its_drives_are_ready_and_not_before():
+    robot = Robot(plant=OwnArm(UR5E, UR5E.payload))
+    robot.tick(SWITCHES // 2)
+    refused = robot.send(c.MoveJ, q=TARGET)
+    assert (refused.code, "not ready" in refused.why) == ("wrong_mode", True)
+    robot.tick(SWITCHES)
+    assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
+    assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
+
+
+def test_power_and_brakes_follow_the_robot_mode_and_it_goes_on_from_where_it_was_moved_to():
+    plant, robot = ready()
+    assert plant.calls == [(True, False)]
+    assert robot.send(c.PowerOff) is not None
+    robot.tick()
+    assert plant.calls[-1] == (False, True)
+    plant.q = plant.q + 0.05  # by hand
+    robot.tick(3)
+    assert robot.send(c.PowerOn) is not None
+    robot.tick(SWITCHES + 2)
+    assert plant.calls[-1] == (True, False)
+    assert robot.states[-1].target_q == pytest.approx(STANDS + 0.05)
+    assert robot.states[-1].actual_q == pytest.approx(STANDS + 0.05, abs=5e-4)
+
+
+def test_a_fault_of_its_own_stops_it_until_the_fault_is_gone_and_safety_is_restarted():
+    plant, robot = ready()
+    robot.send(c.MoveJ, q=TARGET)
+    robot.tick(100)
+    plant.fault = "joint 3 is too warm"
+    robot.until_rest()
+    robot.tick(2)
+    stops = [event for event in robot.events if event.kind == "safety_stop"]
+    assert [event.category for event in stops] == [0]
+    assert "joint 3 is too warm" in stops[0].why
+    assert "motion_stopped" in robot.kinds()
+    assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
+    assert plant.stops == 1
+    assert robot.send(c.PowerOn).code == "wrong_mode"
+    robot.send(c.RestartSafety)
+    robot.tick()
+    assert modes(robot)[1] is SafetyMode.FAULT  # it is still too warm
+    plant.fault = None
+    robot.send(c.RestartSafety)
+    robot.send(c.PowerOn)
+    robot.tick(SWITCHES + 1)
+    assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
+    assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
+
+
+def test_one_that_switches_itself_off_stops_the_robot():
+    plant, robot = ready()
+    robot.send(c.MoveJ, q=TARGET)
+    robot.tick(100)
+    plant.stop()
+    robot.until_rest()
+    robot.tick()
+    assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
+    assert any("switched off its drives" in (event.why or "") for event in robot.events)
+
+
+def test_one_that_does_not_answer_is_told_of_once():
+    plant, robot = ready()
+    robot.send(c.MoveJ, q=TARGET)
+    robot.tick(100)
+    plant.silent = True
+    robot.tick(50)
+    failures = [event for event in robot.events if event.code == "plant_failure"]
+    assert [event.kind for event in failures] == ["motion_stopped", "safety_stop"]
+    assert failures[-1].why == "the arm does not answer"
+    stood = np.array(robot.states[-1].actual_q)
+    assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
+    plant.silent = False
+    robot.send(c.RestartSafety)
+    robot.send(c.PowerOn)
+    robot.tick(SWITCHES + 2)
+    assert robot.states[-1].target_q == pytest.approx(stood)
+    assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
+    assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
+
+
+def test_measurements_whose_time_does_not_pass_are_no_measurements():
+    plant, robot = ready()
+    plant.measure, kept = (lambda: kept), plant.measure()
+    robot.tick(STALE + 1)
+    assert any("not measured" in (event.why or "") for event in robot.events)
+    assert modes(robot)[1] is SafetyMode.FAULT
+
+
+def test_it_cannot_be_put_anywhere():
+    _, robot = ready()
+    before = robot.controller.latest
+    refused = robot.send(SimulationReset, q=TARGET)
+    assert (refused.code, "OwnArm" in refused.why) == ("unknown_type", True)
+    assert robot.controller.latest == before
+    assert isinstance(Robot(plant=NoArm()).send(SimulationReset, q=tuple(UR5E.poses["Q2"])), Done)
+
+
+def test_a_plant_needs_one_of_two_ways_to_begin():
+    class Neither:
+        payload = UR5E.payload
+
+        def step(self, command):  # noqa: ARG002  as the interface has it
+            raise AssertionError
+
+    with pytest.raises(ValueError, match="Neither has neither reset nor measure"):
+        Controller(setup(), Neither())
