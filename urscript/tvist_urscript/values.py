@@ -7,6 +7,7 @@ variable a new list.
 from collections.abc import Iterable, Iterator
 from typing import Any, TypeAlias, TypeVar
 
+from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault
 
 LONGEST = 1000
@@ -235,13 +236,14 @@ def to_text(value: bytes) -> str:
     return value.decode(errors="surrogateescape")
 
 
-def to_str(value: Value) -> str:
+@costs(10)
+def to_str(val: Value) -> str:
     """Write a value as the controller does: floats with six decimals, without zeros at their end.
 
     Raises:
         Fault: The text is too long.
     """
-    return short(_written(value))
+    return short(_written(val))
 
 
 def _written(value: Value) -> str:

@@ -5,24 +5,10 @@ from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number
 from tvist_controller.programs.arm import ProgramArm
 from tvist_protocol.io import BITS, NUMBERS
-from tvist_urscript import signature
+from tvist_urscript import costs
 
 FLAGS = 32
 """Number of flags, which only programs have."""
-
-SIGNATURES = {
-    **{
-        f"read_{side}_{kind}_register": signature("address")
-        for side in ("input", "output")
-        for kind in ("boolean", "integer", "float")
-    },
-    **{
-        f"write_output_{kind}_register": signature("address, value", cost=4)
-        for kind in ("boolean", "integer", "float")
-    },
-    "get_flag": signature("n"),
-    "set_flag": signature("n, value", cost=3),
-}
 
 
 class RegisterFunctions:
@@ -61,16 +47,19 @@ class RegisterFunctions:
         """Read a number that programs write."""
         return self._registers.doubles("output_double")[integer("address", address, 0, NUMBERS - 1)]
 
+    @costs(4)
     def write_output_boolean_register(self, address: object, value: object) -> None:
         """Write a bit for clients."""
         place, bit = integer("address", address, 0, BITS - 1), flag("value", value)
         self._arm.then(lambda: self._registers.write("output_bit", place, bit))
 
+    @costs(4)
     def write_output_integer_register(self, address: object, value: object) -> None:
         """Write an integer for clients."""
         place, wanted = integer("address", address, 0, NUMBERS - 1), integer("value", value, LEAST, MOST)
         self._arm.then(lambda: self._registers.write("output_int", place, wanted))
 
+    @costs(4)
     def write_output_float_register(self, address: object, value: object) -> None:
         """Write a number for clients."""
         place, wanted = integer("address", address, 0, NUMBERS - 1), number("value", value)
@@ -80,6 +69,7 @@ class RegisterFunctions:
         """Return a flag."""
         return self._flags[integer("n", n, 0, FLAGS - 1)]
 
+    @costs(3)
     def set_flag(self, n: object, value: object) -> None:
         """Set a flag."""
         place, wanted = integer("n", n, 0, FLAGS - 1), flag("value", value)
