@@ -3,9 +3,8 @@
 from collections.abc import Iterable
 from inspect import getdoc
 
-from tvist_controller.instruments.snapshot import Snapshot
+from tvist_controller.instruments.snapshot import VARIABLES, Snapshot
 from tvist_server.gateways.ur.rtde.inputs import NAMED as NAMED_INPUTS
-from tvist_server.gateways.ur.rtde.outputs import NAMED as NAMED_OUTPUTS
 from tvist_server.gateways.ur.rtde.wire import Wire
 
 SOURCES = ("State", "Io", "Computed", "Constant")
@@ -68,9 +67,8 @@ def describe(name: str) -> tuple[str, str]:
 
 
 def _outputs() -> Iterable[tuple[str, ...]]:
-    for wire, names in NAMED_OUTPUTS.items():
-        for name in names.split():
-            yield f"`{name}`", wire.name, *describe(name)
+    for name, word in VARIABLES.items():
+        yield f"`{name}`", word, *describe(name)
     for bank in ("output", "input"):
         for name, wire, what in REGISTER_ROWS:
             yield f"`{name.format(bank=bank)}`", wire.name, "io", f"Registers: {what}."
