@@ -274,6 +274,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         """
         try:
             chosen, description = self.profile_in_force, load(self.robot)
+            if self.ur:
+                self.ur_ports.check_joints(description.robot.name, description.joints)
             profile = PLAIN if chosen is None else PROFILES[chosen]
             calibration = self._calibration(description.robot.model)
             setup = Setup(

@@ -26,7 +26,8 @@ Torque constants, resistances and thermal parameters of the motors are guesses o
 two sizes of joint: 10 and 7.9 N m/A on the joint's side. Temperatures and energies are integrated from the first tick
 on, even if no client reads them.
 
-Vectors of joints have six entries: an arm with fewer joints has zeros in the rest, and an arm with more is cut.
+Vectors of joints have six entries: an arm with fewer joints has zeros in the rest, and one with more
+[has no RTDE](../how-to/connect-ur-clients.md#arms-with-more-than-six-joints).
 All variables are offered, including those that a controller of the reported version would not have yet.
 """
 REGISTER_ROWS = (

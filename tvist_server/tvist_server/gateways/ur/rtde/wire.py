@@ -35,10 +35,10 @@ class Wire(Enum):
 
     @property
     def encode(self) -> Encode:
-        """Writes a value.
+        """Function that writes a value as bytes.
 
-        Vectors that are too short are filled with zeros, too long ones are cut: an arm may have one to seven joints,
-        and six is what every client expects.
+        A vector that is too short is filled with zeros, since clients expect six entries of an arm with fewer joints.
+        One that is too long is an error: robots with more joints are refused before they are served, see `UrPorts`.
         """
         pack, length = Struct(f">{self.value}").pack, self.length
         if length == 1:
@@ -47,6 +47,6 @@ class Wire(Enum):
         def vector(values: Sequence[float]) -> bytes:
             if len(values) == length:
                 return pack(*values)
-            return pack(*[*values, *[0] * length][:length])
+            return pack(*values, *[0] * (length - len(values)))
 
         return vector
