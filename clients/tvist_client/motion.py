@@ -12,22 +12,21 @@ REMEMBERED = 256
 
 
 class Motion:
-    """One motion, from the robot's acceptance to its end.
+    """One motion, from the robot's acceptance to its end."""
 
-    Attributes:
-        id: The robot's number for it.
-        started: Tick at which it began; None until then.
-        done: Tick at which its shaped reference came to rest at the target; None until then, or if it never did.
-        limited: Why it is slower than asked, or which limit it will exceed, in a sentence; None if it is as asked.
-        stopped: The event that reports its end before the target; None if there is none.
-    """
+    id: int
+    """The robot's number for it."""
+    started: int | None = None
+    """Tick at which it began; None until then."""
+    done: int | None = None
+    """Tick at which its shaped reference came to rest at the target; None until then, or if it never did."""
+    limited: str | None = None
+    """Why it is slower than asked, or which limit it will exceed, in a sentence; None if it is as asked."""
+    stopped: Event | None = None
+    """The event that reports its end before the target; None if there is none."""
 
     def __init__(self, id: int, pass_time: Callable[["Motion"], Awaitable[None]]) -> None:  # noqa: A002  the wire's name
         self.id = id
-        self.started: int | None = None
-        self.done: int | None = None
-        self.limited: str | None = None
-        self.stopped: Event | None = None
         self._pass_time = pass_time
         self._error: ClientError | None = None
         self._ended = asyncio.Event()
