@@ -88,7 +88,7 @@ class MotionsByNumber:
         self._motions: dict[int, Motion] = {}
 
     def motion(self, id: int) -> Motion:  # noqa: A002  the wire's name
-        """Return the motion with this number."""
+        """Return the motion with this number; create it if neither an answer nor an event has named it yet."""
         motion = self._motions.get(id)
         if motion is None:
             motion = self._motions[id] = Motion(id, self._pass_time)
@@ -97,7 +97,7 @@ class MotionsByNumber:
         return motion
 
     def on_event(self, event: Event) -> None:
-        """Take any event."""
+        """Pass an event on to the motion that it names."""
         if event.id is not None:
             self.motion(event.id).on_event(event)
 

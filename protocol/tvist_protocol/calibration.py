@@ -117,7 +117,7 @@ class ModalModel(_Part, frozen=True, kw_only=True):
 
 
 class Provenance(_Part, frozen=True, kw_only=True):
-    """Origin of a calibration."""
+    """How a calibration was made: command, version, and the measurements that were kept and rejected."""
 
     command: Annotated[str, Meta(max_length=500)]
     """Command that made it."""

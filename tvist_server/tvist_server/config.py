@@ -239,7 +239,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Endpoints to listen on."""
+        """Endpoints to listen on: those of `listen`, or the default; none by default if robots connect to a router."""
         return (() if self.connect else (DEFAULT_ENDPOINT,)) if self.listen is None else self.listen
 
     @property

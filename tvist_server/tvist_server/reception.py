@@ -78,7 +78,7 @@ class Reception(Desk):
         return None if lease is None else lease.client
 
     def setpoint(self, data: bytes) -> None:
-        """Admit a set-point."""
+        """Pass a set-point on; without a valid lease it is counted and dropped, since set-points are not answered."""
         lease = self._host.standing.lease
         setpoint = admit_setpoint(data, lease)
         if setpoint is None or lease is None:

@@ -42,7 +42,7 @@ INSTANCE_BYTES = 4
 
 
 class Recording(NamedTuple):
-    """What became of a recording."""
+    """Where a recording is, and whether it is complete."""
 
     place: str
     """Where it is, in words."""

@@ -30,9 +30,9 @@ class Expressions:
     """Translates expressions.
 
     Attributes:
-        scope: What names mean here.
+        scope: The names that the present function can use.
         cost: Evaluations of what has been translated since it was set to 0.
-        works: What has been translated since it was reset may work on lists, and so take more than that.
+        works: Whether the code translated since it was reset may work on lists, which takes more than `cost`.
         used: Built-in functions that the script calls.
         constants: Lists and default values, by the names that compiled functions have for them.
     """

@@ -22,7 +22,7 @@ PART, PART_NODES = 200, 1000
 
 
 class Functions(Statements):
-    """Translates functions."""
+    """Translates functions of a script, and splits a long main function."""
 
     def function(self, scope: Scope) -> list[ast.FunctionDef]:
         """Translate a function of the script, without those inside it.

@@ -25,11 +25,11 @@ Steps = Generator[Any, None, Any]
 
 
 class Halted(Exception):  # noqa: N818  no error: the script has said `halt`
-    """The program ends now."""
+    """Raised by `halt` to unwind the thread that runs; the machine then ends all threads."""
 
 
 class Killed(Exception):  # noqa: N818  no error: the script has killed the thread that runs
-    """The thread that runs ends now."""
+    """Raised to unwind the thread that runs, since it has killed itself or a thread that it belongs to."""
 
 
 class Machine:
@@ -41,7 +41,7 @@ class Machine:
         halted: Whether it has ended by `halt`.
 
     Args:
-        script: What it runs.
+        script: The program.
         functions: The built-in functions that the script calls, without those of `PURE`.
         finish: Called as a blocking function before a thread waits for another (`join`, `enter_critical`), and at
             its regular end.

@@ -95,7 +95,7 @@ class Pose(Array):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Its six elements."""
+        """Its elements: x, y, z [m] and the rotation vector [rad]."""
         return self.items  # type: ignore[return-value]
 
 

@@ -326,11 +326,11 @@ class ProgramPlayer:
         self._wait()
 
     def _wait(self) -> None:
-        """Be paused."""
+        """Pause the program: none of its threads has a turn any more, from this tick on."""
         self.state = "PAUSED"
         if self._main is not None:
             self.line = self._main.machine.line
-            self._main.machine.left = 0  # in this tick, none of its threads has a turn any more
+            self._main.machine.left = 0
 
     def _check_running(self, command: str) -> None:
         """Refuse to start a program where the arm has no power or is in a protective stop."""

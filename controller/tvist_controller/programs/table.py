@@ -25,7 +25,7 @@ an arm has no closed form."""
 
 
 def page() -> str:
-    """The whole page."""
+    """Return the page of reference that lists all functions."""
     parts = [HEAD]
     for functions, title in FAMILIES.items():
         rows = [

@@ -32,17 +32,17 @@ class TerminalFunctions:
 
     @costs(4)
     def set_standard_digital_out(self, n: object, b: object) -> None:
-        """Set a standard digital output."""
+        """Set one of the eight standard digital outputs."""
         self._set(STANDARD[integer("n", n, 0, 7)], flag("b", b))
 
     @costs(4)
     def set_configurable_digital_out(self, n: object, b: object) -> None:
-        """Set a configurable digital output."""
+        """Set one of the eight configurable digital outputs."""
         self._set(CONFIGURABLE[integer("n", n, 0, 7)], flag("b", b))
 
     @costs(4)
     def set_tool_digital_out(self, n: object, b: object) -> None:
-        """Set a digital output of the tool."""
+        """Set one of the two digital outputs of the tool."""
         self._set(TOOL[integer("n", n, 0, 1)], flag("b", b))
 
     def get_digital_in(self, n: object) -> bool:
@@ -56,27 +56,27 @@ class TerminalFunctions:
         return self._output(number_ if number_ < len(STANDARD) else TOOL[number_ - 8])
 
     def get_standard_digital_in(self, n: object) -> bool:
-        """Return a standard digital input."""
+        """Return one of the eight standard digital inputs."""
         return self._input(STANDARD[integer("n", n, 0, 7)])
 
     def get_standard_digital_out(self, n: object) -> bool:
-        """Return a standard digital output."""
+        """Return one of the eight standard digital outputs."""
         return self._output(STANDARD[integer("n", n, 0, 7)])
 
     def get_configurable_digital_in(self, n: object) -> bool:
-        """Return a configurable digital input."""
+        """Return one of the eight configurable digital inputs."""
         return self._input(CONFIGURABLE[integer("n", n, 0, 7)])
 
     def get_configurable_digital_out(self, n: object) -> bool:
-        """Return a configurable digital output."""
+        """Return one of the eight configurable digital outputs."""
         return self._output(CONFIGURABLE[integer("n", n, 0, 7)])
 
     def get_tool_digital_in(self, n: object) -> bool:
-        """Return a digital input of the tool."""
+        """Return one of the two digital inputs of the tool."""
         return self._input(TOOL[integer("n", n, 0, 1)])
 
     def get_tool_digital_out(self, n: object) -> bool:
-        """Return a digital output of the tool."""
+        """Return one of the two digital outputs of the tool."""
         return self._output(TOOL[integer("n", n, 0, 1)])
 
     # ------------------------------------------------------------------ analogue, tool and run state

@@ -60,7 +60,7 @@ class HostLease:
         self.ask(command(self._token), again)
 
     def ask(self, command: Command, then: Then) -> None:
-        """Send a command unchanged."""
+        """Send a command as it is; it needs no control, or has its token already."""
         self._desk.command(command, lambda reply: self._soon(lambda: then(reply)), self.host)
 
     def leave(self, connection: object) -> None:

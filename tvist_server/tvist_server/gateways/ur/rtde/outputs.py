@@ -1,4 +1,4 @@
-"""Variables that a robot tells, with their types: the annotated properties of a snapshot, and the registers."""
+"""Output variables, which clients read: the annotated properties of a snapshot, and the registers."""
 
 from collections.abc import Callable
 from operator import attrgetter
@@ -9,12 +9,12 @@ from tvist_server.gateways.ur.rtde.registers import KINDS, registers
 from tvist_server.gateways.ur.rtde.wire import Encode, Wire
 
 Read = Callable[[Snapshot], Any]
-"""Takes a variable's value out of a snapshot."""
+"""Function that returns the value of a variable."""
 
 READERS: dict[str, tuple[Read, Encode]] = {
     name: (attrgetter(name), Wire[word].encode) for name, word in VARIABLES.items()
 }
-"""How each variable that is no register is read from a snapshot, and written as bytes."""
+"""Functions that read and encode each variable but the registers, of which `EncodedRegisters` encodes whole banks."""
 OUTPUTS: dict[str, Wire] = {name: Wire[word] for name, word in VARIABLES.items()} | {
     name: wire for kind in KINDS for name, wire in registers(kind)
 }

@@ -40,7 +40,7 @@ REGISTER_ROWS = (
 
 
 def page() -> str:
-    """The whole page."""
+    """Return the page of reference that lists all variables."""
     outputs = _table(("variable", "type", "source", "what"), _outputs())
     inputs = _table(("variable", "type", "what"), _inputs())
     return f"""{HEAD}

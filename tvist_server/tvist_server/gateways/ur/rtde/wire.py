@@ -1,4 +1,4 @@
-"""Types of variables."""
+"""Types of RTDE's variables, and their bytes."""
 
 from collections.abc import Callable, Sequence
 from enum import Enum
@@ -6,11 +6,11 @@ from struct import Struct
 from typing import Any
 
 Encode = Callable[[Any], bytes]
-"""From a value to its bytes."""
+"""Function that returns the bytes of a value."""
 
 
 class Wire(Enum):
-    """A type: its word is its name."""
+    """A type by its name in RTDE; the value is its format in `struct`, without the byte order."""
 
     BOOL = "?"
     UINT8 = "B"
@@ -25,12 +25,12 @@ class Wire(Enum):
 
     @property
     def size(self) -> int:
-        """On the wire [bytes]."""
+        """Size of a value [bytes]."""
         return Struct(f">{self.value}").size
 
     @property
     def length(self) -> int:
-        """Numbers in a value; 1 where it is no vector."""
+        """Number of entries of a vector; 1 for a type that is no vector."""
         return int(self.value[:-1] or 1)
 
     @property
