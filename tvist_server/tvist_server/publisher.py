@@ -127,6 +127,7 @@ class Publisher(Sink):
         if not isinstance(item, Message):
             item()
             return
+        # Encoded once for all gateways, and here rather than in the tick thread, whose time is short (decision 14).
         topic, data = TOPICS[type(item)], encode(item)
         for gateway in self._gateways:
             gateway.publish(topic, item, data)

@@ -135,6 +135,8 @@ class ProgramPlayer:
         Args:
             tick: Number of the tick.
         """
+        # Evaluations are counted rather than timed, so that a run is the same live, in lockstep and in a replay
+        # (decision 26). What a tick takes beyond them, the next ticks pay.
         left = self._left = min(self._left, 0) + EVALUATIONS
         if not self._all:
             return

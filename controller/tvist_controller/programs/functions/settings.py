@@ -88,6 +88,8 @@ class SettingFunctions:
         six = (inertia[0], inertia[1], inertia[2], inertia[3], inertia[4], inertia[5])
         yield from self._arm.finish()
         command = SetPayload(token=OWN_TOKEN, mass=mass, com=xyz, inertia=six, transition_time=seconds)
+        # Planned beside the ticks and taken after a fixed number of them, as a move is: so it takes effect at the same
+        # tick on every machine (decision 26).
         ordered = self._access.order(command)
         for _ in range(DELAY):
             yield

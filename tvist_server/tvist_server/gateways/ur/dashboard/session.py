@@ -86,6 +86,7 @@ class DashboardSession(PortSession):
             if self._waiting:
                 self._do(self._waiting.popleft())
             elif self._declined:
+                # Answered last, since these lines came after those that waited, and answers keep the order.
                 self._declined -= 1
                 self._say(TOO_MANY)
             else:

@@ -205,4 +205,5 @@ def ticks_between(frequency: float) -> int:
     """
     if not frequency > 0.0:
         return 1
+    # 500 / (500 / 15) is 14.999999999999998, and a client that asks for every 15th tick has to get it.
     return floor(RATE / min(max(frequency, 1.0), RATE) + 1e-9)

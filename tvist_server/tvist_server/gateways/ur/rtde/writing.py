@@ -171,6 +171,7 @@ class InputWriter:
         present: tuple[int, float] | None = None
         if io is not None:
             value, voltage = io.standard_analog_output[number], io.analog_io_types >> (2 + number) & 1
+            # The robot publishes volts or amperes: the share computed from them differs from the one set by rounding.
             shown = analog_share(value, voltage=bool(voltage))
             present = voltage, ratio if isclose(shown, ratio, abs_tol=1e-9) else shown
         return self._ledger.is_news(("analog", number), (kind, ratio), present)
