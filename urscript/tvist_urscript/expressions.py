@@ -180,7 +180,7 @@ class Expressions:
         return at.call("posed", at.tuple([self.value(item) for item in node.indices]))
 
     def built_in_array(self, node: tree.Expression) -> str | None:
-        """Return the name of the controller's array that an expression means."""
+        """Return the name of the controller's array that an expression refers to; None if it is another expression."""
         if (
             isinstance(node, tree.Name)
             and node.name in BUILT_IN_ARRAYS
@@ -190,7 +190,7 @@ class Expressions:
         return None
 
     def call_built_in(self, at: Position, name: str, arguments: Sequence[tree.Expression]) -> ast.expr:
-        """Translate what means a call of a built-in function without naming it."""
+        """Translate an access to an array of the controller, which is a call of a built-in function."""
         if name not in self.signatures:
             self.report(at.given["lineno"], at.given["col_offset"], name_not_found(name))
             return at.constant(None)

@@ -60,7 +60,7 @@ class Lines:
         self._several = several
 
     def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, as a text is long
-        """Drop line breaks that end nothing, and add ends that no line break tells.
+        """Drop line breaks inside statements, and add the ends of statements that no line break marks.
 
         Raises:
             ScriptError: A name is too long, or brackets are nested too deep.
@@ -127,7 +127,7 @@ def _parted(tokens: Iterator[Token]) -> Iterator[Token]:
 
 
 def _after(token: Token) -> Token:
-    """An end without a text, where the text ends."""
+    """Return an empty end of statement at the end of a token, the last one of the text."""
     line, column = token.end_line, token.end_column
     return Token(END, "", token.end_pos, line, column, line, column)
 

@@ -11,7 +11,7 @@ HERE, MISSING, DEPTH = "machine", "MISSING", "depth"
 
 
 class Position:
-    """Where a part of Python's tree comes from; it makes such parts.
+    """A position in the script; its methods return nodes of Python's tree that have this position.
 
     Attributes:
         given: The keywords that every node of Python's tree takes.
