@@ -9,9 +9,9 @@ from tvist_urscript.signatures import Parameter, Signature, parameters, signatur
 from tvist_urscript.values import Array, Pose, Value, integer, number, short, to_str
 
 STEP = 0.002
-"""Seconds of a tick."""
+"""Duration of a tick [s]."""
 REGISTERS = 48
-"""Registers of each kind; there are 128 of booleans."""
+"""Number of registers of integers, and of floats; there are BITS of booleans."""
 BITS = 128
 
 _NOWHERE = Pose((0.0,) * 6)

@@ -11,9 +11,9 @@ from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
 from tvist_urscript.values import LONGEST, NUMBERS, Array, Pose
 
 MOST_OPERATIONS = 1000
-"""Evaluations of one statement; beyond them nothing could interrupt it in time."""
+"""Most evaluations of one statement, within which nothing can interrupt it."""
 START = 20
-"""Evaluations that the start of a thread takes; they limit the threads that start in a tick."""
+"""Evaluations that the start of a thread costs, which limits the threads that start in a tick."""
 
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
 SCALING, SUMS = "*/", "+-"

@@ -14,11 +14,11 @@ from tvist_urscript.threads import MOST_THREADS, Thread
 from tvist_urscript.values import Value
 
 EVALUATIONS = 500
-"""Evaluations of all threads in a tick."""
+"""Budget of a tick: evaluations of all threads together."""
 PATIENCE = 250
-"""Ticks in which a thread may use up its budget one after the other, before it counts as an endless loop."""
+"""Ticks in a row in which a thread may use up its budget before it counts as an endless loop."""
 OVERDRAFT = 2000
-"""Evaluations by which one statement may exceed the budget."""
+"""Most evaluations by which one statement may exceed the budget."""
 
 _MISSING = object()
 Steps = Generator[Any, None, Any]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 MOST_THREADS = 100
-"""Threads of a program at the same time."""
+"""Most threads of a program at the same time."""
 
 
 @dataclass(eq=False)

@@ -11,13 +11,13 @@ from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault
 
 LONGEST = 1000
-"""Elements of a list."""
+"""Most elements of a list."""
 LARGEST = 4000
-"""Elements of a list with those of the lists inside it."""
+"""Most elements of a list, with those of the lists inside it."""
 DEEPEST = 20
-"""Lists inside each other."""
+"""Most lists inside each other."""
 LONGEST_TEXT = 1023
-"""Bytes of a text in UTF-8."""
+"""Longest text, in bytes of UTF-8."""
 LOWEST, HIGHEST = -(2**31), 2**31 - 1
 """Integers have 32 bits; a result beyond them is a float."""
 

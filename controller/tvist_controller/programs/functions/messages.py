@@ -11,7 +11,7 @@ from tvist_urscript import Array, Value, costs, to_str
 LONGEST_TEXT = 350
 """Elements of a list that fit into a text."""
 LONGEST_SLEEP = 1e6
-"""[s]"""
+"""Longest time of `sleep` [s]."""
 
 
 class MessageFunctions:

@@ -13,7 +13,7 @@ from tvist_urscript import Value, costs, to_str
 from tvist_urscript.values import Array, to_bytes, to_text
 
 MOST = 30
-"""Values that one call reads."""
+"""Most values that one call reads."""
 ANSWER = 2.0
 """Time to wait for the value of a variable [s]."""
 MORE = 25

@@ -142,11 +142,9 @@ class ConnectionControl(ControllerAccess):
         """Number of commands that are not yet answered."""
 
     def change(self, command: Callable[[str], Command], then: Then) -> None:
-        """Send a command that needs control."""
         self._lease.change(self, command, self._counted(then))
 
     def ask(self, command: Command, then: Then) -> None:
-        """Send a command that does not need control."""
         self._lease.ask(command, self._counted(then))
 
     def _counted(self, then: Then) -> Then:
@@ -160,7 +158,6 @@ class ConnectionControl(ControllerAccess):
 
     @property
     def held_by_other(self) -> bool:
-        """Whether another client has control."""
         return self._lease.held_by_other
 
     def lasting(self) -> "ConnectionControl":
