@@ -108,6 +108,7 @@ rehearse: setup
 	$(BIN)/python -m tools.release rehearse
 
 schemas: setup
+	$(BIN)/python -m tools.blocking
 	$(BIN)/python -m tvist_protocol.generate
 	$(BIN)/python -m tvist_shaping.reference
 

@@ -1,1 +1,1 @@
-"""What maintains the project and is part of no distribution: the documentation's site, releases."""
+"""What maintains the project and is part of no distribution: code that is made, the documentation's site, releases."""

@@ -67,10 +67,6 @@ class Arm(Moves, Guiding, Terminals, Simulation):
     """The arm that `Robot.control` yields. Joint values are any sequence of numbers [rad], one for each joint.
 
     Every command may raise RefusedError; it has then changed nothing.
-
-    Attributes:
-        robot: The robot it belongs to.
-        token: Token of the lease, sent with every command.
     """
 
     # ------------------------------------------------------------------ motion

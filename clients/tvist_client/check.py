@@ -41,7 +41,7 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 class CheckReport(msgspec.Struct, frozen=True):
-    """Result of a check."""
+    """What `tvist check` has found, which is also its `--json`."""
 
     ok: bool
     """Whether everything that was checked is in order."""

@@ -64,7 +64,7 @@ def place_of(text: str) -> Place:
 
 
 class FleetRobot(msgspec.Struct, frozen=True):
-    """One robot of a fleet."""
+    """A robot of a fleet with its modes, as one query of `info` has found it."""
 
     namespace: str
     name: str

@@ -39,7 +39,7 @@ def halt(
     security: Folder | None = None,
     namespace: str = "",
 ) -> HaltReport:
-    """Send `stop` without control, and wait until the arm is at rest; in lockstep, that is up to who steps.
+    """Send `stop` without control, and wait until the arm is at rest; in lockstep, a client has to step time.
 
     Args:
         endpoint: Endpoint of the server, `tcp/<host>:<port>`.

@@ -15,10 +15,13 @@ if TYPE_CHECKING:
 class Leased:
     """A lease on a robot.
 
-    Attributes:
+    Args:
         robot: The robot it belongs to.
-        token: Token of the lease, sent with every command.
+        token: Token of the lease.
     """
+
+    token: str
+    """Token of the lease, sent with every command."""
 
     def __init__(self, robot: "CommandedRobot", token: str) -> None:
         self.robot = robot

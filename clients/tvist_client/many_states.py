@@ -60,7 +60,6 @@ class ManyStates(Across):
         self._newest: dict[Place, tuple[bytes, int, float]] = {}
 
     async def _subscribe(self) -> None:
-        """Subscribe to the key."""
         self._session.declare_subscriber(self._key, Callback(self._on_sample, indirect=False))
 
     def look(self) -> dict[Place, Newest]:

@@ -12,22 +12,21 @@ REMEMBERED = 256
 
 
 class Motion:
-    """One motion, from the robot's acceptance to its end.
+    """One motion, from the robot's acceptance to its end."""
 
-    Attributes:
-        id: The robot's number for it.
-        started: Tick at which it began; None until then.
-        done: Tick at which its shaped reference came to rest at the target; None until then, or if it never did.
-        limited: Why it is slower than asked, or which limit it will exceed, in a sentence; None if it is as asked.
-        stopped: The event that reports its end before the target; None if there is none.
-    """
+    id: int
+    """The robot's number for it."""
+    started: int | None = None
+    """Tick at which it began; None until then."""
+    done: int | None = None
+    """Tick at which its shaped reference came to rest at the target; None until then, or if it never did."""
+    limited: str | None = None
+    """Why it is slower than asked, or which limit it will exceed, in a sentence; None if it is as asked."""
+    stopped: Event | None = None
+    """The event that reports its end before the target; None if there is none."""
 
     def __init__(self, id: int, pass_time: Callable[["Motion"], Awaitable[None]]) -> None:  # noqa: A002  the wire's name
         self.id = id
-        self.started: int | None = None
-        self.done: int | None = None
-        self.limited: str | None = None
-        self.stopped: Event | None = None
         self._pass_time = pass_time
         self._error: ClientError | None = None
         self._ended = asyncio.Event()
@@ -89,7 +88,7 @@ class MotionsByNumber:
         self._motions: dict[int, Motion] = {}
 
     def motion(self, id: int) -> Motion:  # noqa: A002  the wire's name
-        """Return the motion with this number."""
+        """Return the motion with this number; create it if neither an answer nor an event has named it yet."""
         motion = self._motions.get(id)
         if motion is None:
             motion = self._motions[id] = Motion(id, self._pass_time)
@@ -98,7 +97,7 @@ class MotionsByNumber:
         return motion
 
     def on_event(self, event: Event) -> None:
-        """Take any event."""
+        """Pass an event on to the motion that it names."""
         if event.id is not None:
             self.motion(event.id).on_event(event)
 

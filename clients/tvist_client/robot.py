@@ -36,10 +36,8 @@ CHUNK = 50
 class Robot(Published, Kinematics):
     """One robot, over an open transport, which `close` closes.
 
-    Attributes:
-        motions: Motions by number, this client's and others'.
-        arm: The arm, while this client has control.
-        stepper: The clock, while this client holds it.
+    Args:
+        transport: The transport.
     """
 
     def __init__(self, transport: Transport) -> None:
@@ -47,8 +45,11 @@ class Robot(Published, Kinematics):
         self._transport = transport
         self._clock: Clock | None = None
         self.arm: Arm | None = None
+        """The arm, while this client has control."""
         self.stepper: Stepper | None = None
+        """The clock, while this client holds it."""
         self.motions = MotionsByNumber(self._until_ended)
+        """Motions by number, this client's and others'."""
         # Listen before any command is sent, since an event may precede the answer.
         self._events.listen(self.motions.on_event)
         transport.on_lost(self._on_lost)

@@ -26,11 +26,12 @@ class Servo:
         arm: Arm to stream to.
         period: Time between two set-points [s].
         joints: The joint angles that the robot accepts.
-
-    Attributes:
-        period: Time between two set-points [s].
-        sequence: Number of the next set-point.
     """
+
+    period: float
+    """Time between two set-points [s]."""
+    sequence: int
+    """Number of the next set-point."""
 
     def __init__(self, arm: "Simulation", period: float, joints: JointRange) -> None:
         self.period = period

@@ -27,10 +27,13 @@ TICK_S = 0.06
 class Stepper:
     """The clock of a simulated robot, which `Robot.clock_control` yields. It cannot move the robot.
 
-    Attributes:
+    Args:
         robot: The robot it belongs to.
         token: Token of the clock.
     """
+
+    token: str
+    """Token of the clock."""
 
     def __init__(self, robot: "CommandedRobot", token: str) -> None:
         self.robot = robot

@@ -34,7 +34,7 @@ class Stream(AsyncIterator[M], Generic[M]):
         return bool(self._waiting) or self._finished or self._error is not None
 
     def push(self, message: M) -> None:
-        """Add a message."""
+        """Add a message; if the buffer is full, the oldest is dropped and counted."""
         if len(self._waiting) == self._waiting.maxlen:
             self.dropped += 1
         self._waiting.append(message)

@@ -15,7 +15,7 @@ _PARAMETERS = {
 
 
 def asyncapi() -> dict[str, Any]:
-    """The whole document. Liveliness tokens carry no message, and have no operation."""
+    """Return the AsyncAPI document. Liveliness tokens carry no message, and have no operation in it."""
     roots, schemas = components(MESSAGES, "#/components/schemas/{name}")
     return {
         "asyncapi": "3.0.0",

@@ -117,7 +117,7 @@ class ModalModel(_Part, frozen=True, kw_only=True):
 
 
 class Provenance(_Part, frozen=True, kw_only=True):
-    """Origin of a calibration."""
+    """How a calibration was made: command, version, and the measurements that were kept and rejected."""
 
     command: Annotated[str, Meta(max_length=500)]
     """Command that made it."""
@@ -177,7 +177,7 @@ class CalibrationError(ValueError):
 
 
 def calibration_of(content: Mapping[str, Any]) -> Calibration:
-    """Check a map, as `set_estimator` brings it.
+    """Return the calibration in a map, such as that of a `set_estimator`.
 
     Raises:
         ProtocolError: A key is unknown, missing or out of range; `where` names it within `calibration`.
@@ -192,7 +192,7 @@ def calibration_of(content: Mapping[str, Any]) -> Calibration:
 
 
 def calibration_from_json(text: bytes) -> Calibration:
-    """Check a file's content.
+    """Return the calibration in the content of a file.
 
     Raises:
         CalibrationError: The content is not JSON, or a key is unknown, missing or out of range.
@@ -204,5 +204,5 @@ def calibration_from_json(text: bytes) -> Calibration:
 
 
 def calibration_to_json(calibration: Calibration) -> bytes:
-    """A file's content, indented, ending in a line feed."""
+    """Return the content of a calibration file: indented JSON with a line feed at its end."""
     return msgspec.json.format(msgspec.json.encode(calibration), indent=2) + b"\n"

@@ -1,6 +1,7 @@
-"""Bytes to messages and back: MessagePack maps, validated when they come in.
+"""Encodes messages as MessagePack maps, and decodes and validates them.
 
-Every fault of a message is a `ProtocolError`, whatever the bytes; `refusal` makes the answer of it.
+Whatever the bytes, decoding either returns a valid message or raises `ProtocolError`; `refusal` turns the error into
+the server's answer.
 """
 
 from collections.abc import Mapping
@@ -28,34 +29,40 @@ from tvist_protocol.values import Name
 Message = Command | Setpoint | Reply | State | Event | Truth | Telemetry | Io | Info
 
 MAX_BYTES = 256 * 1024
-"""Largest message. The largest useful one, a step of 1000 set-points of 7 joints, has 1000·(18 + 67) bytes;
-three times that leaves room for a calibration sent as a map. 5 MB are refused before they are looked at."""
+"""Largest size of a message [bytes]; a larger one is refused without being decoded.
+
+The longest commands are a step of 1000 set-points of 7 joints, 1000·(18 + 67) bytes, and a calibration sent as a map.
+"""
 
 _Some = TypeVar("_Some")
 _SomeMessage = TypeVar("_SomeMessage", bound=Message)
 
 
 class Envelope(msgspec.Struct, frozen=True, gc=False):
-    """What can be told of a message without building it: reading it takes a twentieth of decoding it, or less."""
+    """Type and token of a message, which are decoded at least twenty times as fast as the whole message."""
 
     type: str | None = None
-    """Its `type`; None where it has none."""
+    """The message's `type`; None if it has none."""
     token: str | None = None
-    """Names the lease; None where it has none."""
+    """Token of the lease; None if the message has none."""
 
 
 class _Calibrated(msgspec.Struct, gc=False):
-    """The part of a `set_estimator` that may be long."""
+    """The field of a `set_estimator` that may be long."""
 
     calibration: Name | Calibration | None = None
 
 
 class _Untyped(msgspec.Struct, tag_field="type", tag=""):
-    """Second member of every union: msgspec asks for `type` only where it has a choice."""
+    """A further member of every union, without which msgspec would not require `type` in a union of one struct."""
 
 
 class _Reader(Generic[_Some]):
-    """Bytes to one kind of message."""
+    """Decodes and validates the messages of one key.
+
+    Args:
+        types: Structs of the messages; their `type` tells them apart.
+    """
 
     def __init__(self, *types: type[msgspec.Struct]) -> None:
         self.types: Mapping[str, type[msgspec.Struct]] = {str(t.__struct_config__.tag): t for t in types}
@@ -96,10 +103,10 @@ _READER_OF: dict[type[msgspec.Struct], _Reader[Any]] = {
 
 
 def encode(message: Message) -> bytes:
-    """Message to bytes, without validating it.
+    """Return the bytes of a message, which is not validated.
 
     Raises:
-        ProtocolError: A field holds what MessagePack cannot, a numpy number for instance.
+        ProtocolError: A field has a value of a type that MessagePack does not have, such as a number of numpy.
     """
     try:
         return _ENCODER.encode(message)
@@ -108,13 +115,13 @@ def encode(message: Message) -> bytes:
 
 
 def check(message: _SomeMessage) -> _SomeMessage:
-    """Validate a message made by its constructor, exactly as the server will.
+    """Validate a message that was constructed here, as the server will: constructors check nothing.
 
     Returns:
-        The message as the server will see it: integers where numbers are meant become floats, lists tuples.
+        The message as the server will decode it: integers in fields for numbers become floats, lists become tuples.
 
     Raises:
-        ProtocolError: What the server would refuse without knowing the robot.
+        ProtocolError: A value is invalid for every robot.
     """
     reader = _READER_OF.get(type(message))
     if reader is None:
@@ -124,12 +131,12 @@ def check(message: _SomeMessage) -> _SomeMessage:
 
 
 def refusal(error: ProtocolError) -> Refused:
-    """Answer to a command that is no valid message."""
+    """Return the answer to a command that could not be decoded."""
     return Refused(code=error.code, where=error.where, why=error.why, limit=error.limit)
 
 
 def decode_envelope(data: bytes) -> Envelope:
-    """Type and token of a message that may be anything else but sound.
+    """Return type and token of a message, whose other fields are not validated.
 
     Raises:
         ProtocolError: The message is not a map, or type or token is not a string.
@@ -143,10 +150,10 @@ def decode_envelope(data: bytes) -> Envelope:
 
 
 def decode_command(data: bytes) -> Command:
-    """Bytes from the command key.
+    """Decode a command.
 
     Raises:
-        ProtocolError: They are no valid command; the same holds for its siblings below.
+        ProtocolError: The bytes are not a valid command. The functions below raise it for their messages.
     """
     if EXPLAINED_BYTES < len(data) <= MAX_BYTES and b"set_estimator" in data:
         _refuse_long_fault(data)
@@ -154,12 +161,14 @@ def decode_command(data: bytes) -> Command:
 
 
 def _refuse_long_fault(data: bytes) -> None:
-    """Find the fault of a long calibration before its map is built, which may take a hundred times longer.
+    """Refuse an invalid long calibration from its bytes.
+
+    To explain an error of a whole message, its map would be built, which may take a hundred times as long.
 
     Raises:
-        ProtocolError: There is one.
+        ProtocolError: The calibration is invalid.
     """
-    decode_envelope(data)  # the message is sound
+    decode_envelope(data)  # refuses bytes that are no MessagePack map
     try:
         _CALIBRATED.decode(data)
     except msgspec.ValidationError as error:
@@ -169,40 +178,40 @@ def _refuse_long_fault(data: bytes) -> None:
 
 
 def decode_setpoint(data: bytes) -> Setpoint:
-    """Bytes from the set-point key."""
+    """Decode a set-point of a stream."""
     return _SETPOINT.read(data)
 
 
 def decode_reply(data: bytes) -> Reply:
-    """Answer to a command."""
+    """Decode the answer to a command."""
     return _REPLY.read(data)
 
 
 def decode_state(data: bytes) -> State:
-    """One tick of the 500 Hz stream."""
+    """Decode a state, of which there is one for each tick."""
     return _STATE.read(data)
 
 
 def decode_event(data: bytes) -> Event:
-    """One event."""
+    """Decode an event."""
     return _EVENT.read(data)
 
 
 def decode_truth(data: bytes) -> Truth:
-    """One tick of what no robot can know."""
+    """Decode a truth message: what a simulation knows and a real robot cannot measure."""
     return _TRUTH.read(data)
 
 
 def decode_telemetry(data: bytes) -> Telemetry:
-    """The server's own figures."""
+    """Decode a telemetry message: timing and load of the server."""
     return _TELEMETRY.read(data)
 
 
 def decode_io(data: bytes) -> Io:
-    """Inputs, outputs and registers."""
+    """Decode inputs, outputs and registers."""
     return _IO.read(data)
 
 
 def decode_info(data: bytes) -> Info:
-    """Answer to a query on the info key."""
+    """Decode the description of a robot, which answers a query of the info key."""
     return _INFO.read(data)

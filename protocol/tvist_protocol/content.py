@@ -1,4 +1,4 @@
-"""What a file or a map holds, checked: a fault is said in words, with key, value and what is allowed."""
+"""Checks the content of files and maps; errors name the key, the value and what is allowed."""
 
 import json
 from typing import Any, NoReturn, TypeVar
@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 def checked(content: object, kind: type[T]) -> T:
-    """Maps, lists and plain values as a struct, or as whatever type is expected.
+    """Return decoded content, of maps, lists and plain values, as the expected type.
 
     Raises:
         ProtocolError: A key is unknown or missing, or a value of another kind or out of range.
@@ -24,7 +24,7 @@ def checked(content: object, kind: type[T]) -> T:
 
 
 def parse_json(data: bytes) -> Any:
-    """What JSON text holds.
+    """Return the content of JSON text.
 
     Raises:
         ProtocolError: The content is not valid JSON; the message gives line and column.

@@ -8,15 +8,15 @@ import msgspec
 from tvist_protocol.errors import ProtocolError, short
 
 _DEPTH = 32
-"""Levels looked into: what is nested deeper holds itself."""
+"""Levels that are searched: a value that is nested deeper contains itself."""
 
 
 def explain_unencodable(message: msgspec.Struct, error: Exception) -> ProtocolError:
-    """Error of a message that MessagePack cannot hold, naming the field and what it holds.
+    """Return the error of a message that cannot be written as MessagePack; it names the field and its value.
 
     Args:
         message: The message.
-        error: What msgspec said.
+        error: The error of msgspec.
     """
     where, value = next(_unencodable(message, "", _DEPTH), ("", message))
     kind = f"{type(value).__module__}.{type(value).__qualname__}".removeprefix("builtins.")

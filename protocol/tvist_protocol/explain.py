@@ -29,7 +29,7 @@ Types = Mapping[str, type[msgspec.Struct]]
 
 
 class _Head(msgspec.Struct):
-    """What is read of a long message again."""
+    """The field of a long message that is decoded again, to name its type."""
 
     type: str | None = None
 
@@ -39,9 +39,9 @@ class _Fault:
 
     Args:
         path: Path as msgspec writes it.
-        content: What it looked at.
-        kind: What it expected.
-        whole: What to call the whole.
+        content: The decoded message or file: maps, lists and plain values.
+        kind: Type that was expected of it; None if it is unknown.
+        whole: Its name in messages, for a fault of the content as a whole.
         types: The messages that were expected, by `type`.
     """
 
@@ -61,7 +61,7 @@ def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -
     """Return the error of a message that is valid MessagePack but not one of the expected messages.
 
     Args:
-        error: What msgspec said.
+        error: The error of msgspec.
         data: The message; of one longer than `EXPLAINED_BYTES` no value but its type is named.
         types: The messages that were expected.
     """
@@ -71,10 +71,10 @@ def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -
 
 
 def explain_content(error: msgspec.ValidationError, content: Any, kind: object) -> ProtocolError:
-    """Error of what a file or a map holds, where it is not what was expected.
+    """Return the error of a file or a map whose content has another type than expected.
 
     Args:
-        error: What `msgspec.convert` said.
+        error: The error of `msgspec.convert`.
         content: Maps, lists and plain values.
         kind: The type that was expected.
     """
@@ -105,7 +105,7 @@ def explain_unknown_type(name: object, types: Types) -> ProtocolError:
 
 
 def explain_bytes(error: Exception) -> ProtocolError:
-    """Error of bytes that are no MessagePack."""
+    """Return the error of bytes that are not MessagePack."""
     match error:
         case RecursionError():
             why = "the message is nested too deeply"

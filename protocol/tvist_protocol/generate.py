@@ -20,7 +20,7 @@ FOLDER = Path(__file__).parents[1]
 
 
 def generated(folder: Path) -> dict[Path, bytes]:
-    """What every generated file should hold.
+    """Return the content that every generated file should have, by its path.
 
     Args:
         folder: `protocol/`, whose README.md and golden JSON are read.
@@ -37,18 +37,18 @@ def generated(folder: Path) -> dict[Path, bytes]:
 
 
 def stray(folder: Path, files: Iterable[Path]) -> set[Path]:
-    """Files that look generated and are not: left over from a message that is gone."""
+    """Return files that are in the places of generated ones and not among them, such as those of a removed message."""
     there = {*(folder / "schemas").iterdir(), *(folder / "fixtures" / "v1").glob("*.msgpack")}
     return there - set(files)
 
 
 def golden(folder: Path) -> list[Path]:
-    """The golden messages, written by hand."""
+    """Return the golden messages, which are written by hand."""
     return sorted((folder / "fixtures" / "v1").glob("*.json"))
 
 
 def filled(text: str, parts: dict[str, str]) -> str:
-    """Text with each part between its markers `<!-- generated: name -->` and `<!-- end -->`.
+    """Return a text with each part between its markers `<!-- generated: name -->` and `<!-- end -->`.
 
     Raises:
         ValueError: A part has no markers, or markers have no part.
@@ -61,7 +61,7 @@ def filled(text: str, parts: dict[str, str]) -> str:
 
 
 def main() -> None:
-    """Write every generated file, and take away what is left over."""
+    """Write every generated file, and remove those that `stray` returns."""
     files = generated(FOLDER)
     for path in stray(FOLDER, files):
         path.unlink()

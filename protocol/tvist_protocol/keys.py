@@ -31,7 +31,7 @@ _SESSION = re.compile(SESSION_PATTERN)
 
 
 def check_robot_name(name: str) -> str:
-    """Give back a robot's name if it may stand in a key.
+    """Return the name of a robot, if it is valid in a key.
 
     Raises:
         ProtocolError: The name is not `[a-z0-9][a-z0-9_-]{0,63}`; code `out_of_range`, where `robot`.
@@ -40,7 +40,7 @@ def check_robot_name(name: str) -> str:
 
 
 def check_namespace(name: str) -> str:
-    """Give back a namespace if it may precede a key.
+    """Return a namespace, if it is valid in front of a key.
 
     Raises:
         ProtocolError: It is not 1 to 8 chunks like a robot's name, separated by `/`; code `out_of_range`, where
@@ -50,12 +50,12 @@ def check_namespace(name: str) -> str:
 
 
 def within(namespace: str, key: str) -> str:
-    """Key as the network carries it: behind its namespace; an empty one changes nothing."""
+    """Return a key behind a namespace, as the network carries it; with an empty one, the key itself."""
     return f"{namespace}/{key}" if namespace else key
 
 
 def place(key: str) -> tuple[str, str] | None:
-    """Namespace (empty if there is none) and name of the robot that a key belongs to; None if it is no robot's."""
+    """Return namespace (empty if there is none) and name of the robot that a key belongs to; None for other keys."""
     above, prefix, rest = f"/{key}".rpartition(f"/{PREFIX}/")
     robot, slash, leaf = rest.partition("/")
     namespace = above.removeprefix("/")
@@ -64,7 +64,7 @@ def place(key: str) -> tuple[str, str] | None:
 
 
 def check_client_name(name: str) -> str:
-    """Give back a client's name if it may stand in a key.
+    """Return the name of a client, if it is valid in a key.
 
     Raises:
         ProtocolError: The name is not 1 to 64 printable ASCII characters without `/ * ? # $`, the first not `@`;
@@ -74,56 +74,56 @@ def check_client_name(name: str) -> str:
 
 
 def state(robot: str) -> str:
-    """Key the 500 Hz stream is put on."""
+    """Return the key of the states, 500 a second."""
     return _key(robot, "state")
 
 
 def truth(robot: str) -> str:
-    """Key what no robot can know is put on."""
+    """Return the key of the truth messages, which only a simulation has."""
     return _key(robot, "truth")
 
 
 def event(robot: str) -> str:
-    """Key events are put on."""
+    """Return the key of the events."""
     return _key(robot, "event")
 
 
 def telemetry(robot: str) -> str:
-    """Key the server's own figures are put on, once a second."""
+    """Return the key of the telemetry of the server, once a second."""
     return _key(robot, "telemetry")
 
 
 def io(robot: str) -> str:
-    """Key inputs, outputs and registers are put on when they change."""
+    """Return the key of inputs, outputs and registers, which are published when they change."""
     return _key(robot, "io")
 
 
 def command(robot: str) -> str:
-    """Key of the queryable that takes commands."""
+    """Return the key of the queryable for commands."""
     return _key(robot, "command")
 
 
 def setpoint(robot: str) -> str:
-    """Key a client puts its set-points on."""
+    """Return the key for the set-points of clients."""
     return _key(robot, "setpoint")
 
 
 def info(robot: str) -> str:
-    """Key of the queryable that says what the robot is."""
+    """Return the key of the queryable that describes the robot."""
     return _key(robot, "info")
 
 
 def alive(robot: str) -> str:
-    """Liveliness token of the server."""
+    """Return the key of the server's liveliness token, which tells that the robot is there."""
     return _key(robot, "alive")
 
 
 def client(robot: str, name: str, session: str = "") -> str:
-    """Liveliness token of a client.
+    """Return the key of a client's liveliness token.
 
     Args:
         robot: The robot's name.
-        name: The client's.
+        name: The client's name.
         session: Zenoh's id of its session, which tells it from another one of that name; empty leaves it out.
 
     Raises:
@@ -134,18 +134,18 @@ def client(robot: str, name: str, session: str = "") -> str:
 
 
 def any_client(robot: str) -> str:
-    """Selects the liveliness tokens of all clients of a robot."""
+    """Return the selector of the liveliness tokens of all clients of a robot."""
     return f"{_key(robot, 'client')}/**"
 
 
 def client_name(robot: str, key: str) -> str | None:
-    """Name in a client's liveliness token, None where the key is not one of this robot's."""
+    """Return the client's name in the key of a liveliness token; None for any other key than this robot's."""
     found = _client(robot, key)
     return None if found is None else found[0]
 
 
 def client_session(robot: str, key: str) -> str:
-    """Session in a client's liveliness token; empty where the token has none."""
+    """Return the session in the key of a client's liveliness token; empty if it names none."""
     found = _client(robot, key)
     return "" if found is None else found[1]
 

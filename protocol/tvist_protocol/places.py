@@ -1,4 +1,4 @@
-"""Follow a path of msgspec through maps and lists, and tell what was expected there."""
+"""Resolves the path in an error message of msgspec: the value at its end, and the type that was expected there."""
 
 import re
 import types
@@ -8,26 +8,27 @@ from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_
 import msgspec
 
 ABSENT: Final = object()
-"""There is nothing at the end of the path."""
+"""Value of a place that the content does not have."""
 _STEP = re.compile(r"\.([^.\[]+)|\[(\d+)\]|\[(\.\.\.)\]")
 
 
 class Place:
-    """The end of a path.
+    """The place that a path leads to in the content of a message.
 
     Args:
-        content: Maps, lists and plain values.
-        kind: What was expected of the whole; None where nobody knows.
-        path: Path as msgspec writes it, `.payload.com[2]`; `[...]` stands for any entry of a map.
+        content: The decoded message: maps, lists and plain values.
+        kind: Type that was expected of the whole content; None if it is unknown.
+        path: Path as msgspec writes it, such as `.payload.com[2]`. msgspec writes `[...]` for an entry of a map without
+            naming its key; the key is then found by checking each entry.
     """
 
     def __init__(self, content: Any, kind: object, path: str) -> None:
         self.where = ""
-        """The path in plain form, `payload.com[2]`."""
+        """The path as users read it: `payload.com[2]`, with the key in place of `[...]`."""
         self.value: Any = content
-        """What is there."""
+        """The value there; `ABSENT` if there is none."""
         self.kind = kind
-        """The type that was expected there; None where nobody knows."""
+        """The type that was expected there; None if it is unknown."""
         self._holder: object = None
         end = 0
         for step in _STEP.finditer(path):
@@ -49,24 +50,27 @@ class Place:
 
     @property
     def struct(self) -> type[msgspec.Struct] | None:
-        """The struct that was expected there, where it was one: of several, the one that the value's tag names."""
+        """The struct that was expected there; None if it was another type.
+
+        Of a union of structs, it is the one that the value's `type` names, or else the first.
+        """
         found = list(_structs(self.kind))
         tag = self.value.get("type") if isinstance(self.value, dict) else None
         return next((kind for kind in found if kind.__struct_config__.tag == tag), next(iter(found), None))
 
     @property
     def tags(self) -> list[str]:
-        """The tags to choose from there, where it is the tag of one of several structs inside the whole."""
+        """The valid values of `type`, if this place is the `type` of a union of structs."""
         return [str(kind.__struct_config__.tag) for kind in _structs(self._holder)]
 
     @property
     def literals(self) -> list[str]:
-        """The strings to choose from there, as Python writes them."""
+        """The strings that are valid there, in quotes."""
         return list(_literals(self.kind))
 
 
 def _choices(kind: object) -> Iterator[object]:
-    """The members of a union, without what annotates them."""
+    """Yield the members of a union, without their `Annotated`; of any other type, the type itself."""
     origin = get_origin(kind)
     if origin is Annotated:
         yield from _choices(get_args(kind)[0])
@@ -78,14 +82,14 @@ def _choices(kind: object) -> Iterator[object]:
 
 
 def _structs(kind: object) -> Iterator[type[msgspec.Struct]]:
-    """The structs among the members of a union."""
+    """Yield the members of a union that are structs."""
     for member in _choices(kind):
         if isinstance(member, type) and issubclass(member, msgspec.Struct):
             yield member
 
 
 def _entry_type(kind: object, name: str | None, index: str | None) -> object:
-    """The type of an entry of a struct, a map or a list."""
+    """Return the type of a field of a struct, or of an entry of a map or list; None if it has none."""
     origin, parts = get_origin(kind), get_args(kind)
     if index is not None and origin in {tuple, list}:
         return parts[0] if origin is list or parts[-1] is Ellipsis else parts[min(int(index), len(parts) - 1)]
@@ -97,7 +101,7 @@ def _entry_type(kind: object, name: str | None, index: str | None) -> object:
 
 
 def _culprit(content: Any, kind: object) -> str:
-    """The key of the entry that is none of this type: msgspec does not say which."""
+    """Return the key of the first entry of a map that is not of a type; `...` if each one is."""
     for key, value in content.items() if isinstance(content, dict) else ():
         try:
             msgspec.convert(value, kind)

@@ -11,7 +11,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def json_schema(message: type[msgspec.Struct]) -> dict[str, Any]:
-    """JSON Schema of one message, complete in itself: for a recording, or a client in another language."""
+    """Return the JSON Schema of one message, complete in itself: for a recording, or a client in another language."""
     (root,), parts = components((message,), "#/$defs/{name}")
     name = root["$ref"].removeprefix("#/$defs/")
     schema: dict[str, Any] = {"$schema": DIALECT} | parts.pop(name)
@@ -21,7 +21,7 @@ def json_schema(message: type[msgspec.Struct]) -> dict[str, Any]:
 def components(
     messages: tuple[type[msgspec.Struct], ...], reference: str
 ) -> tuple[tuple[dict[str, Any], ...], dict[str, Any]]:
-    """JSON Schemas of several messages, and of what they share.
+    """Return the JSON Schemas of several messages, and of what they share.
 
     Args:
         messages: The message types.
@@ -40,7 +40,7 @@ def components(
 
 @cache
 def field_docs(described: type) -> dict[str, str]:
-    """The docstring under each field of a struct or member of an enumeration, in their order."""
+    """Return the docstring under each field of a struct or member of an enumeration, in their order."""
     (body,) = ast.parse(inspect.getsource(described)).body
     assert isinstance(body, ast.ClassDef)
     docs: dict[str, str] = {}

@@ -31,7 +31,7 @@ _LISTS = {
 
 
 def tables() -> dict[str, str]:
-    """Markdown of every generated part of the README, by the name its markers carry."""
+    """Return the Markdown of every generated part of the README, by the name in its markers."""
     return {
         "keys": _table(("key", "kind", "by", "carries", "what"), map(_channel_row, CHANNELS)),
         "commands": _messages(COMMANDS),
@@ -111,7 +111,7 @@ def _default(field: str, part: Schema, schema: Schema) -> str:
 
 
 def _values(part: Schema) -> str:
-    """What a value may be, in words."""
+    """Return in words which values a type allows."""
     match part:
         case {"anyOf": choices}:
             words = " or ".join(map(_values, choices))

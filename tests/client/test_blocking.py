@@ -5,6 +5,7 @@ import inspect
 import threading
 
 import pytest
+from tools import blocking as made
 
 import tvist_client
 from tvist_client import LoopbackTransport, MotionStoppedError, NotConnectedError, RefusedError, blocking
@@ -41,6 +42,10 @@ def test_both_faces_have_the_same_methods_with_the_same_arguments(name):
     assert set(ours) == set(theirs) - INTERNAL[name]
     for method, parameters in ours.items():
         assert plain(parameters) == plain(theirs[method]), method
+
+
+def test_the_blocking_classes_are_those_that_are_made():
+    assert made.PATH.read_text(encoding="utf-8") == made.generated(), "run `make schemas`"
 
 
 def test_a_program_reads_as_it_should(fake, robot):

@@ -1,8 +1,11 @@
 """What is wrong with a program is found without running it: every place, with its line and column."""
 
+from pathlib import Path
+
 from tvist_controller.programs.checking import check_program
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import SIGNATURES
+from tvist_controller.programs.table import page
 
 from .scripts import script
 
@@ -46,6 +49,11 @@ def test_every_function_that_is_not_simulated_is_warned_of():
         (finding,) = check_program(script(f"{name}({', '.join('0' for _ in needed)})"))
         assert (finding.line, finding.level) == (2, "warning")
         assert finding.text.startswith(f"{name}: ")
+
+
+def test_the_page_of_the_functions_is_up_to_date():
+    reference = Path(__file__).parents[2] / "docs" / "reference" / "urscript-functions.md"
+    assert reference.read_text(encoding="utf-8") == page()
 
 
 def test_a_function_of_the_programs_own_hides_one_that_is_not_simulated():

@@ -3,11 +3,18 @@
 import re
 import socket
 import sys
+from pathlib import Path
 
 import pytest
 from tests import forked
-from tests.conformance.served import PATIENCE, Served
+from tests.conformance.served import PATIENCE, Served, refused_to_start
 from tests.places import own_address
+
+from tvist_client.blocking import Robot
+from tvist_protocol.modes import RuntimeState
+from tvist_server.ur_ports import WITHOUT_JOINTS, UrPorts
+
+SEVEN = Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf"
 
 pytestmark = pytest.mark.realtime
 
@@ -41,6 +48,23 @@ def test_a_client_at_a_door_does_not_keep_the_robot_from_ending():
         socket.create_connection((own_address(9), 30003), PATIENCE) as stream,
     ):
         assert len(stream.recv(1220, socket.MSG_WAITALL)) == 1220
+        assert served.end() == 0
+
+
+def test_an_arm_with_seven_joints_has_the_dashboard_and_the_interpreter_alone():
+    limited = [interface for interface in UrPorts().open() if interface not in WITHOUT_JOINTS]
+    shut = [word for interface in limited for word in ("--ur-port", f"{interface}=off")]
+    options = ("--robot", str(SEVEN), "--calibration", "none", "--ur", "--ur-address", own_address(25))
+    code, said = refused_to_start(*options)
+    assert (code, "the robot seven has 7 joints" in said) == (2, True)
+    with Served(*options, *shut, name="seven") as served:
+        said = asked(own_address(25), "power on", "brake release", "load Q2.urp", "play")
+        assert said[-1] == "Starting program"
+        with Robot.connect(served.endpoint, name="seven") as robot:
+            for state in robot.states():
+                if state.runtime_state == RuntimeState.STOPPED and state.actual_q[6] > 0.4:
+                    break
+            assert state.actual_q == pytest.approx([0.5] * 7, abs=0.01)
         assert served.end() == 0
 
 

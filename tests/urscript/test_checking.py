@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from tests.conformance.served import finished
 
-from tvist_urscript import ScriptError, check, compile_script, signature
+from tvist_urscript import ScriptError, Signature, check, compile_script, parameters
 
-KNOWN = {"textmsg": signature('a, b=""')}
+KNOWN = {"textmsg": Signature(parameters("a", b=""))}
 
 
 def places(text):

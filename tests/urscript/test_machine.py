@@ -1,16 +1,21 @@
 """The machine: ticks, budget, threads, critical sections, and what its user gives it."""
 
+from collections.abc import Generator
+
 import pytest
 
 from tvist_urscript import (
     EVALUATIONS,
-    Array,
     Fault,
     Machine,
     Pose,
     ScriptError,
+    Signature,
     compile_script,
+    costs,
+    parameters,
     signature,
+    signatures,
     to_str,
 )
 from tvist_urscript.expressions import START
@@ -18,11 +23,11 @@ from tvist_urscript.machine import OVERDRAFT, PATIENCE
 from tvist_urscript.threads import MOST_THREADS
 
 SIGNATURES = {
-    "say": signature("value"),
-    "sync": signature("", blocks=True),
-    "move": signature("target, speed=1.5", blocks=True),
-    "fail": signature("why"),
-    "costly": signature("", cost=100),
+    "say": Signature(parameters("value")),
+    "sync": Signature((), blocks=True),
+    "move": Signature(parameters("target", speed=1.5), blocks=True),
+    "fail": Signature(parameters("why")),
+    "costly": Signature((), cost=100),
 }
 
 
@@ -87,7 +92,7 @@ def test_a_fault_after_some_ticks_has_the_position_of_its_call_too():
         yield
         raise Fault("later")
 
-    script = compile_script("x = 1 +\n  wait()", {"wait": signature("", blocks=True)})
+    script = compile_script("x = 1 +\n  wait()", {"wait": Signature((), blocks=True)})
     machine = Machine(script, {"wait": failing})
     machine.resume()
     with pytest.raises(ScriptError, match="line 2, column 3: later"):
@@ -151,7 +156,8 @@ def test_all_threads_end_where_one_fails_at_its_end():
             raise KeyError(value)
 
     script = compile_script(
-        "def p():\nthread t():\n hold(1)\nend\nrun t()\nhold(2)\nend", {"hold": signature("v", blocks=True)}
+        "def p():\nthread t():\n hold(1)\nend\nrun t()\nhold(2)\nend",
+        {"hold": Signature(parameters("v"), blocks=True)},
     )
     machine = Machine(script, {"hold": hold})
     machine.resume()
@@ -254,7 +260,7 @@ def test_the_number_of_the_running_thread_is_known():
     numbers = []
     script = compile_script(
         "def program():\nthread t():\n note()\n sync()\n note()\nend\nnote()\nrun t()\nrun t()\nsync()\nsync()\nend",
-        {"note": signature(""), "sync": signature("", blocks=True)},
+        {"note": Signature(()), "sync": Signature((), blocks=True)},
     )
 
     def sync():
@@ -316,7 +322,7 @@ def test_who_missed_a_tick_is_first_in_the_next():
         "  sync()\n end\nend\n"
         "thread late():\n while True:\n  note(2)\n  sync()\n end\nend\nrun busy()\nrun late()\nsync()\n"
         "while True:\n sync()\nend\nend",
-        {"note": signature("x"), "sync": signature("", blocks=True)},
+        {"note": Signature(parameters("x")), "sync": Signature((), blocks=True)},
     )
 
     def sync():
@@ -386,21 +392,39 @@ def test_a_spent_thread_keeps_its_critical_section_and_a_waiting_one_gives_it_up
 
 def test_values_of_functions_can_be_lists_and_poses():
     script = compile_script(
-        "a = read()\na[0] = 5\nsay(a)\nsay(read())", {**SIGNATURES, "read": signature("")}
+        "a = read()\na[0] = 5\nsay(a)\nsay(read())", {**SIGNATURES, "read": Signature(())}
     )
     said = []
     Machine(script, {"say": lambda v: said.append(to_str(v)), "read": lambda: Pose(range(6))}).resume()
     assert said == ["p[5, 1, 2, 3, 4, 5]", "p[0, 1, 2, 3, 4, 5]"]
 
 
-def test_a_signature_says_what_a_manual_says():
-    known = signature('q, a=1.4, v=[1, 2], name="x", feature=p[0, 0, 0, 0, 0, 0], on=True')
-    assert [parameter.name for parameter in known.parameters] == ["q", "a", "v", "name", "feature", "on"]
-    assert known.required == 1
-    assert known.parameters[2].default == Array([1, 2])
-    assert known.parameters[4].default == Pose([0] * 6)
-    with pytest.raises(ValueError, match="no list of parameters"):
-        signature("q a")
+class Functions:
+    """A class of functions that scripts may call."""
+
+    @costs(180)
+    def movej(
+        self, q: object, a: object = 1.4, name: object = "x", on: object = True
+    ) -> Generator[None, None, object]:
+        yield
+        return q, a, name, on
+
+    def read(self):
+        return 0
+
+    def wait(self):
+        yield
+
+    def _private(self):
+        pass
+
+
+def test_a_signature_is_that_of_the_method():
+    known = signatures(Functions)
+    assert list(known) == ["movej", "read", "wait"]
+    assert known["movej"] == Signature(parameters("q", a=1.4, name="x", on=True), blocks=True, cost=180)
+    assert known["movej"] == signature(Functions().movej)
+    assert (known["movej"].required, known["read"].blocks, known["wait"].blocks) == (1, False, True)
 
 
 def test_arguments_are_computed_in_the_order_of_the_text():
@@ -417,7 +441,7 @@ class Added:
     """A program that runs statements as they are added to it."""
 
     def __init__(self, text):
-        self.signatures = SIGNATURES | {"interpret": signature("", blocks=True)}
+        self.signatures = SIGNATURES | {"interpret": Signature((), blocks=True)}
         self.said, self.waiting = [], []
         self.last = compile_script(text, self.signatures)
         self.machine = Machine(

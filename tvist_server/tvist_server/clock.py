@@ -91,7 +91,7 @@ class Clock(ABC):
         self._thread = threading.Thread(target=self._guarded, name="tvist-tick", daemon=True)
 
     def start(self) -> None:
-        """Start the thread."""
+        """Start to run jobs and to tick."""
         self._thread.start()
 
     def close(self) -> None:

@@ -243,7 +243,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Endpoints to listen on."""
+        """Endpoints to listen on: those of `listen`, or the default; none by default if robots connect to a router."""
         return (() if self.connect else (DEFAULT_ENDPOINT,)) if self.listen is None else self.listen
 
     @property
@@ -278,6 +278,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         """
         try:
             chosen, description = self.profile_in_force, load(self.robot)
+            if self.ur:
+                self.ur_ports.check_joints(description.robot.name, description.joints)
             profile = PLAIN if chosen is None else PROFILES[chosen]
             calibration = self._calibration(description.robot.model)
             setup = Setup(

@@ -22,7 +22,7 @@ class Courier:
         self._thread = threading.Thread(target=self._run, name="tvist-publisher", daemon=True)
 
     def start(self) -> None:
-        """Start the thread."""
+        """Start to hand on messages; wake-ups from before are not lost."""
         self._thread.start()
 
     def wake(self) -> None:

@@ -13,7 +13,7 @@ MOST = 64
 
 @dataclass(frozen=True)
 class Member:
-    """One robot of several."""
+    """One of the robots that `robots` lists."""
 
     robot: str
     """Name of a robot that comes with the package, or path of a robot file."""

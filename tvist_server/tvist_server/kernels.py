@@ -125,13 +125,13 @@ def _line() -> None:
 
 
 def _postures() -> None:
-    """Inverse kinematics, in closed form and by iteration."""
+    """Compile inverse kinematics, in closed form and by iteration."""
     for robot in ("ur5e", "one-joint"):
         _planner(robot).rehearse_postures()
 
 
 def _plans() -> None:
-    """What else plans use."""
+    """Compile what plans use besides inverse kinematics and lines."""
     _planner("ur5e").rehearse_plans()
 
 

@@ -84,7 +84,7 @@ class PlanAhead:
         self._thread = threading.Thread(target=self._run, name="tvist-plan", daemon=True)
 
     def start(self) -> None:
-        """Start the thread."""
+        """Start to plan; commands that were submitted before wait until now."""
         self._thread.start()
 
     def end(self) -> None:
@@ -99,7 +99,7 @@ class PlanAhead:
 
     @property
     def waiting(self) -> int:
-        """Number of waiting commands."""
+        """Number of commands whose preparation has not finished."""
         return self._count
 
     def submit(self, admitted: Admitted, answer: Answer) -> None:

@@ -79,19 +79,15 @@ class Publisher(Sink):
                 log.exception("could not hand on a message")
 
     def state(self, state: State) -> None:
-        """Queue a state."""
         self._offer(state)
 
     def event(self, event: Event) -> None:
-        """Queue an event."""
         self._put(event)
 
     def truth(self, truth: Truth) -> None:
-        """Queue values that a real robot cannot measure."""
         self._offer(truth)
 
     def io(self, io: Io) -> None:
-        """Queue inputs, outputs and registers."""
         self._offer(io)
 
     def telemetry(self, telemetry: Telemetry, io: Io) -> None:
@@ -131,6 +127,7 @@ class Publisher(Sink):
         if not isinstance(item, Message):
             item()
             return
+        # Encoded once for all gateways, and here rather than in the tick thread, whose time is short (decision 14).
         topic, data = TOPICS[type(item)], encode(item)
         for gateway in self._gateways:
             gateway.publish(topic, item, data)

@@ -54,6 +54,8 @@ class Reception(Desk):
 
     def request(self, data: bytes, answer: Answer) -> None:
         """Take an encoded command; the reply comes from another thread, or at once if the command is rejected."""
+        # Read without a lock: the controller replaces its standing as a whole. A lease may end before the command gets
+        # its turn, so the tick thread checks it again (decision 14).
         standing = self._host.standing
         self._hand_in(admit(data, standing.lease, standing.clock), answer)
 
@@ -78,7 +80,7 @@ class Reception(Desk):
         return None if lease is None else lease.client
 
     def setpoint(self, data: bytes) -> None:
-        """Admit a set-point."""
+        """Pass a set-point on; without a valid lease it is counted and dropped, since set-points are not answered."""
         lease = self._host.standing.lease
         setpoint = admit_setpoint(data, lease)
         if setpoint is None or lease is None:

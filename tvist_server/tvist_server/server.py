@@ -42,7 +42,7 @@ INSTANCE_BYTES = 4
 
 
 class Recording(NamedTuple):
-    """What became of a recording."""
+    """Where a recording is, and whether it is complete."""
 
     place: str
     """Where it is, in words."""
@@ -183,6 +183,8 @@ class Server:
         # The objects created so far live until the end: the garbage collector need not look at them again.
         gc.collect()
         gc.freeze()
+        # A thread that wants the interpreter's lock waits this long before it asks for it. Python's default, 5 ms, is
+        # longer than a tick, and another thread may hold the lock when the tick thread wakes up.
         sys.setswitchinterval(1e-4)
         if self._lock_memory and lock_memory():
             self.granted.append("memory is locked")
@@ -200,8 +202,10 @@ class Server:
 
     def close(self) -> None:
         """Shut down in order: stop the clocks, close the recordings, deliver pending messages to clients that read."""
+        # In lockstep a tick may be waiting for a client that has stopped reading; the clock could not end before that.
         for robot in self.robots:
             robot.hurry()
+        # A planning thread waits for jobs of the tick thread, so it ends while that thread still runs.
         for robot in self.robots:
             robot.stop_planning()
         for clock in self._clocks:

@@ -10,6 +10,10 @@ InterfaceName = Literal[
     "primary_read_only", "secondary_read_only", "realtime_read_only",
 ]  # fmt: skip
 """Name of one of UR's interfaces."""
+MOST_JOINTS = 6
+"""Joints that a package of UR's interfaces has room for; those that an arm does not have are 0 in it."""
+WITHOUT_JOINTS: frozenset[InterfaceName] = frozenset({"dashboard", "interpreter"})
+"""Interfaces that send no values of joints, so that an arm may have any number of them."""
 Port = Annotated[int, Meta(ge=0, le=65535)]
 
 
@@ -29,3 +33,22 @@ class UrPorts(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def open(self) -> dict[InterfaceName, int]:
         """Return the port of each interface that is open."""
         return {interface: port for interface, port in msgspec.structs.asdict(self).items() if port}  # type: ignore[misc]
+
+    def check_joints(self, robot: str, joints: int) -> None:
+        """Check that the open interfaces can send the values of all joints of a robot.
+
+        Args:
+            robot: Name of the robot.
+            joints: Number of its joints.
+
+        Raises:
+            ValueError: They cannot; without this check, clients would see an arm that lacks its last joints.
+        """
+        limited = [interface for interface in self.open() if interface not in WITHOUT_JOINTS]
+        if joints > MOST_JOINTS and limited:
+            closing = " ".join(f"--ur-port {interface}=off" for interface in limited)
+            raise ValueError(
+                f"the robot {robot} has {joints} joints, but UR's interfaces have room for {MOST_JOINTS}: serve it "
+                "without --ur, since clients over Zenoh get any number, or close the interfaces that send joints: "
+                + closing
+            )

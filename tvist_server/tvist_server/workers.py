@@ -38,7 +38,7 @@ class WorkersError(Exception):
 
 @dataclass
 class _Worker:
-    """One process, from here."""
+    """One of the other processes, as the first one sees it."""
 
     who: str
     """Which one it is, with its robots, in words."""
@@ -255,7 +255,7 @@ class Workers:
 def _begin(
     do: Callable[[First], None], first: Connection, others: Sequence[Connection], folder: OwnFolder
 ) -> None:
-    """Begin a process."""
+    """Run in a new process: close the pipes of other processes and ignore signals, then do the work."""
     for end in others:
         end.close()
     signals = Ending()  # from now on a signal ends only the first process

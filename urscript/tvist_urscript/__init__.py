@@ -2,10 +2,19 @@
 
 from tvist_urscript.checker import check
 from tvist_urscript.compiler import Script, compile_script
+from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault, ScriptError
 from tvist_urscript.library import PURE
 from tvist_urscript.machine import EVALUATIONS, Machine
-from tvist_urscript.signatures import REQUIRED, Parameter, Signature, Signatures, signature
+from tvist_urscript.signatures import (
+    REQUIRED,
+    Parameter,
+    Signature,
+    Signatures,
+    parameters,
+    signature,
+    signatures,
+)
 from tvist_urscript.values import LONGEST, Array, Pose, Value, to_str
 
 __all__ = [
@@ -25,6 +34,9 @@ __all__ = [
     "Value",
     "check",
     "compile_script",
+    "costs",
+    "parameters",
     "signature",
+    "signatures",
     "to_str",
 ]

@@ -23,11 +23,11 @@ from tvist_urscript.values import (
 )
 
 MOST_PRODUCTS = 2744
-"""Multiplications of one product of matrices: two of 14 by 14."""
+"""Most multiplications in one product of matrices: two of 14 by 14."""
 
 Number: TypeAlias = int | float
 Work: TypeAlias = Callable[[int], None]
-"""Takes the number of elements that are about to be computed."""
+"""Function that is told how many elements are about to be computed."""
 
 
 def _sum(a: Number, b: Number) -> Number:

@@ -9,7 +9,7 @@ from tvist_urscript.errors import ScriptError, syntax_error
 from tvist_urscript.values import LONGEST_TEXT, to_bytes, whole
 
 DEEPEST = 100
-"""Levels of expressions inside each other, where a block counts as BLOCK of them."""
+"""Most levels of expressions inside each other; a block counts as BLOCK of them."""
 BLOCK = 4
 
 Children = list[Any]

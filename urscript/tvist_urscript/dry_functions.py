@@ -5,65 +5,67 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from tvist_urscript.errors import Fault
-from tvist_urscript.signatures import Signature, signature
+from tvist_urscript.signatures import Parameter, Signature, parameters, signature
 from tvist_urscript.values import Array, Pose, Value, integer, number, short, to_str
 
 STEP = 0.002
-"""Seconds of a tick."""
+"""Duration of a tick [s]."""
 REGISTERS = 48
-"""Registers of each kind; there are 128 of booleans."""
+"""Number of registers of integers, and of floats; there are BITS of booleans."""
 BITS = 128
 
+_NOWHERE = Pose((0.0,) * 6)
+_SOCKET: dict[str, Value] = {"socket_name": "socket_0"}
 _MOTIONS = {
-    "movej": "q, a=1.4, v=1.05, t=0, r=0",
-    "movel": "pose, a=1.2, v=0.25, t=0, r=0",
-    "movep": "pose, a=1.2, v=0.25, r=0",
-    "movec": "pose_via, pose_to, a=1.2, v=0.25, r=0, mode=0",
-    "optimovej": "goal, a=0.3, v=0.3, r=0",
-    "optimovel": "goal, a=0.3, v=0.3, r=0",
-    "servoj": "q, a=0, v=0, t=0.002, lookahead_time=0.1, gain=300",
-    "servoc": "pose, a=1.2, v=0.25, r=0",
-    "speedj": "qd, a, t=0",
-    "speedl": "xd, a, t=0, aRot=0",
-    "stopj": "a",
-    "stopl": "a, aRot=0",
+    "movej": parameters("q", a=1.4, v=1.05, t=0, r=0),
+    "movel": parameters("pose", a=1.2, v=0.25, t=0, r=0),
+    "movep": parameters("pose", a=1.2, v=0.25, r=0),
+    "movec": parameters("pose_via", "pose_to", a=1.2, v=0.25, r=0, mode=0),
+    "optimovej": parameters("goal", a=0.3, v=0.3, r=0),
+    "optimovel": parameters("goal", a=0.3, v=0.3, r=0),
+    "servoj": parameters("q", a=0, v=0, t=0.002, lookahead_time=0.1, gain=300),
+    "servoc": parameters("pose", a=1.2, v=0.25, r=0),
+    "speedj": parameters("qd", "a", t=0),
+    "speedl": parameters("xd", "a", t=0, aRot=0),
+    "stopj": parameters("a"),
+    "stopl": parameters("a", aRot=0),
 }
 _SETTINGS = {
-    "end_force_mode": "",
-    "end_freedrive_mode": "",
-    "end_teach_mode": "",
-    "force_mode": "task_frame, selection_vector, wrench, type, limits",
-    "force_mode_set_damping": "damping",
-    "force_mode_set_gain_scaling": "scaling",
-    "freedrive_mode": "freeAxes=[1, 1, 1, 1, 1, 1], feature=p[0, 0, 0, 0, 0, 0]",
-    "popup": 's, title="Popup", warning=False, error=False, blocking=False',
-    "set_gravity": "d",
-    "set_payload": "m, cog=None",
-    "set_target_payload": "m, cog, inertia=[0, 0, 0, 0, 0, 0], transition_time=0",
-    "set_tcp": 'pose, tcp_name=""',
-    "set_tool_voltage": "voltage",
-    "teach_mode": "",
-    "zero_ftsensor": "",
+    "end_force_mode": parameters(),
+    "end_freedrive_mode": parameters(),
+    "end_teach_mode": parameters(),
+    "force_mode": parameters("task_frame", "selection_vector", "wrench", "type", "limits"),
+    "force_mode_set_damping": parameters("damping"),
+    "force_mode_set_gain_scaling": parameters("scaling"),
+    "freedrive_mode": parameters(freeAxes=Array((1,) * 6), feature=_NOWHERE),
+    "popup": parameters("s", title="Popup", warning=False, error=False, blocking=False),
+    "set_gravity": parameters("d"),
+    "set_payload": parameters("m", cog=None),
+    "set_target_payload": parameters("m", "cog", inertia=Array((0,) * 6), transition_time=0),
+    "set_tcp": parameters("pose", tcp_name=""),
+    "set_tool_voltage": parameters("voltage"),
+    "teach_mode": parameters(),
+    "zero_ftsensor": parameters(),
 }
-_SOCKETS: dict[str, tuple[str, Value]] = {
-    "socket_open": ('address, port, socket_name="socket_0"', False),
-    "socket_close": ('socket_name="socket_0"', None),
-    "socket_get_var": ('name, socket_name="socket_0"', 0),
-    "socket_read_ascii_float": ('number, socket_name="socket_0", timeout=2', Array((0,))),
-    "socket_read_binary_integer": ('number, socket_name="socket_0", timeout=2', Array((0,))),
-    "socket_read_byte_list": ('number, socket_name="socket_0", timeout=2', Array((0,))),
-    "socket_read_line": ('socket_name="socket_0", timeout=2', ""),
+_SOCKETS: dict[str, tuple[tuple[Parameter, ...], Value]] = {
+    "socket_open": (parameters("address", "port", **_SOCKET), False),
+    "socket_close": (parameters(**_SOCKET), None),
+    "socket_get_var": (parameters("name", **_SOCKET), 0),
+    "socket_read_ascii_float": (parameters("number", **_SOCKET, timeout=2), Array((0,))),
+    "socket_read_binary_integer": (parameters("number", **_SOCKET, timeout=2), Array((0,))),
+    "socket_read_byte_list": (parameters("number", **_SOCKET, timeout=2), Array((0,))),
+    "socket_read_line": (parameters(**_SOCKET, timeout=2), ""),
     "socket_read_string": (
-        'socket_name="socket_0", prefix="", suffix="", interpret_escape=False, timeout=2',
+        parameters(**_SOCKET, prefix="", suffix="", interpret_escape=False, timeout=2),
         "",
     ),
-    "socket_send_byte": ('value, socket_name="socket_0"', False),
-    "socket_send_int": ('value, socket_name="socket_0"', False),
-    "socket_send_line": ('str, socket_name="socket_0"', False),
-    "socket_send_string": ('str, socket_name="socket_0"', False),
-    "socket_set_var": ('name, value, socket_name="socket_0"', None),
+    "socket_send_byte": (parameters("value", **_SOCKET), False),
+    "socket_send_int": (parameters("value", **_SOCKET), False),
+    "socket_send_line": (parameters("str", **_SOCKET), False),
+    "socket_send_string": (parameters("str", **_SOCKET), False),
+    "socket_set_var": (parameters("name", "value", **_SOCKET), None),
 }
-"""Signature of each, and its value where nothing can be reached; the lists are those of a failed read of any length."""
+"""Parameters of each, and its value where nothing can be reached; lists are those of a failed read of any length."""
 _JOINTS = Array((0.0,) * 6)
 _STATE: dict[str, Value] = {
     "get_actual_joint_positions": _JOINTS,
@@ -71,9 +73,9 @@ _STATE: dict[str, Value] = {
     "get_joint_positions": _JOINTS,
     "get_target_joint_positions": _JOINTS,
     "get_target_joint_speeds": _JOINTS,
-    "get_actual_tcp_pose": Pose((0.0,) * 6),
-    "get_target_tcp_pose": Pose((0.0,) * 6),
-    "get_tcp_offset": Pose((0.0,) * 6),
+    "get_actual_tcp_pose": _NOWHERE,
+    "get_target_tcp_pose": _NOWHERE,
+    "get_tcp_offset": _NOWHERE,
     "get_steptime": STEP,
     "is_steady": True,
 }
@@ -102,34 +104,40 @@ class Memory:
     def functions(self) -> dict[str, tuple[Signature, Callable[..., Any]]]:
         """Return the functions, each with its signature."""
         table: dict[str, tuple[Signature, Callable[..., Any]]] = {
-            "textmsg": (signature('s1, s2=""'), self._say),
-            "sync": (signature("", blocks=True), _sync),
-            "sleep": (signature("t", blocks=True), _sleep),
-            "set_digital_out": (signature("n, b"), self._set_digital),
-            "get_digital_out": (signature("n"), self._get_digital),
-            "get_digital_in": (signature("n"), _false),
-            "set_analog_out": (signature("n, f"), self._set_analog),
-            "get_analog_out": (signature("n"), self._get_analog),
-            "get_analog_in": (signature("n"), _zero),
-            "set_standard_digital_out": (signature("n, b"), self._set_digital),
+            name: (signature(function), function)
+            for name, function in (
+                ("textmsg", self._say),
+                ("sync", _sync),
+                ("sleep", _sleep),
+                ("set_digital_out", self._set_digital),
+                ("get_digital_out", self._get_digital),
+                ("get_digital_in", _false),
+                ("set_analog_out", self._set_analog),
+                ("get_analog_out", self._get_analog),
+                ("get_analog_in", _zero),
+                ("set_standard_digital_out", self._set_digital),
+            )
         }
-        for name, text in _MOTIONS.items():
-            motion = signature(text, blocks=True)
+        for name, given in _MOTIONS.items():
+            motion = Signature(given, blocks=True)
             table[name] = (motion, self._motion(name, motion))
-        for name, text in _SETTINGS.items():
-            setting = signature(text)
+        for name, given in _SETTINGS.items():
+            setting = Signature(given)
             table[name] = (setting, self._note(name, setting))
-        for name, (text, value) in _SOCKETS.items():
-            table[name] = (signature(text, blocks=True), _failing(value))
+        for name, (given, value) in _SOCKETS.items():
+            table[name] = (Signature(given, blocks=True), _failing(value))
         for name, value in _STATE.items():
-            table[name] = (signature(""), lambda value=value: value)
+            table[name] = (Signature(()), lambda value=value: value)
         for kind, word in (("int", "integer"), ("double", "float"), ("bit", "boolean")):
-            table[f"read_input_{word}_register"] = (signature("address"), self._reader(self.inputs, kind))
-            table[f"read_output_{word}_register"] = (signature("address"), self._reader(self.outputs, kind))
-            table[f"write_output_{word}_register"] = (signature("address, value"), self._writer(kind))
+            for name, function in (
+                (f"read_input_{word}_register", self._reader(self.inputs, kind)),
+                (f"read_output_{word}_register", self._reader(self.outputs, kind)),
+                (f"write_output_{word}_register", self._writer(kind)),
+            ):
+                table[name] = (signature(function), function)
         return table
 
-    def _say(self, s1: Value, s2: Value) -> None:
+    def _say(self, s1: Value, s2: Value = "") -> None:
         self.said.append(short(to_str(s1) + to_str(s2)))
 
     def _set_digital(self, n: Value, b: Value) -> None:
@@ -164,7 +172,11 @@ class Memory:
 
     def _reader(self, registers: dict[str, dict[int, Value]], kind: str) -> Callable[[Value], Value]:
         nothing: dict[str, Value] = {"int": 0, "double": 0.0, "bit": False}
-        return lambda address: registers[kind].get(_address(address, kind), nothing[kind])
+
+        def read(address: Value) -> Value:
+            return registers[kind].get(_address(address, kind), nothing[kind])
+
+        return read
 
     def _writer(self, kind: str) -> Callable[[Value, Value], None]:
         def write(address: Value, value: Value) -> None:

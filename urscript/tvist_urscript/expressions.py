@@ -11,9 +11,9 @@ from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
 from tvist_urscript.values import LONGEST, NUMBERS, Array, Pose
 
 MOST_OPERATIONS = 1000
-"""Evaluations of one statement; beyond them nothing could interrupt it in time."""
+"""Most evaluations of one statement, within which nothing can interrupt it."""
 START = 20
-"""Evaluations that the start of a thread takes; they limit the threads that start in a tick."""
+"""Evaluations that the start of a thread costs, which limits the threads that start in a tick."""
 
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
 SCALING, SUMS = "*/", "+-"
@@ -30,9 +30,9 @@ class Expressions:
     """Translates expressions.
 
     Attributes:
-        scope: What names mean here.
+        scope: The names that the present function can use.
         cost: Evaluations of what has been translated since it was set to 0.
-        works: What has been translated since it was reset may work on lists, and so take more than that.
+        works: Whether the code translated since it was reset may work on lists, which takes more than `cost`.
         used: Built-in functions that the script calls.
         constants: Lists and default values, by the names that compiled functions have for them.
     """
@@ -180,7 +180,7 @@ class Expressions:
         return at.call("posed", at.tuple([self.value(item) for item in node.indices]))
 
     def built_in_array(self, node: tree.Expression) -> str | None:
-        """Return the name of the controller's array that an expression means."""
+        """Return the name of the controller's array that an expression refers to; None if it is another expression."""
         if (
             isinstance(node, tree.Name)
             and node.name in BUILT_IN_ARRAYS
@@ -190,7 +190,7 @@ class Expressions:
         return None
 
     def call_built_in(self, at: Position, name: str, arguments: Sequence[tree.Expression]) -> ast.expr:
-        """Translate what means a call of a built-in function without naming it."""
+        """Translate an access to an array of the controller, which is a call of a built-in function."""
         if name not in self.signatures:
             self.report(at.given["lineno"], at.given["col_offset"], name_not_found(name))
             return at.constant(None)

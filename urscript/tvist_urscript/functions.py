@@ -8,21 +8,21 @@ from tvist_urscript.pieces import DEPTH, MISSING, Position
 from tvist_urscript.statements import Statements
 
 DEEPEST_CALLS = 200
-"""Calls of functions inside each other."""
+"""Most calls of functions inside each other."""
 MOST_PARAMETERS = 255
-"""Parameters of one function."""
+"""Most parameters of one function."""
 MOST_FUNCTIONS = 2000
-"""Functions and threads of a program."""
+"""Most functions and threads of a program."""
 MOST_STATEMENTS = 4000
-"""Statements of one function: while Python compiles it, no other thread of the process runs."""
+"""Most statements of one function: while Python compiles it, no other thread of the process runs."""
 MOST_NODES = 10_000
-"""Operations, names, calls and statements of one function, for the same reason."""
+"""Most operations, names, calls and statements of one function, for the same reason."""
 PART, PART_NODES = 200, 1000
-"""Statements, and all that MOST_NODES counts, of one part of a long main function."""
+"""Size at which a part of a long main function ends: in statements, and in what MOST_NODES counts."""
 
 
 class Functions(Statements):
-    """Translates functions."""
+    """Translates functions of a script, and splits a long main function."""
 
     def function(self, scope: Scope) -> list[ast.FunctionDef]:
         """Translate a function of the script, without those inside it.

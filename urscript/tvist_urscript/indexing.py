@@ -1,4 +1,4 @@
-"""Elements of lists, poses and matrices: reading one, and the list in which one is another."""
+"""Elements of lists, poses and matrices: reading one, and copying a list with another value for one."""
 
 from typing import Any
 
@@ -29,7 +29,7 @@ def element_of_matrix(value: Value, row: Any, column: Any) -> Value:
 
 
 def replaced(new: Value, indices: tuple[Any, ...], value: Value, work: Work) -> Array:
-    """Return the list in which the element at these indices is another.
+    """Return a copy of a list with another value for the element at these indices.
 
     Copying four elements counts as one evaluation.
 

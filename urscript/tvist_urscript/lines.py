@@ -7,9 +7,9 @@ from lark import Token, UnexpectedInput
 from tvist_urscript.errors import ScriptError, syntax_error
 
 LONGEST_NAME = 255
-"""Characters of a name."""
+"""Longest name [characters]."""
 MOST_BRACKETS = 100
-"""Brackets inside each other."""
+"""Most brackets inside each other."""
 END = "_NEWLINE"
 
 _OPENS = frozenset(("LPAR", "LSQB"))
@@ -32,19 +32,19 @@ _GOES_ON = frozenset(
         "RUN",
     )
 )
-"""After these a line break is no end, as nothing is complete."""
+"""Tokens after which a line break ends no statement, as none is complete."""
 _BEGINS = frozenset(
     ("DEF", "SEC", "THREAD", "IF", "WHILE", "RETURN", "KILL", "JOIN", "BREAK", "CONTINUE", "PASS", "HALT",
      "ENTER_CRITICAL", "EXIT_CRITICAL", "GLOBAL", "LOCAL", "END", "ELIF", "ELSE")
 )  # fmt: skip
-"""Before these a statement ends without a line break: ur_rtde sends `global a =`, then `0  global b = 1`."""
+"""Tokens before which a statement ends without a line break: ur_rtde sends `global a =`, then `0  global b = 1`."""
 _COMPLETE = frozenset(
     ("NAME", "NUMBER", "TEXT", "TRUE", "FALSE", "NONE", "RPAR", "RSQB", "PASS", "BREAK", "CONTINUE", "HALT",
      "ENTER_CRITICAL", "EXIT_CRITICAL", "END")
 )  # fmt: skip
-"""After these, no expression goes on with a name or `run`: it can only begin the next statement of the line."""
+"""Tokens after which no expression goes on with a name or `run`: it can only begin the next statement of the line."""
 _AFTER_NAME = frozenset(("LPAR", "LSQB", "EQUAL"))
-"""What follows the name with which a statement begins."""
+"""Tokens that follow the name with which a statement begins."""
 
 
 class Lines:
@@ -60,7 +60,7 @@ class Lines:
         self._several = several
 
     def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, as a text is long
-        """Drop line breaks that end nothing, and add ends that no line break tells.
+        """Drop line breaks inside statements, and add the ends of statements that no line break marks.
 
         Raises:
             ScriptError: A name is too long, or brackets are nested too deep.
@@ -127,7 +127,7 @@ def _parted(tokens: Iterator[Token]) -> Iterator[Token]:
 
 
 def _after(token: Token) -> Token:
-    """An end without a text, where the text ends."""
+    """Return an empty end of statement at the end of a token, the last one of the text."""
     line, column = token.end_line, token.end_column
     return Token(END, "", token.end_pos, line, column, line, column)
 

@@ -3,6 +3,7 @@
 import math
 
 from tvist_urscript.arithmetic import MOST_PRODUCTS, matrix
+from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault
 from tvist_urscript.poses import pose_inv
 from tvist_urscript.values import (
@@ -21,59 +22,60 @@ from tvist_urscript.values import (
 _BITS = 32
 
 
-def get_list_length(value: Value) -> int:
+def get_list_length(v: Value) -> int:
     """Return the number of elements of a list."""
-    if isinstance(value, Array):
-        return len(value.items)
-    raise Fault(f"{kind(value)} has no length")
+    if isinstance(v, Array):
+        return len(v.items)
+    raise Fault(f"{kind(v)} has no length")
 
 
-def length(value: Value) -> int:
+def length(v: Value) -> int:
     """Return the number of elements of a list, or of bytes of a text."""
-    return len(to_bytes(value)) if type(value) is str else get_list_length(value)
+    return len(to_bytes(v)) if type(v) is str else get_list_length(v)
 
 
-def size(value: Value) -> Value:
+def size(v: Value) -> Value:
     """Return the number of elements of a list, or the rows and columns of a matrix."""
-    if type(value) is Array and (rows := matrix(value)) is not None:
+    if type(v) is Array and (rows := matrix(v)) is not None:
         return Array((len(rows), len(rows[0])))
-    return length(value)
+    return length(v)
 
 
-def norm(value: Value) -> float:
+def norm(a: Value) -> float:
     """Return the absolute value of a number, or the Euclidean length of a list of numbers."""
-    if type(value) is int or type(value) is float:
-        return abs(value)
-    return math.hypot(*vector(value, "the argument of norm"))
+    if type(a) is int or type(a) is float:
+        return abs(a)
+    return math.hypot(*vector(a, "the argument of norm"))
 
 
-def normalize(value: Value) -> Array:
+def normalize(v: Value) -> Array:
     """Return a list of numbers divided by its Euclidean length."""
-    numbers = vector(value, "the argument of normalize")
+    numbers = vector(v, "the argument of normalize")
     whole = math.hypot(*numbers)
     if whole == 0:
         raise Fault("a vector of length 0 has no direction")
     return Array(x / whole for x in numbers)
 
 
-def integer_to_binary_list(value: Value) -> Array:
+@costs(20)
+def integer_to_binary_list(x: Value) -> Array:
     """Return the 32 bits of an integer, the lowest first."""
-    bits = integer(value, "the argument of integer_to_binary_list")
+    bits = integer(x, "the argument of integer_to_binary_list")
     return Array(bool(bits >> place & 1) for place in range(_BITS))
 
 
-def binary_list_to_integer(value: Value) -> int:
+def binary_list_to_integer(l: Value) -> int:
     """Return the integer of at most 32 bits, the lowest first; 32 of them are a signed number."""
-    bits = array(value, "the argument of binary_list_to_integer").items
+    bits = array(l, "the argument of binary_list_to_integer").items
     if len(bits) > _BITS:
         raise Fault(f"an integer has at most {_BITS} bits, not {len(bits)}")
     result = sum(1 << place for place, bit in enumerate(bits) if bit)
     return result - (1 << _BITS) if result >= 1 << _BITS - 1 else result
 
 
-def make_list(elements: Value, initial_value: Value) -> Array:
+def make_list(length: Value, initial_value: Value) -> Array:
     """Return a list of this many equal elements."""
-    count = integer(elements, "the length of make_list")
+    count = integer(length, "the length of make_list")
     if count < 0:
         raise Fault("a list cannot have a negative length")
     if count > LONGEST:
@@ -82,17 +84,18 @@ def make_list(elements: Value, initial_value: Value) -> Array:
     return Array([initial_value] * count)
 
 
-def transpose(value: Value) -> Array:
+def transpose(m: Value) -> Array:
     """Return a matrix with its rows as columns."""
-    rows = _matrix(value, "transpose")
+    rows = _matrix(m, "transpose")
     return Array(Array(column) for column in zip(*rows, strict=True))
 
 
-def inv(value: Value) -> Array:
+@costs(80)
+def inv(m: Value) -> Array:
     """Return the inverse of a pose or of a square matrix, by Gauss and Jordan with pivots."""
-    if type(value) is Pose:
-        return pose_inv(value)
-    rows = _matrix(value, "inv")
+    if type(m) is Pose:
+        return pose_inv(m)
+    rows = _matrix(m, "inv")
     n = len(rows)
     if len(rows[0]) != n:
         raise Fault(f"a matrix of {n} by {len(rows[0])} has no inverse")

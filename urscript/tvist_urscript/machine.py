@@ -14,22 +14,22 @@ from tvist_urscript.threads import MOST_THREADS, Thread
 from tvist_urscript.values import Value
 
 EVALUATIONS = 500
-"""Evaluations of all threads in a tick."""
+"""Budget of a tick: evaluations of all threads together."""
 PATIENCE = 250
-"""Ticks in which a thread may use up its budget one after the other, before it counts as an endless loop."""
+"""Ticks in a row in which a thread may use up its budget before it counts as an endless loop."""
 OVERDRAFT = 2000
-"""Evaluations by which one statement may exceed the budget."""
+"""Most evaluations by which one statement may exceed the budget."""
 
 _MISSING = object()
 Steps = Generator[Any, None, Any]
 
 
 class Halted(Exception):  # noqa: N818  no error: the script has said `halt`
-    """The program ends now."""
+    """Raised by `halt` to unwind the thread that runs; the machine then ends all threads."""
 
 
 class Killed(Exception):  # noqa: N818  no error: the script has killed the thread that runs
-    """The thread that runs ends now."""
+    """Raised to unwind the thread that runs, since it has killed itself or a thread that it belongs to."""
 
 
 class Machine:
@@ -41,7 +41,7 @@ class Machine:
         halted: Whether it has ended by `halt`.
 
     Args:
-        script: What it runs.
+        script: The program.
         functions: The built-in functions that the script calls, without those of `PURE`.
         finish: Called as a blocking function before a thread waits for another (`join`, `enter_critical`), and at
             its regular end.

@@ -1,4 +1,4 @@
-"""Which variable and which function a name means."""
+"""Scopes: which variable or function a name in a script refers to."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -12,16 +12,26 @@ BUILT_IN_ARRAYS: dict[str, tuple[str, str]] = {
     "analog_in": ("get_analog_in", ""),
     "analog_out": ("get_analog_out", "set_analog_out"),
 }
-"""Arrays of the controller: the functions that read and write an element."""
+"""Arrays of the controller, and the functions that read and write an element; the second is empty for inputs."""
 
 
 @dataclass(eq=False)
 class Scope:
-    """What the names inside one function mean.
+    """The names that one function of a script can use.
 
     A variable is local if it is a parameter, if `local` has declared it further up, or if no global has its name.
-    Everything that the outermost level assigns is global. A function sees its own functions and those of the functions
-    around it, but not the variables of these.
+    Every variable that is assigned on the outermost level is global. A function can call its own functions and those of
+    the functions around it, but not use the local variables of these.
+
+    Attributes:
+        function: The function.
+        outer: Scope of the function around it; None for the outermost level.
+        number: Number of the scope in its program, which makes the names of compiled functions unique.
+        globals: Names of global variables, in one set for all scopes of the program.
+        functions: Scopes of the functions that are defined directly inside it, by name.
+        twice: Functions inside it whose name is defined a second time, which is an error.
+        assigned: Variables that are assigned in it without `global`.
+        local: Its parameters, and the variables that `local` has declared so far in its translation.
     """
 
     function: tree.Function
@@ -35,11 +45,11 @@ class Scope:
 
     @property
     def code_name(self) -> str:
-        """The name of its Python function."""
+        """Name of the function in compiled code."""
         return f"f{self.number}_{self.function.name}"
 
     def variable(self, name: str) -> Literal["local", "global"] | None:
-        """Tell which variable a name means here, None where there is none."""
+        """Return whether a name refers to a local or a global variable here; None if no variable has it."""
         if name in self.local:
             return "local"
         if name in self.globals:
@@ -47,7 +57,7 @@ class Scope:
         return "local" if name in self.assigned else None
 
     def declare(self, name: str, qualifier: Literal["global", "local"] | None) -> Literal["local", "global"]:
-        """Tell which variable an assignment means, from which on the name means it."""
+        """Return whether an assignment sets a local or a global variable; after `local`, the name stays local."""
         if qualifier == "global" or self.outer is None:
             return "global"
         if qualifier == "local":
@@ -55,7 +65,7 @@ class Scope:
         return self.variable(name) or "local"
 
     def find(self, name: str) -> "Scope | None":
-        """Return the script's function of this name that is seen from here."""
+        """Return the scope of the script's function of this name that can be called here; None if there is none."""
         scope: Scope | None = self
         while scope is not None:
             if name in scope.functions:
@@ -65,7 +75,7 @@ class Scope:
 
 
 def outline(scope: Scope) -> Scope:
-    """Return what later statements have to know of an outermost level, without the bodies of its functions."""
+    """Return a copy of an outermost scope for statements that are added later, without the bodies of its functions."""
     known = {
         name: Scope(replace(inner.function, body=[]), None, inner.number, set())
         for name, inner in scope.functions.items()
@@ -74,12 +84,12 @@ def outline(scope: Scope) -> Scope:
 
 
 def scopes(program: tree.Function, before: Scope | None = None, number: int = 0) -> list[Scope]:
-    """Return the scopes of a program, its own first, then those of its functions in the order of the text.
+    """Return the scopes of a program: its outermost level, then its functions in the order of the text.
 
     Args:
-        program: The program, or statements that are added to one.
-        before: The scope of the program that they are added to.
-        number: Number of the first scope.
+        program: The program, or statements that are added to a program.
+        before: For added statements, the outermost scope of the program so far.
+        number: Number of the first of these scopes.
     """
     shared: set[str] = set() if before is None else set(before.globals)
     found: list[Scope] = []

@@ -25,8 +25,16 @@ asin = _real("asin", math.asin, "a number from -1 to 1")
 acos = _real("acos", math.acos, "a number from -1 to 1")
 atan = _real("atan", math.atan, "a number")
 sqrt = _real("sqrt", math.sqrt, "a number that is not negative")
-d2r = _real("d2r", math.radians, "a number")
-r2d = _real("r2d", math.degrees, "a number")
+
+
+def d2r(d: Value) -> float:
+    """Return an angle, which is given in degrees, in radians."""
+    return math.radians(number(d, "the argument of d2r"))
+
+
+def r2d(r: Value) -> float:
+    """Return an angle, which is given in radians, in degrees."""
+    return math.degrees(number(r, "the argument of r2d"))
 
 
 def atan2(x: Value, y: Value) -> float:
@@ -43,9 +51,9 @@ def power(base: Value, exponent: Value) -> float:
         raise Fault(f"pow has no value for the base {a:g} and the exponent {b:g}") from None
 
 
-def log(base: Value, f: Value) -> float:
-    """Return the logarithm of f to a base."""
-    a, x = number(base, "the base of log"), number(f, "the second argument of log")
+def log(b: Value, f: Value) -> float:
+    """Return the logarithm of f to the base b."""
+    a, x = number(b, "the base of log"), number(f, "the second argument of log")
     try:
         return math.log(x) / math.log(a)
     except (ValueError, ZeroDivisionError):

@@ -11,7 +11,7 @@ HERE, MISSING, DEPTH = "machine", "MISSING", "depth"
 
 
 class Position:
-    """Where a part of Python's tree comes from; it makes such parts.
+    """A position in the script; its methods return nodes of Python's tree that have this position.
 
     Attributes:
         given: The keywords that every node of Python's tree takes.
@@ -29,51 +29,56 @@ class Position:
 
     @classmethod
     def of(cls, node: Node) -> "Position":
-        """The position of a script's node."""
+        """Return the position of a node of a script's tree."""
         return cls(node.line, node.column)
 
     def name(self, name: str) -> ast.Name:
-        """A variable that is read."""
+        """Return a name that is read."""
         return ast.Name(name, LOAD, **self.given)
 
     def constant(self, value: object) -> ast.Constant:
-        """A number, a text, True, False or None."""
+        """Return a literal: a number, a text, True, False or None."""
         return ast.Constant(value, **self.given)  # type: ignore[arg-type]
 
     def call(self, name: str, *arguments: ast.expr) -> ast.Call:
-        """A call of one of the names of a compiled function's surroundings."""
+        """Return a call of a global name of the compiled code, with arguments by position."""
         return ast.Call(self.name(name), list(arguments), [], **self.given)
 
     def waiting(self, value: ast.expr) -> ast.YieldFrom:
-        """The value of a generator that has come to its end."""
+        """Return `yield from value`: it passes on the ticks of a generator, whose result is its value."""
         return ast.YieldFrom(value, **self.given)
 
     def tuple(self, items: list[ast.expr]) -> ast.Tuple:
-        """Several values."""
+        """Return a tuple display."""
         return ast.Tuple(items, LOAD, **self.given)
 
     def assign(self, name: str, value: ast.expr) -> ast.Assign:
-        """An assignment."""
+        """Return an assignment to a name."""
         return ast.Assign([ast.Name(name, STORE, **self.given)], value, **self.given)
 
     def statement(self, value: ast.expr) -> ast.Expr:
-        """An expression whose value nobody wants."""
+        """Return an expression as a statement."""
         return ast.Expr(value, **self.given)
 
     def branch(self, test: ast.expr, body: list[ast.stmt], otherwise: list[ast.stmt] | None = None) -> ast.If:
-        """An if."""
+        """Return an `if`; an empty body becomes `pass`."""
         return ast.If(test, body or [ast.Pass(**self.given)], otherwise or [], **self.given)
 
     def invert(self, value: ast.expr) -> ast.UnaryOp:
-        """The opposite truth."""
+        """Return `not value`."""
         return ast.UnaryOp(ast.Not(), value, **self.given)
 
     def compare(self, left: ast.expr, operator: ast.cmpop, right: ast.expr) -> ast.Compare:
-        """A comparison of Python's own."""
+        """Return a comparison by Python's operator, not by one of the script's."""
         return ast.Compare(left, [operator], [right], **self.given)
 
     def charge(self, cost: int, *, check: bool) -> list[ast.stmt]:
-        """Take a cost from the budget; where that is spent, yield the cost, to be paid in the tick that bears it."""
+        """Return statements that take a cost from the budget.
+
+        Args:
+            cost: Evaluations.
+            check: Whether to yield if the budget is spent then; the machine charges what is yielded to a later tick.
+        """
         if cost == 0 and not check:
             return []
         left = ast.Attribute(self.name(HERE), "left", STORE, **self.given)

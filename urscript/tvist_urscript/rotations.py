@@ -40,7 +40,7 @@ def product(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 def inverse(a: Quaternion) -> Quaternion:
-    """Return the rotation back."""
+    """Return the conjugate, which turns back."""
     w, x, y, z = a
     return (w, -x, -y, -z)
 
@@ -55,7 +55,7 @@ def turned(a: Quaternion, v: Vector) -> Vector:
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """Return the vector product."""
+    """Return a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 

@@ -1,11 +1,12 @@
 """What is known of a function when a script is compiled: its parameters, whether it waits, what it costs."""
 
-import ast
-from collections.abc import Mapping
+import inspect
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, get_origin
 
-from tvist_urscript.values import Array, Pose, Value
+from tvist_urscript.costs import cost_of
+from tvist_urscript.values import Value
 
 
 class _Required:
@@ -53,32 +54,47 @@ class Signature:
 Signatures = Mapping[str, Signature]
 
 
-def signature(text: str, *, blocks: bool = False, cost: int = 1, linear: bool = False) -> Signature:
-    """Read a signature as manuals write it: `signature("q, a=1.4, v=1.05, t=0, r=0")`.
+def signature(function: Callable[..., Any], *, linear: bool = False) -> Signature:
+    """Return how scripts call a function of Python: with its parameters by their names, and its defaults.
 
-    Raises:
-        ValueError: The text is no list of parameters whose defaults are constants.
+    It blocks if it returns a generator, by its annotation or, without one, because it is a generator function. Its cost
+    is that of `costs`.
+
+    Args:
+        function: A function, or a method of an object. Scripts always give all arguments, in order.
+        linear: See `Signature`.
     """
-    try:
-        tree = ast.parse(f"lambda {text}: 0", mode="eval").body
-    except SyntaxError as error:
-        raise ValueError(f"{text!r} is no list of parameters") from error
-    assert isinstance(tree, ast.Lambda)
-    names = [argument.arg for argument in tree.args.args]
-    missing = len(names) - len(tree.args.defaults)
-    defaults = [REQUIRED] * missing + [_constant(node) for node in tree.args.defaults]
+    found = inspect.signature(function)
+    returned = found.return_annotation
+    if returned is inspect.Signature.empty:
+        blocks = inspect.isgeneratorfunction(function)
+    else:
+        blocks = get_origin(returned) is Generator
     return Signature(
-        tuple(Parameter(name, default) for name, default in zip(names, defaults, strict=True)),
+        tuple(
+            Parameter(name, REQUIRED if one.default is inspect.Parameter.empty else one.default)
+            for name, one in found.parameters.items()
+        ),
         blocks,
-        cost,
+        cost_of(function),
         linear,
     )
 
 
-def _constant(node: ast.expr) -> Any:
-    if isinstance(node, ast.List):
-        return Array(_constant(item) for item in node.elts)
-    if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "p":
-        inner = node.slice
-        return Pose(_constant(item) for item in (inner.elts if isinstance(inner, ast.Tuple) else [inner]))
-    return ast.literal_eval(node)
+def signatures(functions: type) -> dict[str, Signature]:
+    """Return how scripts call the public methods of a class, by name and in the order of the class."""
+    return {
+        name: signature(method.__get__(functions))  # bound to anything: scripts do not give `self`
+        for name, method in vars(functions).items()
+        if inspect.isfunction(method) and not name.startswith("_")
+    }
+
+
+def parameters(*required: str, **defaults: Value) -> tuple[Parameter, ...]:
+    """Return the parameters of a function that has no method of its own: `parameters("q", a=1.4, v=1.05)`.
+
+    Args:
+        required: Names of those that every call gives.
+        defaults: Names and defaults of the others.
+    """
+    return (*map(Parameter, required), *(Parameter(name, value) for name, value in defaults.items()))

@@ -1,4 +1,4 @@
-"""Statements of a script as Python's, with the costs that they take from the budget."""
+"""Translates statements of a script into statements of Python, which also charge their costs to the budget."""
 
 import ast
 from itertools import count
@@ -11,11 +11,11 @@ from tvist_urscript.pieces import Position
 from tvist_urscript.signatures import Signatures
 
 PIECE = 40
-"""Evaluations after which a straight piece of a program looks at the budget."""
+"""Evaluations after which code without loops checks whether the budget is spent."""
 MOST_LOOPS = 15
-"""Loops inside each other; Python has 20 blocks."""
+"""Most loops inside each other: CPython allows 20 nested blocks."""
 LINK = 15
-"""Branches of one chain of Python's; longer chains of `elif` are several."""
+"""Most branches of one `if` of Python; a longer chain of `elif` is split, since Python nests each in the one before."""
 
 Branch = tuple[tree.Expression, list[tree.Statement]]
 Link = tuple[Position, ast.expr, list[ast.stmt]]
@@ -25,8 +25,9 @@ class Statements(Expressions):
     """Translates statements.
 
     Attributes:
-        loops: Loops around what is being translated.
-        is_part: It belongs to a part of the main function, which tells by True that the program has returned.
+        loops: Number of loops around the present statement.
+        is_part: Whether the statement is in a part of a long main function, see `Functions.function`. A part returns
+            True if the program has executed `return` in it.
     """
 
     def __init__(self, signatures: Signatures, report: Report) -> None:
@@ -39,12 +40,12 @@ class Statements(Expressions):
         """Translate statements.
 
         Args:
-            body: They.
-            since: Evaluations that may have passed since something looked at the budget.
-            cost: Evaluations before them that nothing has taken from the budget.
+            body: The statements.
+            since: Largest number of evaluations since the last check of the budget.
+            cost: Evaluations of the code before, such as the conditions of an `if`, that are still to be charged.
 
         Returns:
-            Python's statements, and `since` at their end.
+            The statements of Python, and `since` at their end.
         """
         result: list[ast.stmt] = []
         piece: list[ast.stmt] = []
@@ -94,7 +95,7 @@ class Statements(Expressions):
         return result, since
 
     def limited(self, statement: tree.Statement) -> int:
-        """Return the cost of what has been translated, which has a limit."""
+        """Return the cost of the present statement, and report it as an error if it exceeds MOST_OPERATIONS."""
         if self.cost > MOST_OPERATIONS:
             self.report(
                 statement.line,
@@ -104,9 +105,17 @@ class Statements(Expressions):
         return self.cost
 
     def branches(self, statement: tree.If, test: ast.expr, since: int) -> tuple[list[ast.stmt], int]:
-        """Translate the branches of an `if`, of which the first condition is translated and paid for.
+        """Translate the branches of an `if`.
 
-        Each branch pays for the conditions before it.
+        Each branch charges the cost of the conditions that are evaluated before it.
+
+        Args:
+            statement: The `if`.
+            test: Its first condition, which is translated and charged already.
+            since: See `block`.
+
+        Returns:
+            The statements of Python, and the largest `since` at the end of any branch.
         """
         at = Position.of(statement)
         chains = [
@@ -141,11 +150,18 @@ class Statements(Expressions):
     def links(
         self, statement: tree.If, chain: list[Branch], test: ast.expr, since: int, cost: int
     ) -> tuple[list[Link], int, int, int]:
-        """Translate some branches, of which the first condition is translated and paid for.
+        """Translate the branches of one chain, see LINK.
+
+        Args:
+            statement: The `if`.
+            chain: Condition and statements of each branch.
+            test: The first condition, which is translated and charged already.
+            since: See `block`.
+            cost: See `block`.
 
         Returns:
-            For each its position, condition and statements; what to pay where none is taken; `since` at the end of the
-            one where it is largest, and where none is taken.
+            Position, condition and statements of each branch; the cost to charge if none is taken; the largest `since`
+            at the end of any branch; and `since` if none is taken.
         """
         links: list[Link] = []
         latest = since
@@ -161,7 +177,7 @@ class Statements(Expressions):
         return links, cost, latest, since
 
     def loop(self, statement: tree.While, test: ast.expr, cost: int) -> ast.stmt:
-        """Translate a loop; each turn looks at the budget."""
+        """Translate a loop, which checks the budget at the beginning of each turn."""
         at = Position.of(statement)
         self.loops += 1
         if self.loops > MOST_LOOPS:
@@ -171,7 +187,7 @@ class Statements(Expressions):
         return ast.While(test, [*at.charge(cost, check=True), *body], [], **at.given)
 
     def simple(self, statement: tree.Statement, at: Position) -> list[ast.stmt]:
-        """Translate a statement without statements inside it."""
+        """Translate a statement that contains no others."""
         match statement:
             case tree.Assign():
                 return [self.assign(statement, at)]
@@ -194,7 +210,7 @@ class Statements(Expressions):
                 raise AssertionError(statement)
 
     def word(self, statement: tree.Word, at: Position) -> list[ast.stmt]:
-        """Translate a statement of one word."""
+        """Translate a statement that is a keyword alone, such as `break`."""
         match statement.word:
             case "pass":
                 return []

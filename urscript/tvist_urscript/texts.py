@@ -2,6 +2,7 @@
 
 import re
 
+from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault
 from tvist_urscript.values import Value, integer, short, text, to_bytes, to_str, to_text, whole
 
@@ -10,20 +11,21 @@ _HEXADECIMAL = re.compile(r"\s*[+-]?0[xX][0-9a-fA-F]+\s*", re.ASCII)
 DECIMAL = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 
 
+@costs(10)
 def str_cat(op1: Value, op2: Value) -> str:
     """Return two values as one text."""
     whole_text = to_str(op1) + to_str(op2)
     return short(whole_text if whole_text.isascii() else to_text(to_bytes(whole_text)))
 
 
-def str_len(string: Value) -> int:
+def str_len(str: Value) -> int:
     """Return the number of bytes."""
-    return len(to_bytes(text(string, "the argument of str_len")))
+    return len(to_bytes(text(str, "the argument of str_len")))
 
 
-def str_empty(string: Value) -> bool:
+def str_empty(str: Value) -> bool:
     """Whether a text has no byte."""
-    return not text(string, "the argument of str_empty")
+    return not text(str, "the argument of str_empty")
 
 
 def str_at(src: Value, index: Value) -> str:
@@ -34,29 +36,27 @@ def str_at(src: Value, index: Value) -> str:
     return to_text(string[place : place + 1])
 
 
-def str_find(src: Value, target: Value, start_from: Value) -> int:
+def str_find(src: Value, target: Value, start_from: Value = 0) -> int:
     """Return the position at which a text is found, -1 where it is not."""
     string, wanted = to_bytes(text(src, "src of str_find")), to_bytes(text(target, "target of str_find"))
     start = integer(start_from, "start_from of str_find")
-    if not 0 <= start <= len(string):
-        raise _outside(start, string)
+    _check_start(start, string)
     return string.find(wanted, start)
 
 
-def str_sub(src: Value, index: Value, length: Value) -> str:
+def str_sub(src: Value, index: Value, len: Value = -1) -> str:
     """Return a part of a text; the whole rest where the length is negative or too large."""
     string, start = to_bytes(text(src, "src of str_sub")), integer(index, "the index of str_sub")
-    size = integer(length, "len of str_sub")
-    if not 0 <= start <= len(string):
-        raise _outside(start, string)
+    size = integer(len, "len of str_sub")
+    _check_start(start, string)
     return to_text(string[start:] if size < 0 else string[start : start + size])
 
 
-def to_num(string: Value) -> int | float:
+def to_num(str: Value) -> int | float:
     """Return the number that a text writes, in decimal or, with 0x before it, hexadecimal digits."""
-    if type(string) is int or type(string) is float:
-        return string
-    written = text(string, "the argument of to_num")
+    if type(str) is int or type(str) is float:
+        return str
+    written = text(str, "the argument of to_num")
     if _HEXADECIMAL.fullmatch(written):
         return whole(int(written, 16))
     if _INTEGER.fullmatch(written):
@@ -64,6 +64,11 @@ def to_num(string: Value) -> int | float:
     if DECIMAL.fullmatch(written):
         return float(written)
     raise Fault(f'the text "{written[:40]}" is no number')
+
+
+def _check_start(place: int, string: bytes) -> None:
+    if not 0 <= place <= len(string):
+        raise _outside(place, string)
 
 
 def _outside(place: int, string: bytes) -> Fault:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 MOST_THREADS = 100
-"""Threads of a program at the same time."""
+"""Most threads of a program at the same time."""
 
 
 @dataclass(eq=False)
@@ -34,11 +34,11 @@ class Thread:
 
     @property
     def ended(self) -> bool:
-        """Whether it has come to its end, or was killed."""
+        """Whether the thread has come to its end, or was killed."""
         return self.steps is None
 
     def descends_from(self, other: "Thread") -> bool:
-        """Whether the other has started it, or one of those that have; neither has ended."""
+        """Return whether this thread is the other, or was started by it, directly or by threads in between."""
         thread: Thread | None = self
         while thread is not None:
             if thread is other:
@@ -47,9 +47,9 @@ class Thread:
         return False
 
     def leave(self, others: "Iterable[Thread]") -> None:
-        """End it: nothing of it is kept, and its parent gets those that it has started.
+        """Mark the thread as ended, and make its parent the parent of the threads that it has started.
 
-        As an ended thread cannot be killed, that is the same to `kill`.
+        So `kill` of the parent still reaches them, and the ended thread need not be kept.
         """
         self.steps = None
         for other in others:

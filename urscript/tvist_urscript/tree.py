@@ -114,7 +114,7 @@ class Evaluate(Node):
 
 @dataclass(slots=True)
 class If(Node):
-    """`if`, `elif` and `else`."""
+    """An `if` with its `elif` and `else`: a condition and statements for each branch."""
 
     branches: list[tuple[Expression, list["Statement"]]]
     otherwise: list["Statement"]
@@ -122,7 +122,7 @@ class If(Node):
 
 @dataclass(slots=True)
 class While(Node):
-    """A loop."""
+    """`while`, the only loop."""
 
     condition: Expression
     body: list["Statement"]
@@ -145,7 +145,7 @@ class Handle(Node):
 
 @dataclass(slots=True)
 class Word(Node):
-    """A statement of one word."""
+    """A statement that is a keyword alone."""
 
     word: Literal["break", "continue", "halt", "pass", "enter_critical", "exit_critical"]
 

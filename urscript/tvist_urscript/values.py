@@ -7,16 +7,17 @@ variable a new list.
 from collections.abc import Iterable, Iterator
 from typing import Any, TypeAlias, TypeVar
 
+from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault
 
 LONGEST = 1000
-"""Elements of a list."""
+"""Most elements of a list."""
 LARGEST = 4000
-"""Elements of a list with those of the lists inside it."""
+"""Most elements of a list, with those of the lists inside it."""
 DEEPEST = 20
-"""Lists inside each other."""
+"""Most lists inside each other."""
 LONGEST_TEXT = 1023
-"""Bytes of a text in UTF-8."""
+"""Longest text, in bytes of UTF-8."""
 LOWEST, HIGHEST = -(2**31), 2**31 - 1
 """Integers have 32 bits; a result beyond them is a float."""
 
@@ -94,7 +95,7 @@ class Pose(Array):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Its six elements."""
+        """Its elements: x, y, z [m] and the rotation vector [rad]."""
         return self.items  # type: ignore[return-value]
 
 
@@ -235,13 +236,14 @@ def to_text(value: bytes) -> str:
     return value.decode(errors="surrogateescape")
 
 
-def to_str(value: Value) -> str:
+@costs(10)
+def to_str(val: Value) -> str:
     """Write a value as the controller does: floats with six decimals, without zeros at their end.
 
     Raises:
         Fault: The text is too long.
     """
-    return short(_written(value))
+    return short(_written(val))
 
 
 def _written(value: Value) -> str:

@@ -39,7 +39,6 @@ class LoopbackTransport(Transport):
         self._closed = False
 
     async def request(self, data: bytes, timeout_s: float) -> bytes:  # noqa: ARG002  it computes, it never waits
-        """Carry out a command."""
         self._check_open()
         reply = self._host.request(self._client, data)
         # lets tasks that iterate over the states run between two commands
@@ -47,12 +46,10 @@ class LoopbackTransport(Transport):
         return reply
 
     def put_setpoint(self, data: bytes) -> None:
-        """Pass on a set-point."""
         self._check_open()
         self._host.put_setpoint(self._client, data)
 
     async def info(self) -> bytes:
-        """Return the encoded `info`."""
         self._check_open()
         return self._host.info()
 
@@ -68,10 +65,9 @@ class LoopbackTransport(Transport):
         """Do nothing: a client in this process does not disconnect either."""
 
     async def withdraw(self, client: str) -> None:
-        """Do nothing."""
+        """Do nothing, as `announce` does nothing."""
 
     async def close(self) -> None:
-        """Unsubscribe."""
         self._closed = True
         while self._unsubscribe:
             self._unsubscribe.pop()()

@@ -124,11 +124,9 @@ class ZenohTransport(Transport):
         self._setpoints.put(data)
 
     async def info(self) -> bytes:
-        """Request the encoded `info`."""
         return await self._get(keys.info(self._robot), None, INFO_S)
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
-        """Subscribe to a topic."""
         if self._closed:
             raise self._gone()
         key = KEYS[topic](self._robot)

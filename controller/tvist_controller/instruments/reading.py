@@ -5,6 +5,7 @@ from typing import Any
 from tvist_controller.instruments.meters import Meters
 from tvist_controller.instruments.ratings import JointRating
 from tvist_controller.instruments.rigid_body import RigidBody
+from tvist_controller.instruments.variables import Vector6D
 from tvist_controller.instruments.wrench import RUNNING, ToolWrench
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode
@@ -57,17 +58,17 @@ class Reading:
         self._ratings = ratings
 
     @property
-    def target_q(self) -> list[float]:
+    def target_q(self) -> Vector6D:
         """State: reference before shaping, which is what the program or the client asks for [rad]."""
         return self.state.target_q if self.state.unshaped_q is None else self.state.unshaped_q
 
     @property
-    def target_qd(self) -> list[float]:
+    def target_qd(self) -> Vector6D:
         """State: velocity of the reference before shaping [rad/s]."""
         return self.state.target_qd if self.state.unshaped_qd is None else self.state.unshaped_qd
 
     @property
-    def target_qdd(self) -> list[float]:
+    def target_qdd(self) -> Vector6D:
         """State: acceleration of the reference before shaping [rad/s²]."""
         return self.state.target_qdd if self.state.unshaped_qdd is None else self.state.unshaped_qdd
 

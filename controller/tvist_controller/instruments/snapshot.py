@@ -5,11 +5,12 @@ from typing import Any
 from tvist_controller.instruments.joints import JointValues
 from tvist_controller.instruments.meters import Meters
 from tvist_controller.instruments.ratings import joint_ratings
-from tvist_controller.instruments.reading import POWERED
+from tvist_controller.instruments.reading import POWERED, Reading
 from tvist_controller.instruments.rigid_body import RigidBody
 from tvist_controller.instruments.status import StatusValues
 from tvist_controller.instruments.terminals import TerminalValues
 from tvist_controller.instruments.tool import ToolValues
+from tvist_controller.instruments.variables import variables
 from tvist_controller.instruments.wrench import RUNNING, ToolWrench
 from tvist_plant.description import RobotDescription
 from tvist_protocol.io import Io
@@ -18,6 +19,10 @@ from tvist_protocol.stream import State
 
 class Snapshot(StatusValues, JointValues, ToolValues, TerminalValues):
     """Every output variable of RTDE is an attribute; expensive ones are computed on first access."""
+
+
+VARIABLES = variables(Reading, *Snapshot.__bases__)
+"""RTDE's word for the type of each output variable that is no register, by name."""
 
 
 class Instruments:

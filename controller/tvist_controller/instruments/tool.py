@@ -7,6 +7,7 @@ import numpy as np
 
 from tvist_controller.instruments.reading import Reading
 from tvist_controller.instruments.rigid_body import Tool, add, carried, cross
+from tvist_controller.instruments.variables import Double, Vector3D, Vector6D
 from tvist_controller.instruments.wrench import since_zeroed
 from tvist_plant.model import Floats
 from tvist_plant.plant import GRAVITY
@@ -16,42 +17,42 @@ class ToolValues(Reading):
     """Motion and forces in Cartesian space, in the base frame unless stated otherwise."""
 
     @property
-    def tcp_offset(self) -> list[float]:
+    def tcp_offset(self) -> Vector6D:
         """Io: tool centre point in the flange frame [m, rad]."""
         return self.io.tcp_offset
 
     @property
-    def actual_TCP_pose(self) -> list[float]:
+    def actual_TCP_pose(self) -> Vector6D:
         """State: kinematics of the measured angles with the TCP offset [m, rad]."""
         return self.state.actual_TCP_pose
 
     @property
-    def actual_TCP_speed(self) -> list[float]:
+    def actual_TCP_speed(self) -> Vector6D:
         """State: kinematics of measured angles and velocities with the TCP offset [m/s, rad/s]."""
         return self.state.actual_TCP_speed
 
     @property
-    def actual_tool_accelerometer(self) -> list[float]:
+    def actual_tool_accelerometer(self) -> Vector3D:
         """State: specific force in the flange frame; at rest it points up with 9.81 [m/s²]."""
         return self.state.actual_tool_accelerometer
 
     @property
-    def target_TCP_pose(self) -> list[float]:
+    def target_TCP_pose(self) -> Vector6D:
         """Computed: kinematics of the target angles with the TCP offset [m, rad]."""
         return self._target.pose
 
     @property
-    def target_TCP_speed(self) -> list[float]:
+    def target_TCP_speed(self) -> Vector6D:
         """Computed: kinematics of target angles and velocities with the TCP offset [m/s, rad/s]."""
         return self._target.speed
 
     @property
-    def target_TCP_acceleration(self) -> list[float]:
+    def target_TCP_acceleration(self) -> Vector6D:
         """Computed: kinematics of target angles, velocities and accelerations with the TCP offset [m/s², rad/s²]."""
         return self._target.acceleration
 
     @cached_property
-    def actual_TCP_acceleration(self) -> list[float]:
+    def actual_TCP_acceleration(self) -> Vector6D:
         """Computed: the accelerometer's value without gravity, in the base frame and at the TCP [m/s², rad/s²].
 
         The angular acceleration is that of the shaped reference, since no sensor measures it.
@@ -65,7 +66,7 @@ class ToolValues(Reading):
         return linear + alpha
 
     @cached_property
-    def actual_TCP_force(self) -> list[float]:
+    def actual_TCP_force(self) -> Vector6D:
         """Computed: force at the TCP that explains the measured torques, through the Jacobian [N, N m].
 
         The torque that the shaped motion needs (rigid arm with the declared payload, rotors, friction) is subtracted
@@ -76,18 +77,18 @@ class ToolValues(Reading):
         return since_zeroed(force, self.io.tcp_force_zero)
 
     @cached_property
-    def tcp_force_scalar(self) -> float:
+    def tcp_force_scalar(self) -> Double:
         """Computed: length of the TCP force's linear part [N]."""
         x, y, z, *_ = self.actual_TCP_force
         return sqrt(x * x + y * y + z * z)
 
     @property
-    def wrench_calc_from_currents(self) -> list[float]:
+    def wrench_calc_from_currents(self) -> Vector6D:
         """Computed: the TCP force again, since it is computed from currents here [N, N m]."""
         return self.actual_TCP_force
 
     @cached_property
-    def ft_raw_wrench(self) -> list[float]:
+    def ft_raw_wrench(self) -> Vector6D:
         """Computed: wrench that a sensor between flange and payload would measure, in the flange frame [N, N m].
 
         It is the weight and inertial force of the declared payload, from the accelerometer and without the effect of
@@ -101,18 +102,18 @@ class ToolValues(Reading):
         return add(carries, pushes) + torque
 
     @cached_property
-    def collision_detection_ratio(self) -> float:
+    def collision_detection_ratio(self) -> Double:
         """Computed: largest share of a joint's torque limit by which measured torque differs from expected [-]."""
         felt: list[float] = self._felt.tolist()
         return max(abs(torque) / rating.torque for torque, rating in zip(felt, self._ratings, strict=True))
 
     @cached_property
-    def actual_momentum(self) -> float:
+    def actual_momentum(self) -> Double:
         """Computed: length of the linear momentum of links and declared payload, as measured [kg m/s]."""
         return self._rigid.momentum(self.state.actual_q, self.state.actual_qd, self.io.payload)
 
     @property
-    def elbow_position(self) -> list[float]:
+    def elbow_position(self) -> Vector3D:
         """Computed: measured position where upper arm and forearm meet on the elbow's axis [m].
 
         For an arm with fewer than three joints, it is the flange.
@@ -120,38 +121,38 @@ class ToolValues(Reading):
         return self._elbow[0]
 
     @property
-    def elbow_velocity(self) -> list[float]:
+    def elbow_velocity(self) -> Vector3D:
         """Computed: velocity of the elbow's position [m/s]."""
         return self._elbow[1]
 
     @property
-    def payload(self) -> float:
+    def payload(self) -> Double:
         """Io: declared mass [kg]."""
         return self.io.payload.mass
 
     @property
-    def payload_cog(self) -> list[float]:
+    def payload_cog(self) -> Vector3D:
         """Io: declared centre of mass in the flange frame [m]."""
         return list(self.io.payload.com)
 
     @property
-    def payload_inertia(self) -> list[float]:
+    def payload_inertia(self) -> Vector6D:
         """Io: declared inertia about the centre of mass: xx yy zz xy xz yz [kg m²]."""
         xx, xy, xz, yy, yz, zz = self.io.payload.inertia
         return [xx, yy, zz, xy, xz, yz]
 
     @property
-    def target_gravity(self) -> list[float]:
+    def target_gravity(self) -> Vector3D:
         """Constant: 0 0 9.81, the acceleration that is equivalent to gravity, for a robot on the floor [m/s²]."""
         return [0.0, 0.0, GRAVITY]
 
     @property
-    def target_base_acceleration(self) -> list[float]:
+    def target_base_acceleration(self) -> Vector6D:
         """Constant: zero; the base stands [m/s², rad/s²]."""
         return [0.0] * 6
 
     @cached_property
-    def target_base_wrench(self) -> list[float]:
+    def target_base_wrench(self) -> Vector6D:
         """Computed: force and torque at the base of the arm with the declared payload, for the target motion [N, N m].
 
         The weight of the base itself is not included.

@@ -300,7 +300,7 @@ class ProgramArm:
         """Begin a stop of what moves, which is the program's own will."""
         if self._motion.activity.moving:
             self._owe()
-        self._own = True
+        self._own = True  # so that `hear` does not take this stop for one that ends the program
         try:
             stop()
         finally:

@@ -27,6 +27,7 @@ class ScriptCompiler:
 
     def rehearse(self) -> None:
         """Build what compiling uses, before any program comes."""
+        # Once as a program, and once as a statement that is added to it, which takes other ways through the compiler.
         compile_script("sync()", SIGNATURES, compile_script("sync()", SIGNATURES))
 
     def compile(self, command: ProgramLoad | ProgramRun) -> Script | None:

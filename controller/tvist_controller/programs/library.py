@@ -1,46 +1,50 @@
 """All functions of the controller that programs can call."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arm import ProgramArm
-from tvist_controller.programs.functions import (
-    messages,
-    motions,
-    poses,
-    registers,
-    safety,
-    settings,
-    sockets,
-    state,
-    statements,
-    terminals,
-    unsimulated,
-)
+from tvist_controller.programs.functions.messages import MessageFunctions
+from tvist_controller.programs.functions.motions import MotionFunctions
+from tvist_controller.programs.functions.poses import PoseFunctions
+from tvist_controller.programs.functions.registers import RegisterFunctions
+from tvist_controller.programs.functions.safety import SafetyFunctions
+from tvist_controller.programs.functions.settings import SettingFunctions
+from tvist_controller.programs.functions.sockets import SocketFunctions
+from tvist_controller.programs.functions.state import StateFunctions
+from tvist_controller.programs.functions.statements import StatementFunctions
+from tvist_controller.programs.functions.terminals import TerminalFunctions
+from tvist_controller.programs.functions.unsimulated import MISSING, SUBJECTS, IdleFunctions
 from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.programs.popups import Popups
 from tvist_controller.programs.sockets import Sockets
 from tvist_controller.programs.watchdogs import Watchdogs
+from tvist_urscript import Signature, Signatures, signatures
 
-_MODULES = (
-    motions,
-    poses,
-    state,
-    settings,
-    registers,
-    terminals,
-    messages,
-    sockets,
-    statements,
-    safety,
-    unsimulated,
-)
-SIGNATURES = {name: one for module in _MODULES for name, one in module.SIGNATURES.items()}
-"""Signature of each function; those of the language itself are in `tvist_urscript`."""
+FAMILIES: Mapping[type, str] = {
+    MotionFunctions: "Motions",
+    PoseFunctions: "Kinematics and dynamics",
+    StateFunctions: "State",
+    SettingFunctions: "Settings",
+    RegisterFunctions: "Registers and flags",
+    TerminalFunctions: "Inputs and outputs",
+    MessageFunctions: "Messages and time",
+    SocketFunctions: "Sockets",
+    StatementFunctions: "Statements from clients",
+    SafetyFunctions: "Safety",
+}
+"""What the functions of each class are about, in the order of the documentation."""
 
-MOVING = frozenset(motions.SIGNATURES) | {"interpreter_mode"}
+SIGNATURES: Signatures = {
+    **{name: one for family in FAMILIES for name, one in signatures(family).items()},
+    **{name: Signature(given) for name, (given, _) in SUBJECTS.items()},
+    **signatures(IdleFunctions),
+}
+"""How scripts call each function; those of the language itself are in `tvist_urscript`."""
+
+MOVING = frozenset(signatures(MotionFunctions)) | {"interpreter_mode"}
 """Functions that move the arm, or let clients do so."""
 
 
@@ -54,17 +58,17 @@ def functions(
 ) -> dict[str, Callable[..., Any]]:
     """Return the functions for the programs of one robot, by name."""
     kinematics = ProgramKinematics(access.description, access.motion, arm.spend)
-    classes = {
-        motions: motions.MotionFunctions(access, arm, kinematics),
-        poses: poses.PoseFunctions(access, kinematics),
-        state: state.StateFunctions(access, arm, kinematics),
-        settings: settings.SettingFunctions(access, arm),
-        registers: registers.RegisterFunctions(access, arm),
-        terminals: terminals.TerminalFunctions(access, arm),
-        messages: messages.MessageFunctions(access, arm, popups),
-        sockets: sockets.SocketFunctions(connections, arm),
-        statements: statements.StatementFunctions(arm, queue),
-        safety: safety.SafetyFunctions(access, arm, watchdogs),
-        unsimulated: unsimulated.UnsimulatedFunctions(),
-    }
-    return {name: getattr(classes[module], name) for module in _MODULES for name in module.SIGNATURES}
+    families = (
+        MotionFunctions(access, arm, kinematics),
+        PoseFunctions(access, kinematics),
+        StateFunctions(access, arm, kinematics),
+        SettingFunctions(access, arm),
+        RegisterFunctions(access, arm),
+        TerminalFunctions(access, arm),
+        MessageFunctions(access, arm, popups),
+        SocketFunctions(connections, arm),
+        StatementFunctions(arm, queue),
+        SafetyFunctions(access, arm, watchdogs),
+        IdleFunctions(),
+    )
+    return MISSING | {name: getattr(family, name) for family in families for name in signatures(type(family))}

@@ -135,6 +135,8 @@ class ProgramPlayer:
         Args:
             tick: Number of the tick.
         """
+        # Evaluations are counted rather than timed, so that a run is the same live, in lockstep and in a replay
+        # (decision 26). What a tick takes beyond them, the next ticks pay.
         left = self._left = min(self._left, 0) + EVALUATIONS
         if not self._all:
             return
@@ -326,11 +328,11 @@ class ProgramPlayer:
         self._wait()
 
     def _wait(self) -> None:
-        """Be paused."""
+        """Pause the program: none of its threads has a turn any more, from this tick on."""
         self.state = "PAUSED"
         if self._main is not None:
             self.line = self._main.machine.line
-            self._main.machine.left = 0  # in this tick, none of its threads has a turn any more
+            self._main.machine.left = 0
 
     def _check_running(self, command: str) -> None:
         """Refuse to start a program where the arm has no power or is in a protective stop."""

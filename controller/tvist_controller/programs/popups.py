@@ -25,7 +25,7 @@ class Popups:
         """Show a popup.
 
         Args:
-            text: What it says.
+            text: The message.
             title: Its title.
             kind: `message`, `warning` or `error`.
             blocking: Whether the program waits until it is closed.

@@ -17,14 +17,14 @@ LONGEST_LINE = 1023
 
 
 def integers(received: bytes, number: int) -> tuple[tuple[int, ...], int] | None:
-    """Cut integers of 32 bits in network byte order."""
+    """Cut this many integers of 32 bits in network byte order."""
     if len(received) < 4 * number:
         return None
     return unpack_from(f">{number}i", received), 4 * number
 
 
 def octets(received: bytes, number: int) -> tuple[tuple[int, ...], int] | None:
-    """Cut single bytes."""
+    """Cut this many bytes, each as a number."""
     return None if len(received) < number else (tuple(received[:number]), number)
 
 

@@ -72,7 +72,7 @@ class Wait(NamedTuple):
 
 
 class Waited(NamedTuple):
-    """A wait is over."""
+    """A wait is over, so that no time has to be kept for it any more."""
 
     wait: int
 

@@ -26,7 +26,7 @@ from tvist_plant.plant import PERIOD
 from tvist_urscript import Fault, Machine
 
 MAX_SOCKETS = 16
-"""Sockets that a program may have at a time."""
+"""Most sockets of a program at a time."""
 
 T = TypeVar("T")
 Take = Callable[[bytes], tuple[T, int] | None]

@@ -2,23 +2,10 @@
 
 from collections.abc import Sequence
 from inspect import getdoc
-from types import ModuleType
 
-from tvist_controller.programs.functions import (
-    messages,
-    motions,
-    poses,
-    registers,
-    safety,
-    settings,
-    sockets,
-    state,
-    statements,
-    terminals,
-    unsimulated,
-)
-from tvist_controller.programs.library import SIGNATURES
-from tvist_urscript.signatures import REQUIRED, Signature
+from tvist_controller.programs.functions.unsimulated import SUBJECTS, IdleFunctions
+from tvist_controller.programs.library import FAMILIES, SIGNATURES
+from tvist_urscript import REQUIRED, Signature, signatures
 
 HEAD = """# Functions of programs
 
@@ -35,27 +22,15 @@ reads is of the present. A function that waits ends the path: the arm then stops
 COSTS = """Evaluations that a call takes from [the budget](urscript.md#5-threads), in proportion to its time; all others
 take one. Inverse kinematics takes 900 more where a joint is free, since it then searches a curve of postures, or where
 an arm has no closed form."""
-SUBJECTS: tuple[tuple[str, ModuleType, type], ...] = (
-    ("Motions", motions, motions.MotionFunctions),
-    ("Kinematics and dynamics", poses, poses.PoseFunctions),
-    ("State", state, state.StateFunctions),
-    ("Settings", settings, settings.SettingFunctions),
-    ("Registers and flags", registers, registers.RegisterFunctions),
-    ("Inputs and outputs", terminals, terminals.TerminalFunctions),
-    ("Messages and time", messages, messages.MessageFunctions),
-    ("Sockets", sockets, sockets.SocketFunctions),
-    ("Statements from clients", statements, statements.StatementFunctions),
-    ("Safety", safety, safety.SafetyFunctions),
-)
 
 
 def page() -> str:
-    """The whole page."""
+    """Return the page of reference that lists all functions."""
     parts = [HEAD]
-    for title, module, functions in SUBJECTS:
+    for functions, title in FAMILIES.items():
         rows = [
             (f"`{_call(name, one)}`", "waits" if one.blocks else "", _what(functions, name))
-            for name, one in module.SIGNATURES.items()
+            for name, one in signatures(functions).items()
         ]
         parts.append(f"## {title}\n\n{_table(('function', '', 'what'), rows)}\n")
     costs = sorted({one.cost for one in SIGNATURES.values() if one.cost > 1}, reverse=True)
@@ -66,9 +41,9 @@ def page() -> str:
     parts.append(f"## Costs\n\n{COSTS}\n\n{_table(('evaluations', 'functions'), dear)}\n")
     missing = [
         (f"`{name}`", what)
-        for name, (_, what) in sorted(unsimulated.SUBJECTS.items(), key=lambda row: row[::-1])
+        for name, (_, what) in sorted(SUBJECTS.items(), key=lambda row: (row[1][1], row[0]))
     ]
-    idle = ", ".join(f"`{name}`" for name in unsimulated.IDLE)
+    idle = ", ".join(f"`{name}`" for name in signatures(IdleFunctions))
     parts.append(
         "## Not simulated\n\nThese end the program with an error that says so. "
         f"{idle} succeed, since what they set or end is never going on.\n\n{_table(('function', 'subject'), missing)}\n"

@@ -36,6 +36,7 @@ UINT64 actual_digital_input_bits actual_digital_output_bits actual_configurable_
 UINT64 actual_configurable_digital_output_bits control_step
 UINT8 tool_output_mode tool_digital_output0_mode tool_digital_output1_mode
 """
+"""Types that UR publishes: the second opinion on the annotations from which the server takes them."""
 OUTPUT_TYPES = {name: line.split()[0] for line in NAMED.strip().splitlines() for name in line.split()[1:]}
 for bank in ("output", "input"):
     OUTPUT_TYPES |= {f"{bank}_bit_register_{k}": "BOOL" for k in range(64, 128)}

@@ -1,11 +1,15 @@
 """Where the interfaces are: addresses, ports, and what is refused before anything is opened."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from tvist_server.config import ConfigError, ServeConfig, from_mapping
 from tvist_server.gateways.exposure import ExposureError, guarded_interfaces
-from tvist_server.ur_ports import UrPorts
+from tvist_server.ur_ports import WITHOUT_JOINTS, UrPorts
 
+SEVEN = Path(__file__).parents[2] / "plant" / "urdf" / "seven.urdf"
 EVERYWHERE = "0.0.0.0"  # noqa: S104  it is refused
 
 
@@ -41,6 +45,19 @@ def test_of_several_robots_each_has_the_next_address():
 def test_an_address_that_is_none_is_named(values, named):
     with pytest.raises(ConfigError, match=named):
         config(**values).interfaces(0)
+
+
+def test_an_arm_with_seven_joints_is_refused_since_the_last_would_be_missing():
+    seven = {"robot": str(SEVEN), "calibration": "none"}
+    with pytest.raises(ConfigError, match="the robot seven has 7 joints") as refused:
+        config(**seven).setups()
+    assert "without --ur" in str(refused.value)
+    options = re.findall(r"--ur-port (\w+)=off", str(refused.value))
+    assert config(**seven, ur_ports=dict.fromkeys(options, 0)).setups()[0].description.joints == 7
+    assert set(UrPorts().open()) - set(options) == WITHOUT_JOINTS
+    with pytest.raises(ConfigError, match="--ur-port rtde=off"):
+        config(robots=f"ur5e,{SEVEN}", calibration="none").setups()
+    assert from_mapping(seven, "tvist.toml").setups()[0].description.joints == 7
 
 
 def test_everywhere_is_no_address_for_several():

@@ -26,7 +26,7 @@ class DistantMetrics(MetricsGateway):
         session.declare_subscriber(keys.telemetry(robot), Callback(self._on_telemetry, indirect=False))
 
     def look(self) -> None:
-        """Take the newest state."""
+        """Take the newest state that has arrived over the network; to be called before the figures are read."""
         sample = self._states.try_recv()
         if sample is not None:
             self.state = decode_state(sample.payload.to_bytes())

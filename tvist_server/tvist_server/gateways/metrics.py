@@ -40,7 +40,6 @@ class MetricsGateway(Gateway):
         """Number of events of each kind."""
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  every gateway gets it
-        """Keep a message."""
         if isinstance(message, State):
             self.state = message
         elif isinstance(message, Telemetry):
@@ -94,7 +93,7 @@ class Metrics(Collector):
         self._robots.append(gateway)
 
     def close(self) -> None:
-        """Stop listening."""
+        """Stop publishing the page."""
         with contextlib.suppress(OSError):
             self._server.shutdown()
             self._server.server_close()

@@ -84,7 +84,7 @@ class Router:
         self._session = open_router(endpoints, connect, settings, security)
 
     def close(self) -> None:
-        """Disconnect everyone."""
+        """Close the router, which disconnects all robots and clients."""
         close_session(self._session)
 
 

@@ -211,14 +211,13 @@ class ProgramSockets(Gateway, SocketPorts):
         """Ignore what the robot publishes."""
 
     async def open(self) -> None:
-        """Begin to connect."""
         self._loop = asyncio.get_running_loop()
         early, self._early = self._early or [], None
         for action in early:
             action()
 
     async def shut(self) -> None:
-        """Close all sockets."""
+        """Close all sockets, and ignore further orders of programs."""
         self._loop = None
         for link in tuple(self._links.values()):
             link.end()

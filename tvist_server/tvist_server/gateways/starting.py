@@ -23,11 +23,9 @@ class Starting(Queried):
         self._how_far = f"{done} of {total} kernels are compiled; "
 
     def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  whatever it is
-        """Refuse a command."""
         answer(self._refused())
 
     def info(self, answer: Callable[[bytes], None]) -> None:
-        """Refuse to describe the robot."""
         answer(encode(self._refused()))
 
     def _refused(self) -> Refused:

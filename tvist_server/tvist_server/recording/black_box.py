@@ -55,16 +55,13 @@ class BlackBox(Sink):
             self._write(state.tick)
 
     def event(self, event: Event) -> None:
-        """Keep an event."""
         self._kept.append(event)
         self._failed |= event.code == "plant_failure"
 
     def truth(self, truth: Truth) -> None:
-        """Keep values that a real robot cannot measure."""
         self._kept.append(truth)
 
     def io(self, io: Io) -> None:
-        """Keep inputs, outputs and registers."""
         self._kept.append(io)
 
     def journal(self, entry: Entry) -> None:

@@ -43,7 +43,7 @@ class OneFile:
             raise
 
     def write(self, message: Recorded) -> None:
-        """Add a message."""
+        """Write a message into the present chunk."""
         self._writer.write(message)
 
     def flush(self) -> None:
@@ -59,5 +59,5 @@ class OneFile:
         return self._stream.fileno()
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; without `finish` before, it has no index."""
         self._stream.close()

@@ -112,23 +112,18 @@ class Recorder(Sink):
         self._thread.start()
 
     def state(self, state: State) -> None:
-        """Record one tick."""
         self._offer(state)
 
     def event(self, event: Event) -> None:
-        """Record an event."""
         self._offer(event)
 
     def truth(self, truth: Truth) -> None:
-        """Record one tick of values that a real robot cannot measure."""
         self._offer(truth)
 
     def io(self, io: Io) -> None:
-        """Record inputs, outputs and registers."""
         self._offer(io)
 
     def journal(self, entry: Entry) -> None:
-        """Record an input of the controller."""
         self._offer(entry)
 
     @property

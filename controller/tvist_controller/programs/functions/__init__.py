@@ -1,1 +1,1 @@
-"""The controller's functions in programs, by subject: each module has their signatures and a class that runs them."""
+"""The controller's functions in programs, by subject: scripts call the public methods of each module's class."""

@@ -6,19 +6,12 @@ from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.popups import Popups
 from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import PopupKind
-from tvist_urscript import Array, Value, signature, to_str
+from tvist_urscript import Array, Value, costs, to_str
 
 LONGEST_TEXT = 350
 """Elements of a list that fit into a text."""
 LONGEST_SLEEP = 1e6
-"""[s]"""
-
-SIGNATURES = {
-    "textmsg": signature('s1, s2=""', cost=30),
-    "popup": signature('s, title="Popup", warning=False, error=False, blocking=False', blocks=True, cost=20),
-    "sync": signature("", blocks=True),
-    "sleep": signature("t", blocks=True),
-}
+"""Longest time of `sleep` [s]."""
 
 
 class MessageFunctions:
@@ -33,12 +26,21 @@ class MessageFunctions:
     def __init__(self, access: Access, arm: ProgramArm, popups: Popups) -> None:
         self._access, self._arm, self._popups = access, arm, popups
 
-    def textmsg(self, s1: Value, s2: Value) -> None:
+    @costs(30)
+    def textmsg(self, s1: Value, s2: Value = "") -> None:
         """Write a line to the log, which clients of the primary interface get."""
         text = readable(f"{self._written(s1)}{self._written(s2)}")
         self._arm.then(lambda: self._access.emit("text", why=text))
 
-    def popup(self, s: Value, title: Value, warning: object, error: object, blocking: object) -> Turns:
+    @costs(20)
+    def popup(
+        self,
+        s: Value,
+        title: Value = "Popup",
+        warning: object = False,
+        error: object = False,
+        blocking: object = False,
+    ) -> Turns:
         """Show a message; with `blocking`, wait until somebody closes it."""
         text, head = readable(self._written(s)), readable(self._written(title))
         kind: PopupKind = (

@@ -15,7 +15,7 @@ from tvist_controller.trajectory import Guided, JointSpeed, ToolSpeed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
 from tvist_protocol.transitions import Activity
-from tvist_urscript import Array, Fault, signature
+from tvist_urscript import Array, Fault, costs
 
 MAX_BLEND: Final = 10.0
 LONGEST: Final = 3600.0
@@ -24,21 +24,6 @@ CLOSE: Final = 1e-3
 """Distance at which `servoc` has arrived [m, and rad times `TURN`]."""
 TURN: Final = 0.25
 """Length that a turn of 1 rad counts as [m]."""
-
-SIGNATURES = {
-    "movej": signature("q, a=1.4, v=1.05, t=0, r=0", blocks=True, cost=180),
-    "movel": signature("pose, a=1.2, v=0.25, t=0, r=0", blocks=True, cost=60),
-    "movep": signature("pose, a=1.2, v=0.25, r=0", blocks=True, cost=60),
-    "movec": signature("pose_via, pose_to, a=1.2, v=0.25, r=0, mode=0", blocks=True, cost=100),
-    "optimovej": signature("goal, a=0.3, v=0.3, r=0", blocks=True, cost=180),
-    "optimovel": signature("goal, a=0.3, v=0.3, r=0", blocks=True, cost=60),
-    "servoj": signature("q, a=0, v=0, t=0.002, lookahead_time=0.1, gain=300", blocks=True, cost=120),
-    "servoc": signature("pose, a=1.2, v=0.25, r=0", blocks=True, cost=200),
-    "speedj": signature("qd, a=1.4, t=None", blocks=True, cost=100),
-    "speedl": signature("xd, a=1.2, t=None, aRot=None", blocks=True, cost=120),
-    "stopj": signature("a=2", blocks=True, cost=150),
-    "stopl": signature("a=1.2, aRot=None", blocks=True, cost=150),
-}
 
 
 class MotionFunctions:
@@ -57,7 +42,8 @@ class MotionFunctions:
 
     # ------------------------------------------------------------------ planned moves
 
-    def movej(self, q: object, a: object, v: object, t: object, r: object) -> Turns:
+    @costs(180)
+    def movej(self, q: object, a: object = 1.4, v: object = 1.05, t: object = 0, r: object = 0) -> Turns:
         """Move all joints in phase to joint positions, or to those nearest that reach a pose."""
         posture = self._posture("q", q)
         segment = JointSegment(
@@ -69,7 +55,8 @@ class MotionFunctions:
         )
         yield from self._arm.follow(segment)
 
-    def movel(self, pose: object, a: object, v: object, t: object, r: object) -> Turns:
+    @costs(60)
+    def movel(self, pose: object, a: object = 1.2, v: object = 0.25, t: object = 0, r: object = 0) -> Turns:
         """Move the tool on a straight line to a pose, or to the one at joint positions."""
         segment = LineSegment(
             pose=self._pose("pose", pose),
@@ -80,7 +67,8 @@ class MotionFunctions:
         )
         yield from self._arm.follow(segment)
 
-    def movep(self, pose: object, a: object, v: object, r: object) -> Turns:
+    @costs(60)
+    def movep(self, pose: object, a: object = 1.2, v: object = 0.25, r: object = 0) -> Turns:
         """Move the tool on a straight line at a constant speed, also in the blend at its end."""
         segment = ProcessSegment(
             pose=self._pose("pose", pose),
@@ -90,8 +78,15 @@ class MotionFunctions:
         )
         yield from self._arm.follow(segment)
 
+    @costs(100)
     def movec(
-        self, pose_via: object, pose_to: object, a: object, v: object, r: object, mode: object
+        self,
+        pose_via: object,
+        pose_to: object,
+        a: object = 1.2,
+        v: object = 0.25,
+        r: object = 0,
+        mode: object = 0,
     ) -> Turns:
         """Move the tool on an arc through the position of one pose to another."""
         segment = ArcSegment(
@@ -104,20 +99,29 @@ class MotionFunctions:
         )
         yield from self._arm.follow(segment)
 
-    def optimovej(self, goal: object, a: object, v: object, r: object) -> Turns:
+    @costs(180)
+    def optimovej(self, goal: object, a: object = 0.3, v: object = 0.3, r: object = 0) -> Turns:
         """Move the joints with shares of the arm's largest acceleration and velocity."""
         acceleration, velocity = _share("a", a), _share("v", v)
         yield from self.movej(goal, acceleration * self._acceleration, velocity * self._velocity, 0, r)
 
-    def optimovel(self, goal: object, a: object, v: object, r: object) -> Turns:
+    @costs(60)
+    def optimovel(self, goal: object, a: object = 0.3, v: object = 0.3, r: object = 0) -> Turns:
         """Move the tool on a line with shares of the largest acceleration and speed, which the joints limit further."""
         acceleration, velocity = _share("a", a), _share("v", v)
         yield from self.movel(goal, acceleration * MAX_TOOL[1], velocity * MAX_TOOL[0], 0, r)
 
     # ------------------------------------------------------------------ guided motions
 
+    @costs(120)
     def servoj(
-        self, q: object, a: object, v: object, t: object, lookahead_time: object, gain: object
+        self,
+        q: object,
+        a: object = 0,
+        v: object = 0,
+        t: object = 0.002,
+        lookahead_time: object = 0.1,
+        gain: object = 300,
     ) -> Turns:
         """Follow joint positions for a time; `a` and `v` have no effect, as on UR's robots."""
         posture = np.array(self._posture("q", q))
@@ -133,7 +137,8 @@ class MotionFunctions:
 
         yield from self._arm.guide(start, lambda: iter([None] * max(ticks, 1)))
 
-    def servoc(self, pose: object, a: object, v: object, r: object) -> Turns:
+    @costs(200)
+    def servoc(self, pose: object, a: object = 1.2, v: object = 0.25, r: object = 0) -> Turns:
         """Move the tool towards a pose at a speed; the next call may replace the pose in motion."""
         goal = self._pose("pose", pose)
         acceleration, velocity = _tool("a", a, "acceleration"), _tool("v", v, "velocity")
@@ -161,7 +166,8 @@ class MotionFunctions:
 
         yield from self._arm.guide(start, wait)
 
-    def speedj(self, qd: object, a: object, t: object) -> Turns:
+    @costs(100)
+    def speedj(self, qd: object, a: object = 1.4, t: object = None) -> Turns:
         """Approach velocities of the joints, and keep them; return after a time, or when they are reached."""
         joints, most = self._access.description.joints, self._access.description.limits.velocity
         wanted = np.array(numbers("qd", qd, joints))
@@ -173,26 +179,29 @@ class MotionFunctions:
 
         yield from self._arm.guide(start, self._wait(t))
 
-    def speedl(self, xd: object, a: object, t: object, a_rot: object) -> Turns:
+    @costs(120)
+    def speedl(self, xd: object, a: object = 1.2, t: object = None, aRot: object = None) -> Turns:
         """Approach a velocity of the tool in the base frame, and keep it; see `speedj`."""
         twist = np.array(numbers("xd", xd, 6))
         acceleration = _tool("a", a, "acceleration")
-        angular = acceleration if a_rot is None else positive("aRot", a_rot, 1e5)
+        angular = acceleration if aRot is None else positive("aRot", aRot, 1e5)
 
         def start(shaped: bool) -> int:
             return self._access.guidance.move_tool(twist, acceleration, angular, shaped=shaped)
 
         yield from self._arm.guide(start, self._wait(t))
 
-    def stopj(self, a: object) -> Turns:
+    @costs(150)
+    def stopj(self, a: object = 2) -> Turns:
         """Stop with a deceleration of the joints."""
         deceleration = self._within(positive("a", a), "acceleration", self._acceleration)
         yield from self._arm.halt(lambda: self._access.guidance.stop_joints(deceleration))
 
-    def stopl(self, a: object, a_rot: object) -> Turns:
+    @costs(150)
+    def stopl(self, a: object = 1.2, aRot: object = None) -> Turns:
         """Stop with a deceleration of the tool."""
         deceleration = _tool("a", a, "acceleration")
-        angular = deceleration if a_rot is None else positive("aRot", a_rot, 1e5)
+        angular = deceleration if aRot is None else positive("aRot", aRot, 1e5)
         yield from self._arm.halt(lambda: self._access.guidance.stop_tool(deceleration, angular))
 
     # ------------------------------------------------------------------ arguments

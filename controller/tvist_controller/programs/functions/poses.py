@@ -5,21 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.programs import arguments
 from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import a_list, a_pose, is_pose, numbers, pose
+from tvist_controller.programs.arguments import a_list, a_pose, is_pose, numbers
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.refusal import RefusalError, check_joints
-from tvist_urscript import Array, Fault, Pose, signature
-
-_INVERSE = "x, qnear=None, maxPositionError=1e-10, maxOrientationError=1e-10, tcp=None"
-SIGNATURES = {
-    "get_inverse_kin": signature(_INVERSE, cost=150),
-    "get_inverse_kin_has_solution": signature(_INVERSE, cost=150),
-    "get_forward_kin": signature("q=None, tcp=None", cost=80),
-    "is_within_safety_limits": signature("pose, qNear=None", cost=200),
-    "get_jacobian": signature("q=None, tcp=None", cost=110),
-    "get_mass_matrix": signature("q=None, include_rotors_inertia=True", cost=280),
-}
+from tvist_urscript import Array, Fault, Pose, costs
 
 
 class PoseFunctions:
@@ -35,33 +26,47 @@ class PoseFunctions:
         self._joints = access.description.joints
         self._dynamics = InverseDynamics(access.description, access.motion.cycle.line.dynamics.payload)
 
+    @costs(150)
     def get_inverse_kin(
-        self, x: object, qnear: object, position_error: object, orientation_error: object, tcp: object
+        self,
+        x: object,
+        qnear: object = None,
+        maxPositionError: object = 1e-10,
+        maxOrientationError: object = 1e-10,
+        tcp: object = None,
     ) -> Array:
         """Return the joint positions nearest to others, or to the present ones, at which the tool has a pose.
 
         The solution is exact to rounding, so both errors are met whatever they are.
         """
-        del position_error, orientation_error
-        return a_list(self._kinematics.posture(pose("x", x), self._near(qnear), _tool(tcp)))
+        del maxPositionError, maxOrientationError
+        return a_list(self._kinematics.posture(arguments.pose("x", x), self._near(qnear), _tool(tcp)))
 
+    @costs(150)
     def get_inverse_kin_has_solution(
-        self, x: object, qnear: object, position_error: object, orientation_error: object, tcp: object
+        self,
+        x: object,
+        qnear: object = None,
+        maxPositionError: object = 1e-10,
+        maxOrientationError: object = 1e-10,
+        tcp: object = None,
     ) -> bool:
         """Return whether `get_inverse_kin` has an answer."""
-        del position_error, orientation_error
-        return self._solution(pose("x", x), self._near(qnear), _tool(tcp)) is not None
+        del maxPositionError, maxOrientationError
+        return self._solution(arguments.pose("x", x), self._near(qnear), _tool(tcp)) is not None
 
-    def get_forward_kin(self, q: object, tcp: object) -> Pose:
+    @costs(80)
+    def get_forward_kin(self, q: object = None, tcp: object = None) -> Pose:
         """Return the pose of the tool at joint positions, or at the measured ones."""
         return a_pose(self._kinematics.tool_pose(self._posture(q), _tool(tcp)))
 
-    def is_within_safety_limits(self, target: object, near: object) -> bool:
+    @costs(200)
+    def is_within_safety_limits(self, pose: object, qNear: object = None) -> bool:
         """Return whether the arm can be at a pose or at joint positions: within their range, without a collision."""
-        if is_pose(target):
-            q = self._solution(pose("pose", target), self._near(near))
+        if is_pose(pose):
+            q = self._solution(arguments.pose("pose", pose), self._near(qNear))
         else:
-            q = numbers("pose", target, self._joints)
+            q = numbers("pose", pose, self._joints)
         if q is None:
             return False
         try:
@@ -70,12 +75,14 @@ class PoseFunctions:
             return False
         return self._access.motion.collisions.meeting(np.array(q)) is None
 
-    def get_jacobian(self, q: object, tcp: object) -> Array:
+    @costs(110)
+    def get_jacobian(self, q: object = None, tcp: object = None) -> Array:
         """Return the Jacobian of the tool in the base frame, rows for velocity and angular velocity."""
         matrix = self._kinematics.jacobian(self._posture(q), _tool(tcp))
         return Array(tuple(a_list(row) for row in matrix.tolist()))
 
-    def get_mass_matrix(self, q: object, include_rotors_inertia: object) -> Array:
+    @costs(280)
+    def get_mass_matrix(self, q: object = None, include_rotors_inertia: object = True) -> Array:
         """Return the inertia matrix of the joints with the declared payload [kg m^2]."""
         self._dynamics.believe(self._access.motion.cycle.line.dynamics.bodies)
         matrix = self._dynamics.inertia(self._posture(q))
@@ -104,4 +111,4 @@ class PoseFunctions:
 
 
 def _tool(tcp: object) -> Sequence[float] | None:
-    return None if tcp is None else pose("tcp", tcp)
+    return None if tcp is None else arguments.pose("tcp", tcp)

@@ -5,24 +5,10 @@ from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number
 from tvist_controller.programs.arm import ProgramArm
 from tvist_protocol.io import BITS, NUMBERS
-from tvist_urscript import signature
+from tvist_urscript import costs
 
 FLAGS = 32
 """Number of flags, which only programs have."""
-
-SIGNATURES = {
-    **{
-        f"read_{side}_{kind}_register": signature("address")
-        for side in ("input", "output")
-        for kind in ("boolean", "integer", "float")
-    },
-    **{
-        f"write_output_{kind}_register": signature("address, value", cost=4)
-        for kind in ("boolean", "integer", "float")
-    },
-    "get_flag": signature("n"),
-    "set_flag": signature("n, value", cost=3),
-}
 
 
 class RegisterFunctions:
@@ -38,50 +24,54 @@ class RegisterFunctions:
         self._flags = [False] * FLAGS
 
     def read_input_boolean_register(self, address: object) -> bool:
-        """Read a bit that a client writes."""
+        """Read an input bit, which clients write."""
         return self._registers.bit("input_bit", integer("address", address, 0, BITS - 1))
 
     def read_input_integer_register(self, address: object) -> int:
-        """Read an integer that a client writes."""
+        """Read an input integer, which clients write."""
         return self._registers.integers("input_int")[integer("address", address, 0, NUMBERS - 1)]
 
     def read_input_float_register(self, address: object) -> float:
-        """Read a number that a client writes."""
+        """Read an input number, which clients write."""
         return self._registers.doubles("input_double")[integer("address", address, 0, NUMBERS - 1)]
 
     def read_output_boolean_register(self, address: object) -> bool:
-        """Read a bit that programs write."""
+        """Read an output bit, which programs write."""
         return self._registers.bit("output_bit", integer("address", address, 0, BITS - 1))
 
     def read_output_integer_register(self, address: object) -> int:
-        """Read an integer that programs write."""
+        """Read an output integer, which programs write."""
         return self._registers.integers("output_int")[integer("address", address, 0, NUMBERS - 1)]
 
     def read_output_float_register(self, address: object) -> float:
-        """Read a number that programs write."""
+        """Read an output number, which programs write."""
         return self._registers.doubles("output_double")[integer("address", address, 0, NUMBERS - 1)]
 
+    @costs(4)
     def write_output_boolean_register(self, address: object, value: object) -> None:
-        """Write a bit for clients."""
+        """Write an output bit, which clients read."""
         place, bit = integer("address", address, 0, BITS - 1), flag("value", value)
         self._arm.then(lambda: self._registers.write("output_bit", place, bit))
 
+    @costs(4)
     def write_output_integer_register(self, address: object, value: object) -> None:
-        """Write an integer for clients."""
+        """Write an output integer of 32 bits, which clients read."""
         place, wanted = integer("address", address, 0, NUMBERS - 1), integer("value", value, LEAST, MOST)
         self._arm.then(lambda: self._registers.write("output_int", place, wanted))
 
+    @costs(4)
     def write_output_float_register(self, address: object, value: object) -> None:
-        """Write a number for clients."""
+        """Write an output number, which clients read."""
         place, wanted = integer("address", address, 0, NUMBERS - 1), number("value", value)
         self._arm.then(lambda: self._registers.write("output_double", place, wanted))
 
     def get_flag(self, n: object) -> bool:
-        """Return a flag."""
+        """Return one of 32 flags, which only programs can read and set."""
         return self._flags[integer("n", n, 0, FLAGS - 1)]
 
+    @costs(3)
     def set_flag(self, n: object, value: object) -> None:
-        """Set a flag."""
+        """Set one of the flags."""
         place, wanted = integer("n", n, 0, FLAGS - 1), flag("value", value)
 
         def write() -> None:

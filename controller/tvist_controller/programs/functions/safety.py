@@ -4,12 +4,7 @@ from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import positive, shown
 from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.watchdogs import Watchdogs
-from tvist_urscript import Fault, signature
-
-SIGNATURES = {
-    "protective_stop": signature("", blocks=True, cost=10),
-    "rtde_set_watchdog": signature('variable_name, min_frequency, action="pause"', cost=5),
-}
+from tvist_urscript import Fault, costs
 
 
 class SafetyFunctions:
@@ -24,6 +19,7 @@ class SafetyFunctions:
     def __init__(self, access: Access, arm: ProgramArm, watchdogs: Watchdogs) -> None:
         self._access, self._arm, self._watchdogs = access, arm, watchdogs
 
+    @costs(10)
     def protective_stop(self) -> Turns:
         """Make a protective stop, which pauses the program here; a secondary program waits until it is unlocked."""
         motion = self._access.motion
@@ -31,7 +27,10 @@ class SafetyFunctions:
         while motion.activity.protective:
             yield
 
-    def rtde_set_watchdog(self, variable_name: object, min_frequency: object, action: object) -> None:
+    @costs(5)
+    def rtde_set_watchdog(
+        self, variable_name: object, min_frequency: object, action: object = "pause"
+    ) -> None:
         """Pause or stop the program when a client writes an input of RTDE less often than a frequency [Hz]."""
         if action not in {"pause", "stop", "ignore"}:
             raise Fault(f'action is {shown(action)}: it must be "pause", "stop" or "ignore"')

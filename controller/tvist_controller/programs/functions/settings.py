@@ -8,21 +8,11 @@ from tvist_controller.programs.moves import OWN_TOKEN
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.io import SetTcp
-from tvist_urscript import Fault, signature
+from tvist_urscript import Fault, costs
 
 GRAVITY = 9.82
 """Gravity that programs declare, within `TOLERANCE`; the simulated arm stands upright and knows no other [m/s^2]."""
 TOLERANCE = 0.05
-
-SIGNATURES = {
-    "set_tcp": signature('tcp, tcp_name=""', blocks=True, cost=5),
-    "set_payload": signature("m, cog=None", blocks=True, cost=20),
-    "set_payload_mass": signature("m", blocks=True, cost=20),
-    "set_payload_cog": signature("cog", blocks=True, cost=20),
-    "set_target_payload": signature("m, cog, inertia=None, transition_time=0", blocks=True, cost=20),
-    "set_gravity": signature("d"),
-    "zero_ftsensor": signature("", cost=80),
-}
 
 
 class SettingFunctions:
@@ -36,28 +26,35 @@ class SettingFunctions:
     def __init__(self, access: Access, arm: ProgramArm) -> None:
         self._access, self._arm = access, arm
 
-    def set_tcp(self, tcp: object, tcp_name: object) -> Turns:
+    @costs(5)
+    def set_tcp(self, tcp: object, tcp_name: object = "") -> Turns:
         """Set the tool centre point in the flange frame."""
         del tcp_name  # names are for people
         yield from self._arm.finish()
         self._send(SetTcp(token=OWN_TOKEN, offset=pose("tcp", tcp)))
 
-    def set_payload(self, m: object, cog: object) -> Turns:
+    @costs(20)
+    def set_payload(self, m: object, cog: object = None) -> Turns:
         """Declare a payload without inertia; without a centre of mass, it is at the tool centre point."""
         com = self._access.motion.tcp[:3] if cog is None else numbers("cog", cog, 3)
         yield from self._declare(number("m", m, 0.0), com, (0.0,) * 6)
 
+    @costs(20)
     def set_payload_mass(self, m: object) -> Turns:
         """Change the mass of the declared payload."""
         declared = self._access.declared()
         yield from self._declare(number("m", m, 0.0), declared.com, declared.inertia)
 
+    @costs(20)
     def set_payload_cog(self, cog: object) -> Turns:
         """Change the centre of mass of the declared payload."""
         declared = self._access.declared()
         yield from self._declare(declared.mass, numbers("cog", cog, 3), declared.inertia)
 
-    def set_target_payload(self, m: object, cog: object, inertia: object, transition_time: object) -> Turns:
+    @costs(20)
+    def set_target_payload(
+        self, m: object, cog: object, inertia: object = None, transition_time: object = 0
+    ) -> Turns:
         """Declare a payload with its inertia, Ixx Iyy Izz Ixy Ixz Iyz, in a time."""
         seconds = number("transition_time", transition_time, 0.0, 3600.0)
         xx, yy, zz, xy, xz, yz = (0.0,) * 6 if inertia is None else numbers("inertia", inertia, 6)
@@ -79,6 +76,7 @@ class SettingFunctions:
             raise Fault(f"set_gravity: d is [{x:g}, {y:g}, {z:g}]; the simulated arm stands upright, so it must be "
                         f"[0, 0, {GRAVITY}]")  # fmt: skip
 
+    @costs(80)
     def zero_ftsensor(self) -> None:
         """Take the present force and torque at the tool as zero."""
         self._access.zero_wrench()
@@ -90,6 +88,8 @@ class SettingFunctions:
         six = (inertia[0], inertia[1], inertia[2], inertia[3], inertia[4], inertia[5])
         yield from self._arm.finish()
         command = SetPayload(token=OWN_TOKEN, mass=mass, com=xyz, inertia=six, transition_time=seconds)
+        # Planned beside the ticks and taken after a fixed number of them, as a move is: so it takes effect at the same
+        # tick on every machine (decision 26).
         ordered = self._access.order(command)
         for _ in range(DELAY):
             yield

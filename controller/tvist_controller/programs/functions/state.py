@@ -12,47 +12,7 @@ from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
 from tvist_protocol.stream import State
-from tvist_urscript import Array, Pose, signature
-
-_PLAIN = (
-    "get_steptime",
-    "get_actual_joint_positions",
-    "get_joint_positions",
-    "get_actual_joint_speeds",
-    "get_target_joint_positions",
-    "get_target_joint_speeds",
-    "get_target_joint_accelerations",
-    "get_actual_tcp_pose",
-    "get_actual_tcp_speed",
-    "get_target_tcp_pose",
-    "get_target_tcp_speed",
-    "get_actual_tool_flange_pose",
-    "get_target_waypoint",
-    "get_tcp_offset",
-    "get_target_payload",
-    "get_target_payload_cog",
-    "get_target_payload_inertia",
-    "get_joint_torques",
-    "get_tcp_force",
-    "force",
-    "is_steady",
-    "get_tool_accelerometer_reading",
-)
-SIGNATURES = {
-    **{name: signature("") for name in _PLAIN},
-    **{
-        name: signature("", cost=50)
-        for name in (
-            "get_actual_tcp_pose",
-            "get_target_tcp_pose",
-            "get_target_tcp_speed",
-            "get_actual_tool_flange_pose",
-            "get_target_waypoint",
-        )
-    },
-    **{name: signature("", cost=80) for name in ("get_tcp_force", "force", "get_joint_torques")},
-    "get_actual_joint_positions_history": signature("steps=0", cost=4),
-}
+from tvist_urscript import Array, Pose, costs
 
 
 class _Target(NamedTuple):
@@ -92,12 +52,6 @@ class StateFunctions:
         """Return the measured joint positions: an older name [rad]."""
         return self.get_actual_joint_positions()
 
-    def get_actual_joint_positions_history(self, steps: object) -> Array:
-        """Return the measured joint positions a number of ticks ago [rad]."""
-        past = self._access.steadiness
-        ago = integer("steps", steps, 0, max(past.known - 1, 0))
-        return a_list(past.past(ago) if past.known else self._access.latest().actual_q)
-
     def get_actual_joint_speeds(self) -> Array:
         """Return the measured joint velocities [rad/s]."""
         return a_list(self._access.latest().actual_qd)
@@ -114,6 +68,7 @@ class StateFunctions:
         """Return the joint accelerations that the program asks for at present [rad/s^2]."""
         return a_list(_target(self._access.latest()).qdd)
 
+    @costs(50)
     def get_actual_tcp_pose(self) -> Pose:
         """Return the pose of the tool by the measured joint positions."""
         return a_pose(self._kinematics.tool_pose(np.array(self._access.latest().actual_q)))
@@ -123,19 +78,23 @@ class StateFunctions:
         state = self._access.latest()
         return self._speed(state.actual_q, state.actual_qd)
 
+    @costs(50)
     def get_target_tcp_pose(self) -> Pose:
         """Return the pose of the tool that the program asks for at present."""
         return a_pose(self._kinematics.tool_pose(np.array(_target(self._access.latest()).q)))
 
+    @costs(50)
     def get_target_tcp_speed(self) -> Array:
         """Return the velocity of the tool that the program asks for at present [m/s, rad/s]."""
         target = _target(self._access.latest())
         return self._speed(target.q, target.qd)
 
+    @costs(50)
     def get_actual_tool_flange_pose(self) -> Pose:
         """Return the pose of the flange by the measured joint positions."""
         return a_pose(self._kinematics.tool_pose(np.array(self._access.latest().actual_q), (0.0,) * 6))
 
+    @costs(50)
     def get_target_waypoint(self) -> Pose:
         """Return the pose at the end of the present move; without one, the present target."""
         segment = self._arm.waypoint
@@ -162,14 +121,17 @@ class StateFunctions:
         xx, xy, xz, yy, yz, zz = self._access.declared().inertia
         return a_list((xx, yy, zz, xy, xz, yz))
 
+    @costs(80)
     def get_joint_torques(self) -> Array:
         """Return the external torques on the joints: without what the arm itself needs [N m]."""
         return a_list(self._access.torques())
 
+    @costs(80)
     def get_tcp_force(self) -> Array:
         """Return the external force and torque at the tool in the base frame [N, N m]."""
         return a_list(self._access.wrench())
 
+    @costs(80)
     def force(self) -> float:
         """Return the size of the external force at the tool [N]."""
         return math.hypot(*self._access.wrench()[:3])
@@ -181,6 +143,13 @@ class StateFunctions:
     def get_tool_accelerometer_reading(self) -> Array:
         """Return what the accelerometer in the flange measures, gravity included [m/s^2]."""
         return a_list(self._access.latest().actual_tool_accelerometer)
+
+    @costs(4)
+    def get_actual_joint_positions_history(self, steps: object = 0) -> Array:
+        """Return the measured joint positions a number of ticks ago [rad]."""
+        past = self._access.steadiness
+        ago = integer("steps", steps, 0, max(past.known - 1, 0))
+        return a_list(past.past(ago) if past.known else self._access.latest().actual_q)
 
     def _speed(self, q: list[float], qd: list[float]) -> Array:
         return a_list((self._kinematics.jacobian(np.array(q)) @ np.array(qd)).tolist())

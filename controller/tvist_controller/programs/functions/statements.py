@@ -3,13 +3,6 @@
 from tvist_controller.programs.arguments import flag
 from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.interpreter import StatementQueue
-from tvist_urscript import signature
-
-SIGNATURES = {
-    "interpreter_mode": signature("clearQueueOnEnter=True, clearOnEnd=True", blocks=True),
-    "end_interpreter": signature(""),
-    "clear_interpreter": signature(""),
-}
 
 
 class StatementFunctions:
@@ -23,7 +16,7 @@ class StatementFunctions:
     def __init__(self, arm: ProgramArm, queue: StatementQueue) -> None:
         self._arm, self._queue = arm, queue
 
-    def interpreter_mode(self, clearQueueOnEnter: object, clearOnEnd: object) -> Turns:
+    def interpreter_mode(self, clearQueueOnEnter: object = True, clearOnEnd: object = True) -> Turns:
         """Carry out the statements that clients send to port 30020, until one of them calls `end_interpreter`.
 
         They see the program's functions and its variables, and may define both.

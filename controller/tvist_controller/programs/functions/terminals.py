@@ -5,34 +5,10 @@ from tvist_controller.programs.arguments import flag, integer, number, shown
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.moves import OWN_TOKEN
 from tvist_protocol.io import SetIo
-from tvist_urscript import Array, Fault, signature
+from tvist_urscript import Array, Fault, costs
 
 STANDARD, CONFIGURABLE, TOOL = range(8), range(8, 16), range(16, 18)
 """Bits of the digital terminals."""
-
-SIGNATURES = {
-    **{
-        f"set_{kind}digital_out": signature("n, b", cost=4)
-        for kind in ("", "standard_", "configurable_", "tool_")
-    },
-    **{
-        f"get_{kind}digital_{side}": signature("n")
-        for kind in ("", "standard_", "configurable_", "tool_")
-        for side in ("in", "out")
-    },
-    "set_analog_out": signature("n, f", cost=6),
-    "set_standard_analog_out": signature("n, f", cost=6),
-    "set_analog_outputdomain": signature("port, domain"),
-    "set_analog_inputrange": signature("port, range"),
-    "set_standard_analog_input_domain": signature("port, domain"),
-    "set_tool_voltage": signature("voltage"),
-    "set_runstate_outputs": signature("outputs"),
-    "get_analog_in": signature("n"),
-    "get_standard_analog_in": signature("n"),
-    "get_tool_analog_in": signature("n"),
-    "get_analog_out": signature("n"),
-    "get_standard_analog_out": signature("n"),
-}
 
 
 class TerminalFunctions:
@@ -48,21 +24,25 @@ class TerminalFunctions:
 
     # ------------------------------------------------------------------ digital
 
+    @costs(4)
     def set_digital_out(self, n: object, b: object) -> None:
         """Set a digital output: 0 to 7 standard, 8 and 9 those of the tool, as before configurable ones existed."""
         number_ = integer("n", n, 0, 9)
         self._set(number_ if number_ < len(STANDARD) else TOOL[number_ - 8], flag("b", b))
 
+    @costs(4)
     def set_standard_digital_out(self, n: object, b: object) -> None:
-        """Set a standard digital output."""
+        """Set one of the eight standard digital outputs."""
         self._set(STANDARD[integer("n", n, 0, 7)], flag("b", b))
 
+    @costs(4)
     def set_configurable_digital_out(self, n: object, b: object) -> None:
-        """Set a configurable digital output."""
+        """Set one of the eight configurable digital outputs."""
         self._set(CONFIGURABLE[integer("n", n, 0, 7)], flag("b", b))
 
+    @costs(4)
     def set_tool_digital_out(self, n: object, b: object) -> None:
-        """Set a digital output of the tool."""
+        """Set one of the two digital outputs of the tool."""
         self._set(TOOL[integer("n", n, 0, 1)], flag("b", b))
 
     def get_digital_in(self, n: object) -> bool:
@@ -70,41 +50,43 @@ class TerminalFunctions:
         number_ = integer("n", n, 0, 9)
         return self._input(number_ if number_ < len(STANDARD) else TOOL[number_ - 8])
 
-    def get_standard_digital_in(self, n: object) -> bool:
-        """Return a standard digital input."""
-        return self._input(STANDARD[integer("n", n, 0, 7)])
-
-    def get_configurable_digital_in(self, n: object) -> bool:
-        """Return a configurable digital input."""
-        return self._input(CONFIGURABLE[integer("n", n, 0, 7)])
-
-    def get_tool_digital_in(self, n: object) -> bool:
-        """Return a digital input of the tool."""
-        return self._input(TOOL[integer("n", n, 0, 1)])
-
     def get_digital_out(self, n: object) -> bool:
         """Return a digital output, numbered as in `set_digital_out`."""
         number_ = integer("n", n, 0, 9)
         return self._output(number_ if number_ < len(STANDARD) else TOOL[number_ - 8])
 
+    def get_standard_digital_in(self, n: object) -> bool:
+        """Return one of the eight standard digital inputs."""
+        return self._input(STANDARD[integer("n", n, 0, 7)])
+
     def get_standard_digital_out(self, n: object) -> bool:
-        """Return a standard digital output."""
+        """Return one of the eight standard digital outputs."""
         return self._output(STANDARD[integer("n", n, 0, 7)])
 
+    def get_configurable_digital_in(self, n: object) -> bool:
+        """Return one of the eight configurable digital inputs."""
+        return self._input(CONFIGURABLE[integer("n", n, 0, 7)])
+
     def get_configurable_digital_out(self, n: object) -> bool:
-        """Return a configurable digital output."""
+        """Return one of the eight configurable digital outputs."""
         return self._output(CONFIGURABLE[integer("n", n, 0, 7)])
 
+    def get_tool_digital_in(self, n: object) -> bool:
+        """Return one of the two digital inputs of the tool."""
+        return self._input(TOOL[integer("n", n, 0, 1)])
+
     def get_tool_digital_out(self, n: object) -> bool:
-        """Return a digital output of the tool."""
+        """Return one of the two digital outputs of the tool."""
         return self._output(TOOL[integer("n", n, 0, 1)])
 
-    # ------------------------------------------------------------------ analogue
+    # ------------------------------------------------------------------ analogue, tool and run state
 
+    @costs(6)
     def set_analog_out(self, n: object, f: object) -> None:
         """Set an analogue output to a share of its range."""
         self.set_standard_analog_out(n, f)
 
+    @costs(6)
     def set_standard_analog_out(self, n: object, f: object) -> None:
         """Set an analogue output to a share of its range."""
         place, share = integer("n", n, 0, 1), number("f", f, 0.0, 1.0)
@@ -123,15 +105,33 @@ class TerminalFunctions:
         place, voltage = integer("port", port, 0, 1), bool(integer("domain", domain, 0, 1))
         self._arm.then(lambda: self._terminals.choose_output(place, voltage=voltage))
 
-    def set_analog_inputrange(self, port: object, range_: object) -> None:
+    def set_analog_inputrange(self, port: object, range: object) -> None:
         """Make an analogue input a current (0) or a voltage (1 to 3, all of 0 to 10 V)."""
-        place, voltage = integer("port", port, 0, 1), integer("range", range_, 0, 3) > 0
+        place, voltage = integer("port", port, 0, 1), integer("range", range, 0, 3) > 0
         self._arm.then(lambda: self._terminals.choose_input(place, voltage=voltage))
 
     def set_standard_analog_input_domain(self, port: object, domain: object) -> None:
         """Make an analogue input a current (0) or a voltage (1)."""
         place, voltage = integer("port", port, 0, 1), bool(integer("domain", domain, 0, 1))
         self._arm.then(lambda: self._terminals.choose_input(place, voltage=voltage))
+
+    def set_tool_voltage(self, voltage: object) -> None:
+        """Set the supply of the tool: 0, 12 or 24 V."""
+        wanted = integer("voltage", voltage, 0, 24)
+        if wanted not in {0, 12, 24}:
+            raise Fault(f"voltage is {wanted}: it must be 0, 12 or 24")
+        self._arm.then(lambda: self._terminals.set_tool_voltage(wanted))
+
+    def set_runstate_outputs(self, outputs: object) -> None:
+        """Accept that no output shows whether a program runs.
+
+        Raises:
+            Fault: One should, which is not simulated.
+        """
+        if not isinstance(outputs, Array):
+            raise Fault(f"outputs is {shown(outputs)}: it must be a list")
+        if any(bool(item) for item in outputs.items):
+            raise Fault("set_runstate_outputs: outputs that show whether a program runs are not simulated")
 
     def get_analog_in(self, n: object) -> float:
         """Return an analogue input: 0 and 1 of the control box, 2 and 3 of the tool [A or V]."""
@@ -153,26 +153,6 @@ class TerminalFunctions:
     def get_standard_analog_out(self, n: object) -> float:
         """Return an analogue output as a share of its range."""
         return self._terminals.analog_ratio(integer("n", n, 0, 1))
-
-    # ------------------------------------------------------------------ tool and run state
-
-    def set_tool_voltage(self, voltage: object) -> None:
-        """Set the supply of the tool: 0, 12 or 24 V."""
-        wanted = integer("voltage", voltage, 0, 24)
-        if wanted not in {0, 12, 24}:
-            raise Fault(f"voltage is {wanted}: it must be 0, 12 or 24")
-        self._arm.then(lambda: self._terminals.set_tool_voltage(wanted))
-
-    def set_runstate_outputs(self, outputs: object) -> None:
-        """Accept that no output shows whether a program runs.
-
-        Raises:
-            Fault: One should, which is not simulated.
-        """
-        if not isinstance(outputs, Array):
-            raise Fault(f"outputs is {shown(outputs)}: it must be a list")
-        if any(bool(item) for item in outputs.items):
-            raise Fault("set_runstate_outputs: outputs that show whether a program runs are not simulated")
 
     def _set(self, bit: int, on: bool) -> None:
         command = SetIo(token=OWN_TOKEN, digital_output_mask=1 << bit, digital_outputs=int(on) << bit)

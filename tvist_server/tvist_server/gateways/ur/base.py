@@ -16,7 +16,7 @@ Then = Callable[[Reply], None]
 
 
 class ControllerAccess(Protocol):
-    """Access of one connection to the controller."""
+    """How one connection sends commands to the controller; `change` first takes control if it is free."""
 
     peer: str
     """The client and its interface, as a phrase for messages to people."""

@@ -60,7 +60,7 @@ class InterpreterSession(PortSession):
         return self._lines.waiting
 
     def receive(self, data: bytes) -> None:
-        """Take lines."""
+        """Add the lines that are complete with these bytes to those that wait for their turn."""
         *whole, rest = data.split(b"\n")
         for piece in whole:
             self._keep(piece)

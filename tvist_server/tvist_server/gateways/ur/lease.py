@@ -11,6 +11,8 @@ from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_server.gateways.base import Desk
 from tvist_server.gateways.ur.base import ControllerAccess, Then
 
+# The longest that the protocol allows, since the control of a host ends with its connections and not with time
+# (decision 12). ALIVE is wall time, the lease robot's time, which may pass many times faster in lockstep.
 LEASE = 3600.0
 """Duration of the lease without renewal [s]; it is renewed every `ALIVE`."""
 ALIVE = 10.0
@@ -60,7 +62,7 @@ class HostLease:
         self.ask(command(self._token), again)
 
     def ask(self, command: Command, then: Then) -> None:
-        """Send a command unchanged."""
+        """Send a command as it is; it needs no control, or has its token already."""
         self._desk.command(command, lambda reply: self._soon(lambda: then(reply)), self.host)
 
     def leave(self, connection: object) -> None:
@@ -140,11 +142,9 @@ class ConnectionControl(ControllerAccess):
         """Number of commands that are not yet answered."""
 
     def change(self, command: Callable[[str], Command], then: Then) -> None:
-        """Send a command that needs control."""
         self._lease.change(self, command, self._counted(then))
 
     def ask(self, command: Command, then: Then) -> None:
-        """Send a command that does not need control."""
         self._lease.ask(command, self._counted(then))
 
     def _counted(self, then: Then) -> Then:
@@ -158,7 +158,6 @@ class ConnectionControl(ControllerAccess):
 
     @property
     def held_by_other(self) -> bool:
-        """Whether another client has control."""
         return self._lease.held_by_other
 
     def lasting(self) -> "ConnectionControl":

@@ -29,7 +29,7 @@ _VERSION = Struct(">BBii")
 
 
 class MessageKind(IntEnum):
-    """Kinds of robot messages."""
+    """UR's numbers of the robot messages that are sent here."""
 
     TEXT = 0
     POPUP = 2
@@ -41,7 +41,7 @@ class MessageKind(IntEnum):
 
 
 class ErrorLevel(IntEnum):
-    """Severity of an error."""
+    """UR's numbers for how severe an error code is."""
 
     DEBUG = 0
     INFO = 1
@@ -104,7 +104,7 @@ def popup(
     Args:
         time: Time of the message [µs].
         title: Title of the window.
-        what: What it says.
+        what: Text for people.
         warning: Whether it is a warning.
         error: Whether it is an error.
         blocking: Whether the program waits until it is closed.

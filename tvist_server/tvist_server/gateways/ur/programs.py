@@ -88,7 +88,7 @@ class Programs:
 
     @property
     def playing(self) -> bool:
-        """Whether a program runs."""
+        """Whether a program runs and is not paused."""
         return self.state == "PLAYING"
 
     # ------------------------------------------------------------------ requests

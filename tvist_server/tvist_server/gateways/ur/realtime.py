@@ -73,7 +73,7 @@ def package(snapshot: Snapshot) -> bytes:
                 values.append(getattr(snapshot, name))
             else:
                 found: list[float] = getattr(snapshot, name)
-                values += found[:count]
+                values += found
                 values += [0.0] * (count - len(found))  # an arm with fewer joints
         made = snapshot.shared[_KEY] = PACKAGE.pack(PACKAGE.size, *values)
     return made

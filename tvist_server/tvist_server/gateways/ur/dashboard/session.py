@@ -51,11 +51,10 @@ class DashboardSession(PortSession):
         """Tick at which waiting for rest ends."""
 
     def opened(self) -> None:
-        """Send the greeting."""
         self._say(GREETING)
 
     def receive(self, data: bytes) -> None:
-        """Take commands."""
+        """Carry out the commands that are complete with these bytes; those beyond MAX_WAITING are declined."""
         if self.over:
             return
         for line in self._lines.feed(data):
@@ -76,7 +75,6 @@ class DashboardSession(PortSession):
         return b""
 
     def closed(self) -> None:
-        """Drop the waiting commands."""
         self.over, self._rested = True, None
 
     def _work(self) -> None:
@@ -88,6 +86,7 @@ class DashboardSession(PortSession):
             if self._waiting:
                 self._do(self._waiting.popleft())
             elif self._declined:
+                # Answered last, since these lines came after those that waited, and answers keep the order.
                 self._declined -= 1
                 self._say(TOO_MANY)
             else:

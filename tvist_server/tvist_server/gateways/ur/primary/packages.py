@@ -12,10 +12,9 @@ from tvist_plant.description import RobotDescription
 from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_server.gateways.ur import messages
 from tvist_server.gateways.ur.model import series
+from tvist_server.ur_ports import MOST_JOINTS
 
 ROBOT_STATE: Final = 16
-JOINTS: Final = 6
-"""Number of joints in a package; for an arm with fewer, the others are 0."""
 NOMINAL: Final = 0xFFFFFFFF
 """Checksum of uncalibrated kinematics."""
 SUBTYPE: Final = 3
@@ -112,17 +111,17 @@ def _joints(snapshot: Snapshot) -> bytes:
         snapshot.actual_current,
         snapshot.actual_joint_voltage,
         snapshot.joint_temperatures,
-        [0.0] * JOINTS,  # second temperature, which e-Series joints do not have
+        [0.0] * MOST_JOINTS,  # second temperature, which e-Series joints do not have
         snapshot.joint_mode,
         strict=False,
     )
-    return b"".join([_JOINT.pack(*row) for row in rows]).ljust(JOINTS * _JOINT.size, b"\0")
+    return b"".join([_JOINT.pack(*row) for row in rows]).ljust(MOST_JOINTS * _JOINT.size, b"\0")
 
 
 def _kinematics(description: RobotDescription) -> bytes:
     a, d, alpha = _denavit_hartenberg(description)
-    theta = [0.0] * JOINTS
-    return _KINEMATICS.pack(*[NOMINAL] * JOINTS, *theta, *a, *d, *alpha, 0)
+    theta = [0.0] * MOST_JOINTS
+    return _KINEMATICS.pack(*[NOMINAL] * MOST_JOINTS, *theta, *a, *d, *alpha, 0)
 
 
 def _masterboard(snapshot: Snapshot) -> bytes:
@@ -171,7 +170,7 @@ def _configuration(description: RobotDescription) -> bytes:
         value for pair in zip(_six(limits.velocity), _six(limits.acceleration), strict=True) for value in pair
     ]
     a, d, alpha = _denavit_hartenberg(description)
-    theta = [0.0] * JOINTS
+    theta = [0.0] * MOST_JOINTS
     numbers = (6, 4, robot_type(description), SUBTYPE)  # masterboard, box, arm
     return _CONFIGURATION.pack(*position, *motion, *MOTION_DEFAULTS, *a, *d, *alpha, *theta, *numbers)
 
@@ -182,4 +181,4 @@ def _denavit_hartenberg(description: RobotDescription) -> tuple[list[float], lis
 
 
 def _six(values: tuple[float, ...]) -> list[float]:
-    return [*values, *[0.0] * (JOINTS - len(values))][:JOINTS]
+    return [*values, *[0.0] * (MOST_JOINTS - len(values))]

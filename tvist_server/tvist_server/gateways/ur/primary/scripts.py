@@ -113,7 +113,7 @@ class Intake:
         return units
 
     def _keep(self, piece: bytes, units: list[Unit]) -> None:
-        """Append to the incomplete line."""
+        """Append to the incomplete line; of a unit longer than LONGEST only the beginning is kept."""
         if self.held + len(piece) >= LONGEST:  # the line feed is still to come
             if not self._skipping:
                 seen = (self._unit + self._rest + piece).decode(errors="replace")
@@ -125,7 +125,7 @@ class Intake:
         self._rest += piece
 
     def _take(self, whole: bytes, units: list[Unit]) -> None:
-        """Take a complete line."""
+        """Add a complete line to the present unit, which ends with the line on which all blocks are closed."""
         line = whole.decode(errors="replace")
         code = _code(line)
         if not line.strip() and not self._unit and not self._skipping:

@@ -1,4 +1,5 @@
-"""Real-time data exchange, port 30004: recipes of variables, read up to 500 times a second, and written.
+"""Real-time data exchange, port 30004: clients subscribe to lists of variables at up to 500 Hz, and write others.
 
-A package is its size (two bytes, the header among them), its kind (one byte) and a payload; numbers are big-endian.
+A package consists of its size in bytes, header included (uint16), its type (uint8) and a payload; numbers are
+big-endian.
 """

@@ -1,4 +1,4 @@
-"""Packages of the wire: cut out of the stream, and put together. Nothing here knows what they mean."""
+"""Splits the byte stream of a connection into packages, and makes packages of payloads."""
 
 from collections.abc import Iterable
 from enum import IntEnum
@@ -6,13 +6,13 @@ from struct import Struct
 
 HEADER = Struct(">HB")
 LARGEST = 0xFFFF
-"""Size of a package, header included [bytes]."""
+"""Largest size of a package, header included [bytes]."""
 TEXT = 255
 """Longest text in a message [bytes]."""
 
 
 class PackageKind(IntEnum):
-    """What a package is, by its letter."""
+    """Type of a package; its number is the ASCII code of a letter."""
 
     REQUEST_PROTOCOL_VERSION = ord("V")
     GET_URCONTROL_VERSION = ord("v")
@@ -25,7 +25,7 @@ class PackageKind(IntEnum):
 
 
 class TextLevel(IntEnum):
-    """How grave a text message is."""
+    """Severity of a text message."""
 
     EXCEPTION = 0
     ERROR = 1
@@ -34,17 +34,17 @@ class TextLevel(IntEnum):
 
 
 class PackageReader:
-    """Cuts a stream into packages.
+    """Splits a byte stream into packages, and keeps at most one incomplete package.
 
-    It never holds more than one unfinished package. A size smaller than the header's three bytes is a lie with which
-    nothing can be found again for certain; it is taken for three, so that reading goes on behind the header.
+    A package whose size field is smaller than the header is skipped: reading continues behind its three bytes, since
+    the size does not tell where the next package begins.
     """
 
     def __init__(self) -> None:
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> list[tuple[int, bytes]]:
-        """Kind and payload of each package that is complete now; what lied about its size is left out."""
+        """Add bytes, and return type and payload of each package that is complete now."""
         buffer = self._buffer
         buffer += data
         at, packages = 0, []
@@ -62,12 +62,18 @@ class PackageReader:
 
 
 def package(kind: PackageKind, payload: bytes = b"") -> bytes:
-    """A package; its payload must fit."""
+    """Return a package. Header and payload must not exceed 65535 bytes."""
     return HEADER.pack(HEADER.size + len(payload), kind) + payload
 
 
 def words(kind: PackageKind, head: bytes, names: Iterable[str]) -> bytes:
-    """A package of words between commas, cut behind the last one that fits: its size has two bytes and no more."""
+    """Return a package of words separated by commas; words that do not fit into 65535 bytes are left out.
+
+    Args:
+        kind: Type of the package.
+        head: What precedes the words.
+        names: The words.
+    """
     text = ",".join(names).encode()
     room = LARGEST - HEADER.size - len(head)
     if len(text) > room:
@@ -76,7 +82,14 @@ def words(kind: PackageKind, head: bytes, names: Iterable[str]) -> bytes:
 
 
 def text_message(version: int, level: TextLevel, text: str, source: str) -> bytes:
-    """A message to the client; version 1 has neither lengths nor source."""
+    """Return a text message to the client.
+
+    Args:
+        version: Protocol version; in version 1 the message has neither lengths nor a source.
+        level: Severity.
+        text: The message, cut after 255 bytes.
+        source: Who sends it, cut after 255 bytes.
+    """
     message = text.encode()[:TEXT]
     if version == 1:
         return package(PackageKind.TEXT_MESSAGE, bytes([level]) + message)

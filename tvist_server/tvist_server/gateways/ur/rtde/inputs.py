@@ -1,4 +1,4 @@
-"""Variables that a client sets, with their types."""
+"""Input variables, which clients set, and their types."""
 
 from typing import get_args
 
@@ -7,7 +7,7 @@ from tvist_server.gateways.ur.rtde.registers import NUMBERS, SINGLE_BITS, WORDS
 from tvist_server.gateways.ur.rtde.wire import Wire
 
 DIGITAL: dict[str, tuple[int, int]] = {"standard": (0, 8), "configurable": (8, 8), "tool": (16, 2)}
-"""Groups of digital outputs: the first bit among all, and how many there are."""
+"""Groups of digital outputs: number of the first bit, and number of bits."""
 
 NAMED: dict[str, tuple[Wire, str]] = {
     "speed_slider_mask": (Wire.UINT32, "1: use `speed_slider_fraction`."),
@@ -33,7 +33,7 @@ NAMED: dict[str, tuple[Wire, str]] = {
         "Ignored, as on a UR robot without ft_rtde_input_enable.",
     ),
 }
-"""All but the registers, with what they are for."""
+"""Type and description of each input variable that is no register."""
 
 _BITS, _INTS, _DOUBLES = get_args(Bank)[:3]
 REGISTERS: dict[str, tuple[Bank, int, Wire]] = (
@@ -42,12 +42,12 @@ REGISTERS: dict[str, tuple[Bank, int, Wire]] = (
     | {f"input_int_register_{k}": (_INTS, k, Wire.INT32) for k in NUMBERS}
     | {f"input_double_register_{k}": (_DOUBLES, k, Wire.DOUBLE) for k in NUMBERS}
 )
-"""Bank, first register and type."""
+"""Bank, number of the first register, and type of each variable that sets registers."""
 
 INPUTS: dict[str, Wire] = {name: wire for name, (wire, _) in NAMED.items()} | {
     name: wire for name, (_, _, wire) in REGISTERS.items()
 }
-"""Every input variable by name."""
+"""Type of every input variable by name."""
 
 NEED_CONTROL = frozenset(NAMED) - {"external_force_torque"}
-"""What only who has control may set. Registers are memory that anyone may write."""
+"""Variables that only the client in control may set. Registers are memory, which any client may write."""

@@ -1,4 +1,4 @@
-"""Lists of variables that travel together in one package."""
+"""Recipes: lists of variables that are sent in one data package."""
 
 from collections.abc import Callable, Iterable
 from operator import itemgetter
@@ -18,13 +18,13 @@ _SHARED = "rtde"
 
 
 def split(names: bytes) -> tuple[str, ...]:
-    """Names between commas; clients end their lists with one, or not."""
+    """Return the names of a list that is separated by commas; a comma at its end is ignored."""
     text = names.decode("ascii", "replace").removesuffix(",")
     return tuple(name.strip() for name in text.split(",")) if text else ()
 
 
 class Encoded(dict[str, bytes]):
-    """Variables of one tick as bytes, made when first asked for: recipes share most of them."""
+    """Bytes of one tick's variables by name, each encoded once for all recipes, when the first one needs it."""
 
     def __init__(self, snapshot: Snapshot) -> None:
         registers = snapshot.kept.setdefault(_SHARED, EncodedRegisters())
@@ -32,7 +32,7 @@ class Encoded(dict[str, bytes]):
         super().__init__(registers)
         self._snapshot = snapshot
         self.packages: dict[tuple[bytes, tuple[str, ...]], bytes] = {}
-        """Whole packages by head and names: clients with the same recipe share them."""
+        """Complete data packages by head and names, for clients with the same recipe."""
 
     def __missing__(self, name: str) -> bytes:
         read, encode = READERS[name]
@@ -41,7 +41,7 @@ class Encoded(dict[str, bytes]):
 
     @classmethod
     def of(cls, snapshot: Snapshot) -> "Encoded":
-        """The one of this snapshot."""
+        """Return the encoded variables of a snapshot, which all clients share."""
         encoded = snapshot.shared.get(_SHARED)
         if encoded is None:
             encoded = snapshot.shared[_SHARED] = cls(snapshot)
@@ -58,11 +58,11 @@ class OutputRecipe:
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self.words = [OUTPUTS[name].name if name in OUTPUTS else "NOT_FOUND" for name in names]
-        """Types, or what is wrong."""
+        """Type of each variable, or `NOT_FOUND`."""
         self._names = names
         self._fields: Callable[[Encoded], Iterable[bytes]]
         self.valid = bool(names) and "NOT_FOUND" not in self.words
-        """Whether there are packages of it: each variable exists, and all fit into one package."""
+        """Whether each variable exists and all of them fit into one package."""
         if self.valid:
             one = names[0]
             self._fields = itemgetter(*names) if len(names) > 1 else lambda encoded: (encoded[one],)
@@ -70,11 +70,11 @@ class OutputRecipe:
             self.valid = HEADER.size + 1 + self._size <= LARGEST
 
     def package(self, snapshot: Snapshot, head: bytes) -> bytes:
-        """One data package.
+        """Return the data package of a tick.
 
         Args:
             snapshot: Values of the tick.
-            head: What comes before the variables: the recipe's id, where the protocol has one.
+            head: Bytes in front of the variables: the recipe's id in protocol version 2, nothing in version 1.
         """
         encoded = Encoded.of(snapshot)
         key = head, self._names
@@ -98,7 +98,10 @@ class InputRecipe:
         self._all = Struct(">" + "".join(wire.value for _, wire in self._fields))
 
     def values(self, data: bytes) -> dict[str, Value]:
-        """What a package says: of one that is too short the variables that are whole, of one too long its beginning."""
+        """Return the value of each variable in the payload of a data package.
+
+        Variables that a short payload does not contain completely are missing; bytes after the last one are ignored.
+        """
         if len(data) >= self._all.size:
             numbers, fields = self._all.unpack_from(data), self._fields
         else:

@@ -1,4 +1,4 @@
-"""Registers: what their variables are called, and their bytes, kept from tick to tick."""
+"""Registers: names of their variables, and their bytes, which are kept from tick to tick."""
 
 from collections.abc import Sequence
 from struct import Struct
@@ -7,15 +7,15 @@ from tvist_protocol.io import Io
 from tvist_server.gateways.ur.rtde.wire import Wire
 
 NUMBERS = range(48)
-"""Registers of integers, and of doubles."""
+"""Numbers of the integer registers; the double registers have the same."""
 SINGLE_BITS = range(64, 128)
-"""Bits that are variables of their own; the others come as words."""
+"""Bits that are variables of their own; bits 0 to 63 are sent in two words of 32."""
 WORDS = ("0_to_31", "32_to_63")
-"""Ends of the words' names."""
+"""Suffixes of the names of the two words."""
 
 
 def registers(kind: str) -> tuple[tuple[str, Wire], ...]:
-    """Names and types of the variables of a bank, in its order."""
+    """Return names and types of the variables of a bank, in the order of its registers."""
     if kind.endswith("_bit"):
         words = [(f"{kind}_registers{span}", Wire.UINT32) for span in WORDS]
         return (*words, *[(f"{kind}_register_{number}", Wire.BOOL) for number in SINGLE_BITS])
@@ -24,17 +24,17 @@ def registers(kind: str) -> tuple[tuple[str, Wire], ...]:
 
 
 KINDS = [f"{side}_{kind}" for side in ("output", "input") for kind in ("bit", "int", "double")]
-"""Banks by the beginning of their variables' names."""
+"""Prefixes of the names of variables, one for each bank."""
 _BANKS = {
     f"{kind}_register": ([name for name, _ in registers(kind)], Struct(">" + layout))
     for kind, layout in zip(KINDS, ("4I", f"{len(NUMBERS)}i", f"{len(NUMBERS)}d") * 2, strict=True)
 }
-"""Names of a bank's variables, and its bytes as a whole, by its name in `Io`."""
+"""Names of the variables of each bank, and the format of the whole bank, by its field in `Io`."""
 _BITS = (b"\x00", b"\x01")
 
 
 class EncodedRegisters(dict[str, bytes]):
-    """Registers as bytes by name. They change seldom, and then a bank at a time: only that is cut up anew."""
+    """Bytes of each register variable by name. Registers rarely change: only a bank that has is encoded again."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -42,7 +42,7 @@ class EncodedRegisters(dict[str, bytes]):
         self._seen: dict[str, bytes] = {}
 
     def update_from(self, io: Io) -> None:
-        """Take over what has changed."""
+        """Encode the banks that differ from the last call."""
         if io is self._io:
             return
         self._io = io
@@ -55,7 +55,7 @@ class EncodedRegisters(dict[str, bytes]):
 
 
 def _cut(data: bytes, values: Sequence[float]) -> list[bytes]:
-    """Bytes of each variable of a bank."""
+    """Return the bytes of each variable of a bank."""
     size = len(data) // len(values)
     numbers = [data[at : at + size] for at in range(0, len(data), size)]
     if len(values) == len(NUMBERS):

@@ -1,7 +1,7 @@
-"""One RTDE connection: what it has set up, and what it is answered.
+"""One RTDE connection: its protocol version, its recipes, and the answers to its packages.
 
-Before `REQUEST_PROTOCOL_VERSION` the protocol is version 1, which knows no frequency, no recipe's id in front of
-outputs and their types, and no source in text messages.
+A connection uses protocol version 1 until the client requests version 2. In version 1 the client cannot choose a
+frequency, packages of outputs carry no recipe id, and text messages carry no source.
 """
 
 from collections.abc import Callable
@@ -25,13 +25,13 @@ from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, spl
 from tvist_server.gateways.ur.rtde.writing import InputWriter
 
 RATE = 500.0
-"""Rate of control periods, and the highest frequency of packages [Hz]."""
+"""Frequency of the control loop, and so the highest frequency of data packages [Hz]."""
 RECIPES = 255
-"""Input recipes that a connection can number."""
+"""Most input recipes of a connection: their ids are 1 to 255."""
 SENTENCES = 64
-"""Different text messages to a client between two starts: it may send wrong packages for days."""
+"""Most text messages that a client gets between two starts, since it may send wrong packages for days."""
 OUTPUT_ID = b"\x01"
-"""A connection has one output recipe."""
+"""Id of the output recipe: a connection has only one."""
 
 _UINT16 = Struct(">H")
 _DOUBLE = Struct(">d")
@@ -40,12 +40,12 @@ _TRUE, _FALSE = b"\x01", b"\x00"
 
 
 class RtdeSession(PortSession):
-    """Answers a client and samples for it.
+    """Answers the packages of one client, and sends it the outputs that it has subscribed to.
 
     Args:
-        robot: What the interfaces of a robot share.
-        control: The way to its controller.
-        send: Sends an answer.
+        robot: State that the interfaces of a robot share.
+        control: Access to its controller.
+        send: Sends bytes to the client.
     """
 
     client_begins = True
@@ -78,11 +78,11 @@ class RtdeSession(PortSession):
 
     @property
     def served(self) -> bool:
-        """Whether outputs were started, and not paused since."""
+        """Whether the client has started outputs and not paused them since."""
         return self._started
 
     def receive(self, data: bytes) -> None:
-        """Take what arrived, cut anywhere."""
+        """Handle all packages that are complete with these bytes; the rest is kept for the next call."""
         for kind, payload in self._reader.feed(data):
             handler = self._handlers.get(kind)
             if handler is None:
@@ -91,7 +91,10 @@ class RtdeSession(PortSession):
                 handler(payload)
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """A data package where one is due: with the first tick after the start, then every so many ticks."""
+        """Return a data package if one is due, otherwise no bytes.
+
+        The first one is sent with the first tick after the start, the others at the frequency of the recipe.
+        """
         if not self._started or self._outputs is None:
             return b""
         tick, every = snapshot.state.tick, self._every
@@ -103,13 +106,13 @@ class RtdeSession(PortSession):
         return self._outputs.package(snapshot, self._head)
 
     def closed(self) -> None:
-        """The connection is gone: its inputs are free."""
+        """Release the input variables of the connection, so that other clients can set them."""
         self._robot.inputs.release(self)
 
     # ------------------------------------------------------------------ answers
 
     def _request_version(self, payload: bytes) -> None:
-        """Version 1 or 2; another one leaves what is."""
+        """Switch to version 1 or 2. Any other is refused, and the present version stays in use."""
         wanted = _UINT16.unpack_from(payload)[0] if len(payload) >= _UINT16.size else 0
         accepted = wanted in {1, 2}
         if accepted:
@@ -122,7 +125,10 @@ class RtdeSession(PortSession):
         self._send(package(PackageKind.GET_URCONTROL_VERSION, _VERSION.pack(*numbers)))
 
     def _set_up_outputs(self, payload: bytes) -> None:
-        """A new output recipe replaces the old one; one that is not valid leaves none."""
+        """Replace the output recipe, and answer with its id and the types of its variables.
+
+        If the new recipe is invalid, the id is 0 and no recipe is left; version 1 answers without an id.
+        """
         frequency = RATE
         if self._version > 1:
             if len(payload) >= _DOUBLE.size:
@@ -137,7 +143,10 @@ class RtdeSession(PortSession):
         self._send(words(PackageKind.SETUP_OUTPUTS, head, recipe.words))
 
     def _set_up_inputs(self, payload: bytes) -> None:
-        """A further input recipe; one that is not valid has id 0 and takes nothing."""
+        """Add an input recipe, and answer with its id and the types of its variables.
+
+        If a variable cannot be set, or there are 255 recipes, the id is 0 and the owners of the variables stay.
+        """
         names = split(payload)
         types = [self._input_word(name) for name in names]
         valid = bool(names) and len(self._inputs) < RECIPES and not {"NOT_FOUND", "IN_USE"} & set(types)
@@ -149,7 +158,7 @@ class RtdeSession(PortSession):
         self._send(words(PackageKind.SETUP_INPUTS, bytes([number]), types))
 
     def _input_word(self, name: str) -> str:
-        """Type of an input variable, or why it cannot be had."""
+        """Return the type of an input variable, or `NOT_FOUND` or `IN_USE` if this connection cannot set it."""
         if name not in INPUTS:
             return "NOT_FOUND"
         elsewhere = name in NEED_CONTROL and self._control.held_by_other
@@ -158,7 +167,7 @@ class RtdeSession(PortSession):
         return INPUTS[name].name
 
     def _take_data(self, payload: bytes) -> None:
-        """Inputs are taken whether or not outputs were started."""
+        """Set the input variables of a data package, whether or not the client has started outputs."""
         number = payload[0] if payload else 0
         if 0 < number <= len(self._inputs):
             self._writer.write(self._inputs[number - 1].values(payload[1:]))
@@ -166,7 +175,7 @@ class RtdeSession(PortSession):
             self._complain(f"there is no input recipe {number}")
 
     def _start(self, _payload: bytes) -> None:
-        """Samples begin; not after output variables that were wrong."""
+        """Start to send outputs. This is refused if the last output recipe was invalid."""
         self._started, self._next = not self._outputs_wrong, None
         self._said.clear()
         self._send(package(PackageKind.START, _TRUE if self._started else _FALSE))
@@ -176,22 +185,25 @@ class RtdeSession(PortSession):
         self._send(package(PackageKind.PAUSE, _TRUE))
 
     def _take_text(self, _payload: bytes) -> None:
-        """What clients say is for a person's log; there is none to show it in."""
+        """Ignore a text message: on a robot of UR's, it would appear in the log of the teach pendant."""
 
     def _complain(self, sentence: str) -> None:
-        """Tell the client, once; never before the start, where it would be taken for the answer to a set-up."""
+        """Send the client a warning once per start.
+
+        Before the start nothing is sent, since clients would take it for the answer to the recipe that they set up.
+        """
         if self._started and sentence not in self._said and len(self._said) < SENTENCES:
             self._said.add(sentence)
             self._send(text_message(self._version, TextLevel.WARNING, sentence, "RTDE"))
 
 
 def ticks_between(frequency: float) -> int:
-    """Ticks from one sample to the next: the rate over the frequency, rounded down.
+    """Return the number of ticks between two data packages: 500 Hz divided by the frequency, rounded down.
 
     Args:
-        frequency: Wanted [Hz]; what is above 500 counts as 500, what is below 1 as 1, and no number above zero as none
-            wanted, hence 500.
+        frequency: Requested frequency [Hz], clipped to 1 to 500; zero, negative numbers and NaN stand for 500.
     """
     if not frequency > 0.0:
         return 1
+    # 500 / (500 / 15) is 14.999999999999998, and a client that asks for every 15th tick has to get it.
     return floor(RATE / min(max(frequency, 1.0), RATE) + 1e-9)

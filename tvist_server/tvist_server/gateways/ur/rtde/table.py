@@ -3,9 +3,8 @@
 from collections.abc import Iterable
 from inspect import getdoc
 
-from tvist_controller.instruments.snapshot import Snapshot
+from tvist_controller.instruments.snapshot import VARIABLES, Snapshot
 from tvist_server.gateways.ur.rtde.inputs import NAMED as NAMED_INPUTS
-from tvist_server.gateways.ur.rtde.outputs import NAMED as NAMED_OUTPUTS
 from tvist_server.gateways.ur.rtde.wire import Wire
 
 SOURCES = ("State", "Io", "Computed", "Constant")
@@ -27,7 +26,8 @@ Torque constants, resistances and thermal parameters of the motors are guesses o
 two sizes of joint: 10 and 7.9 N m/A on the joint's side. Temperatures and energies are integrated from the first tick
 on, even if no client reads them.
 
-Vectors of joints have six entries: an arm with fewer joints has zeros in the rest, and an arm with more is cut.
+Vectors of joints have six entries: an arm with fewer joints has zeros in the rest, and one with more
+[has no RTDE](../how-to/connect-ur-clients.md#arms-with-more-than-six-joints).
 All variables are offered, including those that a controller of the reported version would not have yet.
 """
 REGISTER_ROWS = (
@@ -40,7 +40,7 @@ REGISTER_ROWS = (
 
 
 def page() -> str:
-    """The whole page."""
+    """Return the page of reference that lists all variables."""
     outputs = _table(("variable", "type", "source", "what"), _outputs())
     inputs = _table(("variable", "type", "what"), _inputs())
     return f"""{HEAD}
@@ -68,9 +68,8 @@ def describe(name: str) -> tuple[str, str]:
 
 
 def _outputs() -> Iterable[tuple[str, ...]]:
-    for wire, names in NAMED_OUTPUTS.items():
-        for name in names.split():
-            yield f"`{name}`", wire.name, *describe(name)
+    for name, word in VARIABLES.items():
+        yield f"`{name}`", word, *describe(name)
     for bank in ("output", "input"):
         for name, wire, what in REGISTER_ROWS:
             yield f"`{name.format(bank=bank)}`", wire.name, "io", f"Registers: {what}."

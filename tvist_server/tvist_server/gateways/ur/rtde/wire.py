@@ -1,4 +1,4 @@
-"""Types of variables."""
+"""Types of RTDE's variables, and their bytes."""
 
 from collections.abc import Callable, Sequence
 from enum import Enum
@@ -6,11 +6,11 @@ from struct import Struct
 from typing import Any
 
 Encode = Callable[[Any], bytes]
-"""From a value to its bytes."""
+"""Function that returns the bytes of a value."""
 
 
 class Wire(Enum):
-    """A type: its word is its name."""
+    """A type by its name in RTDE; the value is its format in `struct`, without the byte order."""
 
     BOOL = "?"
     UINT8 = "B"
@@ -25,20 +25,20 @@ class Wire(Enum):
 
     @property
     def size(self) -> int:
-        """On the wire [bytes]."""
+        """Size of a value [bytes]."""
         return Struct(f">{self.value}").size
 
     @property
     def length(self) -> int:
-        """Numbers in a value; 1 where it is no vector."""
+        """Number of entries of a vector; 1 for a type that is no vector."""
         return int(self.value[:-1] or 1)
 
     @property
     def encode(self) -> Encode:
-        """Writes a value.
+        """Function that writes a value as bytes.
 
-        Vectors that are too short are filled with zeros, too long ones are cut: an arm may have one to seven joints,
-        and six is what every client expects.
+        A vector that is too short is filled with zeros, since clients expect six entries of an arm with fewer joints.
+        One that is too long is an error: robots with more joints are refused before they are served, see `UrPorts`.
         """
         pack, length = Struct(f">{self.value}").pack, self.length
         if length == 1:
@@ -47,6 +47,6 @@ class Wire(Enum):
         def vector(values: Sequence[float]) -> bytes:
             if len(values) == length:
                 return pack(*values)
-            return pack(*[*values, *[0] * length][:length])
+            return pack(*values, *[0] * (length - len(values)))
 
         return vector

@@ -1,4 +1,4 @@
-"""Input variables to commands: only what is new, and as few as will do."""
+"""Turns the input variables of data packages into commands, and leaves out values that are in force already."""
 
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from math import isclose
@@ -14,22 +14,22 @@ from tvist_server.gateways.ur.rtde.recipes import Value
 from tvist_server.gateways.ur.rtde.wire import Wire
 
 Complain = Callable[[str], None]
-"""Tells the client what was refused."""
+"""Function that sends the client a warning."""
 Number = bool | int | float
 LARGEST = 1e308
-"""What a register may hold, either way: not infinity."""
+"""Largest absolute value of an input: infinity and NaN are refused."""
 
 
 class InputWriter:
-    """Writes what one connection sends.
+    """Sets the inputs that one connection sends.
 
-    A variable that a package leaves out keeps the value it had on this connection: a mask is 0 before the first, and
-    what was never given a value is not set.
+    A variable that is not in a package keeps its last value on this connection. Until the first one a mask is 0, and
+    any other variable is not set.
 
     Args:
         robot: Robot to write to.
-        control: The way to it.
-        complain: Takes sentences for the client.
+        control: Access to its controller.
+        complain: Sends the client a warning.
     """
 
     def __init__(self, robot: UrRobot, control: ControllerAccess, complain: Complain) -> None:
@@ -41,7 +41,7 @@ class InputWriter:
         self._told_of_force = False
 
     def write(self, values: dict[str, Value]) -> None:
-        """Take what one package says."""
+        """Set the variables of one package; values that are not finite are refused one by one."""
         for name, value in values.items():
             numbers = value if isinstance(value, tuple) else (value,)
             if not all(abs(number) <= LARGEST for number in numbers):
@@ -76,7 +76,7 @@ class InputWriter:
     # ------------------------------------------------------------------ registers
 
     def _set_registers(self, values: dict[str, Value]) -> None:
-        """Registers need no control."""
+        """Write registers, for which the client needs no control."""
         io = self._io
         watched = () if io is None else io.watched  # the program's watchdogs count every write
         news: dict[Hashable, object] = {
@@ -118,7 +118,7 @@ class InputWriter:
             self._change({"speed": fraction}, lambda token: SetSpeed(token=token, fraction=fraction))
 
     def _set_outputs(self, values: Iterable[str]) -> None:
-        """Digital and analogue outputs that a package is about, in one command."""
+        """Set, in one command, the digital and analogue outputs that the variables of a package refer to."""
         groups = {name.partition("_output")[0] for name in values}
         digital = {bit: on for bit, on in self._digital(groups) if self._is_digital_news(bit, on)}
         analog: dict[int, tuple[int, float]] = {}
@@ -143,7 +143,7 @@ class InputWriter:
         )
 
     def _digital(self, groups: set[str]) -> Iterator[tuple[int, bool]]:
-        """Digital outputs of these groups that are to be set."""
+        """Digital outputs of these groups whose bit in the mask is set: number and value of each."""
         for group, (first, count) in DIGITAL.items():
             if f"{group}_digital" not in groups or f"{group}_digital_output" not in self._held:
                 continue
@@ -159,7 +159,7 @@ class InputWriter:
         return self._ledger.is_news(("digital", bit), on, present)
 
     def _analog(self) -> Iterator[tuple[int, tuple[int, float]]]:
-        """Analogue outputs that are to be set: their type and share of the range."""
+        """Analogue outputs whose bit in the mask is set: number of each, and its type and share of the range."""
         mask, types = (int(self._number(f"standard_analog_output_{part}")) for part in ("mask", "type"))
         for number in range(2):
             name = f"standard_analog_output_{number}"
@@ -171,6 +171,7 @@ class InputWriter:
         present: tuple[int, float] | None = None
         if io is not None:
             value, voltage = io.standard_analog_output[number], io.analog_io_types >> (2 + number) & 1
+            # The robot publishes volts or amperes: the share computed from them differs from the one set by rounding.
             shown = analog_share(value, voltage=bool(voltage))
             present = voltage, ratio if isclose(shown, ratio, abs_tol=1e-9) else shown
         return self._ledger.is_news(("analog", number), (kind, ratio), present)
@@ -192,7 +193,7 @@ class InputWriter:
         self._control.change(command, self._answer_of(values))
 
     def _answer_of(self, values: dict[Hashable, object]) -> Callable[[Reply], None]:
-        """Takes the reply to a command that sets these values."""
+        """Return a function that handles the reply to a command that sets these values."""
 
         def then(reply: Reply) -> None:
             self._ledger.answered(values)
@@ -203,7 +204,7 @@ class InputWriter:
 
 
 def _present(io: Io, name: str) -> Number:
-    """What the robot shows of an input register."""
+    """Return the present value of an input register in the robot's `io`."""
     bank, first, wire = REGISTERS[name]
     registers: list[int] | list[float] = getattr(io, f"{bank}_register")
     if wire is Wire.BOOL:
@@ -212,7 +213,7 @@ def _present(io: Io, name: str) -> Number:
 
 
 def _runs(cells: dict[int, tuple[Number, bool]]) -> Iterator[tuple[int, tuple[Number, ...]]]:
-    """Registers in a row, from the first new one to the last: one command each."""
+    """Group registers with consecutive numbers: each group reaches from its first to its last new value."""
     run: list[Number] = []
     first = end = 0
     for number in [*sorted(cells), None]:
