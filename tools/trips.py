@@ -1,7 +1,7 @@
 """`python -m tools.trips`: through which modules a set-point, a tick, a package of RTDE and a program travel.
 
 Everything runs in one thread and without a clock, so that a profile sees the whole way; Zenoh's and asyncio's own
-frames are missing, and what is compiled counts as nothing. Runs in a checkout.
+frames are missing, and all that is compiled counts as one module. Runs in a checkout.
 """
 
 import argparse
@@ -10,9 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from struct import pack
-from types import FrameType
+from types import CodeType, FrameType
 from typing import Any
 
+from numba.core.dispatcher import Dispatcher
 from rich.console import Console
 from rich.table import Table
 
@@ -29,6 +30,7 @@ from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 from tvist_server.gateways.ur.rtde.session import RtdeSession
 from tvist_server.robot import ServedRobot
 
+COMPILED = "what is compiled"
 HOUSE = Path(__file__).parents[1]
 SERVO = """def servo():
   while True:
@@ -54,7 +56,7 @@ class Trip:
 
 def travelled(way: Callable[[], object]) -> Trip:
     """Run a function, and return what it has gone through."""
-    trip, here = Trip(), [""]
+    trip, here, kernels = Trip(), [""], _kernels()
 
     def see(frame: FrameType, event: str, _: object) -> None:
         file = frame.f_code.co_filename
@@ -63,6 +65,8 @@ def travelled(way: Callable[[], object]) -> Trip:
         module = str(Path(file).relative_to(HOUSE))
         if module == "tools/trips.py":
             return
+        if frame.f_code in kernels:
+            module = COMPILED
         if event == "call":
             trip.modules[module] = None
             trip.functions.add(id(frame.f_code))
@@ -76,6 +80,12 @@ def travelled(way: Callable[[], object]) -> Trip:
     finally:
         sys.setprofile(None)
     return trip
+
+
+def _kernels() -> set[CodeType]:
+    """Code of all functions that are compiled: numba lets a profile see them as if they were not."""
+    found = (vars(module).values() for name, module in sys.modules.items() if name.startswith("tvist"))
+    return {one.py_func.__code__ for values in found for one in values if isinstance(one, Dispatcher)}
 
 
 class Window(Gateway):

@@ -1,6 +1,8 @@
 """The power, brakes and condition of a plant that has them; simulated arms have none, and are always ready."""
 
-from tvist_plant.plant import PERIOD, Condition, Plant, Powered, Stoppable
+from typing import Self
+
+from tvist_plant.plant import PERIOD, Condition, Placeable, Plant, Powered, Stoppable
 from tvist_protocol.modes import RobotMode
 
 STALE = 10
@@ -21,6 +23,12 @@ class ArmPower:
         self._was_ready = False
         self._measured: float | None = None
         self._same = 0
+
+    @classmethod
+    def of(cls, plant: Plant) -> Self | None:
+        """Return the power of a plant; None if it has none, and no clock, as simulated arms."""
+        simulated = isinstance(plant, Placeable) and not isinstance(plant, Powered | Stoppable)
+        return None if simulated else cls(plant)
 
     @property
     def condition(self) -> Condition:

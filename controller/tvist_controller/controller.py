@@ -3,6 +3,7 @@
 It owns a `Session`, which grants control, and a `ControlCycle`, which moves the arm; neither knows of the other.
 """
 
+import math
 from functools import cached_property
 from typing import Any, Unpack
 
@@ -47,6 +48,7 @@ from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event, EventKind, State, Truth
+from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
 
@@ -73,6 +75,11 @@ class Controller:
         self._events: list[Event] = []
         self._stop_reasons = StopReasons()
         planner = Planner(setup)
+        self._look_at = -math.inf
+        """Time at which something may time out next; a command may bring it forward."""
+        self._changed = True
+        """Whether a command, an event or a program may have changed the modes since the last tick."""
+        self._modes = 0, 0, 0
         self._commands = CommandTable(planner, lambda: self.basis)
         first = planner.filters.first()
         self.cycle = ControlCycle(
@@ -110,6 +117,7 @@ class Controller:
         )  # fmt: skip
         for part in parts:
             self._commands.add(part.rows)
+        self._update_modes()
         self.report = self._report(self.cycle.sample)
         """Report of the last tick, or of the arm at rest if it has not ticked yet or was placed somewhere since."""
 
@@ -140,7 +148,7 @@ class Controller:
     @property
     def stop_reason(self) -> StopReason | None:
         """The stop that keeps the robot from moving; None if there is none."""
-        return self._stop_reasons.present(self.motion.activity.robot_mode, self.motion.safety_mode)
+        return self._stop_reasons.present(self.motion.robot_mode, self.motion.safety_mode)
 
     # ------------------------------------------------------------------ inputs
 
@@ -167,6 +175,7 @@ class Controller:
             origin: IP address of the machine that sent it, if known.
         """
         self.counters.commands += 1
+        self._attend()
         row = self._commands.row(command)
         try:
             token: Any = getattr(command, "token", None)
@@ -189,6 +198,7 @@ class Controller:
 
     def client_gone(self, client: str, session: str) -> None:
         """Handle the end of a client's session, which ends the rights it held."""
+        self._attend()
         self._authority.client_gone(client, session)
 
     def missed(self, ticks: int) -> None:
@@ -210,8 +220,11 @@ class Controller:
 
     def begin_tick(self) -> None:
         """Begin a control period: what has timed out ends, and programs have their turn."""
-        self._watch_time()
-        self.programs.advance(self.tick_number + 1)
+        if self.now >= self._look_at:
+            self._watch_time()
+        if not self.programs.idle:
+            self._attend()
+            self.programs.advance(self.tick_number + 1)
 
     def complete_tick(self) -> tuple[Report, list[Event]]:
         """Compute the rest of a control period that has begun."""
@@ -222,9 +235,11 @@ class Controller:
             sample = self.motion.recover(error, self._seed)
             self._reporter.restart()
             self._payload.begin_anew()
+            self._changed = True
         self._payload.watch(sample)
         self.filters.watch(sample)
-        self._stop_reasons.update(self.motion.activity.robot_mode, self.motion.safety_mode)
+        if self._changed or self.motion.changed:
+            self._update_modes()
         self.tick_number += 1
         events, self._events = self._events, []
         self.report = self._report(sample)
@@ -232,17 +247,28 @@ class Controller:
         return self.report, events
 
     def _report(self, sample: Sample) -> Report:
-        motion, robot_mode = self.motion, self.motion.activity.robot_mode
+        motion = self.motion
         return self._reporter.report(
             self.tick_number,
             sample,
             self.cycle.line.filter.tvist,
             self.cycle.line.drives.delay,
-            modes=(int(robot_mode), int(motion.safety_mode), int(motion.runtime)),
+            modes=self._modes,
             speed=motion.motions.speed,
             setpoint_sequence=motion.streams.sequence,
             missed_ticks=self.counters.missed_ticks,
         )
+
+    def _attend(self) -> None:
+        """Look in the next tick at what may have changed, and at what may have timed out."""
+        self._look_at, self._changed = -math.inf, True
+
+    def _update_modes(self) -> None:
+        motion, robot, safety = self.motion, self.motion.robot_mode, self.motion.safety_mode
+        self._stop_reasons.update(robot, safety)
+        self._modes = int(robot), int(safety), int(motion.runtime)
+        # A paused motion comes to a standstill without any event.
+        self._changed, motion.changed = motion.activity is Activity.PAUSED, False
 
     def io(self, *, wrench: bool = True) -> Io:
         """Return inputs, outputs and registers as they are for the next tick.
@@ -288,16 +314,20 @@ class Controller:
         """Store an event of the tick that is being computed, or of the next one between two ticks."""
         event = Event(tick=self.tick_number + 1, kind=kind, **fields)
         self._events.append(event)
+        self._changed = True
         if kind in {"protective_stop", "safety_stop"}:
             self._stop_reasons.note(event, self.motion.safety_mode)
         self.programs.hear(event)
 
     def _watch_time(self) -> None:
-        """End what has timed out or run its course."""
+        """End what has timed out or run its course, and note when something will next."""
         self._faults.end(self.tick_number + 1)
         self._authority.watch(self.now)
+        self._look_at = min(PERIOD * (self._faults.next_end - 1), self.session.ends)
         if self.setup.clock == "realtime":
             self.motion.watch(self.now)
+            self._look_at = min(self._look_at, self.motion.streams.silent_at)
+        self._changed = True
 
     def _interrupt(self, why: str) -> None:
         """End the activities that need control, when no client has control any more."""
@@ -326,6 +356,7 @@ class Controller:
 
     def _send(self, command: c.Command, plan: Plan | None) -> Reply | None:
         """Carry out a command of a program."""
+        self._attend()
         reply = self._commands.carry_out(command, self.tick_number + 1, self.now, plan)
         self.peripherals.changed |= self._commands.row(command).changes_io
         return reply
@@ -357,6 +388,7 @@ class Controller:
             self._stop_reasons.forget()
         self._reporter.restart()
         self._reporter.forget_modes()
+        self._update_modes()
         self.report = self._report(self.cycle.sample)
         self._payload.begin_anew()
         self.programs.steadiness.forget()

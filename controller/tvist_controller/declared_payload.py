@@ -37,7 +37,7 @@ class DeclaredPayload:
 
     def watch(self, sample: Sample) -> None:
         """Warn if the arm does not carry the declared payload; this cannot be checked while the brakes hold it."""
-        if self._motion.activity.robot_mode is not RobotMode.RUNNING:
+        if self._motion.robot_mode is not RobotMode.RUNNING:
             self._held = True
             return
         if self._held:

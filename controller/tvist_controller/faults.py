@@ -1,6 +1,7 @@
 """Deliberate faults: those of `simulation.inject`, applied to the arm or the safety system."""
 
 import heapq
+import math
 from collections.abc import Callable
 from itertools import count
 
@@ -84,6 +85,11 @@ class Faults:
                 self._at(ends, fault, end)
         else:
             self._momentary[fault]()
+
+    @property
+    def next_end(self) -> float:
+        """Number of the tick in which the next fault ends; infinite if none does."""
+        return self._ends[0][0] if self._ends else math.inf
 
     def end(self, tick: int) -> None:
         """End the faults whose time is over, before a tick."""

@@ -32,6 +32,8 @@ class LineMode(Enum):
     )  # fmt: skip
 
     def __init__(self, label: str, shaped: bool, guarded: bool, *followed_by: str) -> None:
+        self.at_rest = self.name == "REST"
+        """Whether the shaped reference rests."""
         self.label = label
         """The mode in words."""
         self.shaped = shaped
@@ -40,11 +42,6 @@ class LineMode(Enum):
         """Whether a shaped reference is played only if a stop leads on from it that meets nothing."""
         self.followed_by = followed_by
         """Names of the modes that may begin while it lasts."""
-
-    @property
-    def at_rest(self) -> bool:
-        """Whether the shaped reference rests."""
-        return self is LineMode.REST
 
 
 def check_change(before: LineMode, after: LineMode, *, guarded: bool) -> None:

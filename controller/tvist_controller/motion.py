@@ -50,8 +50,9 @@ class MotionControl:
     ) -> None:
         self.cycle = cycle
         self.collisions = collisions
+        self.changed = True
+        """Whether the activity may have changed since somebody has set this to False."""
         self.activity = PUT[mode]
-        """Present activity of the robot."""
         self.safety = SafetySystem()
         """The safety system."""
         self._emit = emit
@@ -60,7 +61,7 @@ class MotionControl:
         self.ahead = WayAhead(cycle, self.outlook, collisions)
         """Collision check of that motion."""
         self._protection = Protection(cycle)
-        self._power = ArmPower(cycle.line.plant)
+        self._power = ArmPower.of(cycle.line.plant)
         self.motions = Motions(cycle, self.safety, emit)
         """Motions by number, and their speed."""
         self.ahead.coming = lambda: self.motions.coming
@@ -68,6 +69,19 @@ class MotionControl:
         """The present stream of set-points, if there is one."""
         self.tcp: tuple[float, ...] = (0.0,) * 6
         """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
+
+    @property
+    def activity(self) -> Activity:
+        """Present activity of the robot."""
+        return self._activity
+
+    @activity.setter
+    def activity(self, activity: Activity) -> None:
+        # What every tick asks is looked up once.
+        self._activity, self._moving, self.robot_mode = activity, activity.moving, activity.robot_mode
+        self.may_move = after(activity, "move_j") is not None
+        """Whether a point-to-point motion may begin in the present activity."""
+        self.changed = True
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point for the motions that begin from now on; see `tcp`."""
@@ -77,11 +91,6 @@ class MotionControl:
     def streaming(self) -> bool:
         """Whether the robot follows a stream of set-points."""
         return self.streams.stream is not None
-
-    @property
-    def may_move(self) -> bool:
-        """Whether a point-to-point motion may begin in the present activity."""
-        return after(self.activity, "move_j") is not None
 
     def basis(self, on: FilterBasis) -> MotionBasis | None:
         """What a point-to-point motion from here depends on; None if the arm is busy or without power.
@@ -166,7 +175,8 @@ class MotionControl:
             why: The reason, for people.
         """
         target, plan, cycle = after(self.activity, "brakes"), None, self.cycle
-        self._power.stop()
+        if self._power is not None:
+            self._power.stop()
         self.activity = target or self.activity
         if target is not None and not cycle.mode.at_rest:
             stop = brake(cycle.description, cycle.line.plant.payload, cycle.line.shaped.joints.newest, PERIOD)
@@ -207,7 +217,8 @@ class MotionControl:
         sample = cycle.reset(cycle.line.shaped.joints.position, seed=seed)
         self._protection.forget()
         if not simulated:
-            self._power.stop()
+            if self._power is not None:
+                self._power.stop()
             self.activity = Activity.POWER_OFF
             if self.safety.latched is None:  # while an arm does not answer, every tick fails
                 self.safety.latched = "fault"
@@ -228,7 +239,7 @@ class MotionControl:
         if target is None:
             raise out_of_turn(trigger, self.activity)
         self.safety.check(trigger, self.activity)
-        if target.moving and not self.activity.moving and not self._power.condition.ready:
+        if target.moving and self._power is not None and not (self._moving or self._power.condition.ready):
             raise RefusalError(
                 "wrong_mode", "", "the drives of the arm are not ready: wait until they hold it"
             )
@@ -369,22 +380,24 @@ class MotionControl:
         Raises:
             PlantError: The arm's state is no longer finite; call `recover`.
         """
-        self._power.follow(self.activity.robot_mode)
+        if self._power is not None:
+            self._power.follow(self.robot_mode)
         sample = self.cycle.step()
         if sample.refused is not None and self.activity is not Activity.STOPPING:
             self.end("interruption", *sample.refused)
-        if self.cycle.mode.at_rest and self.activity.moving and (target := after(self.activity, "at_rest")):
+        if self._moving and self.cycle.mode.at_rest and (target := after(self.activity, "at_rest")):
             goes_on = self.activity is Activity.MOVING and self.motions.go_on()
             if not goes_on:
                 self.activity = target
                 self.motions.done()
-        if self.activity.robot_mode is RobotMode.RUNNING:
+        if self.robot_mode is RobotMode.RUNNING:
             for danger in self._protection.dangers(sample):
                 self.protect(danger.why, danger.code)
-        trouble = self._power.trouble(self.activity.robot_mode, sample.measured.timestamp)
-        if trouble is not None and self.safety.latched is None:
-            self.safety.latched = "fault"
-            self.brake(trouble)
+        if self._power is not None:
+            trouble = self._power.trouble(self.robot_mode, sample.measured.timestamp)
+            if trouble is not None and self.safety.latched is None:
+                self.safety.latched = "fault"
+                self.brake(trouble)
         return sample
 
     def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:

@@ -5,6 +5,7 @@ from msgspec import Struct
 
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.control.kinematics import ForwardKinematics
+from tvist_controller.control.line_tick import TORQUE
 from tvist_controller.sample import Sample
 from tvist_controller.state_layout import Layout, width, write_state
 from tvist_plant.plant import PERIOD
@@ -107,7 +108,7 @@ class Report(Struct, gc=False):
             target_q=target.q.tolist(),
             target_qd=target.qd.tolist(),
             target_qdd=target.qdd.tolist(),
-            target_moment=sample.torque.tolist(),
+            target_moment=sample.signals[TORQUE].tolist(),
             actual_q=measured.q.tolist(),
             actual_qd=measured.qd.tolist(),
             actual_moment=measured.moment.tolist(),

@@ -1,5 +1,6 @@
 """Control of the arm by lease. Motion, network and clock are not involved: the time is an argument."""
 
+import math
 from dataclasses import dataclass, replace
 
 from tvist_protocol.replies import Code, Refused
@@ -120,9 +121,14 @@ class Session:
         """End the lease."""
         self.lease = None
 
+    @property
+    def ends(self) -> float:
+        """Time at which the lease runs out if it is not renewed [s]; infinite if it does not."""
+        return self.lease.ends if self._timeouts and self.lease is not None else math.inf
+
     def expired(self, now: float) -> bool:
         """Return whether the lease has run out."""
-        return self._timeouts and self.lease is not None and now >= self.lease.ends
+        return now >= self.ends
 
     def client_gone(self, client: str, session: str) -> bool:
         """Handle the end of a client's session; return True if the lease ends with it."""

@@ -1,5 +1,7 @@
 """The present stream of set-points, and the counts of all streams."""
 
+import math
+
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.trajectory import SetpointStream
 
@@ -35,6 +37,12 @@ class Streaming:
     def refuse(self, why: str) -> None:
         """Remember why a set-point was rejected, to be reported if no valid one follows."""
         self._refused = why
+
+    @property
+    def silent_at(self) -> float:
+        """Time at which the stream counts as silent unless a set-point comes [s]; infinite without one."""
+        # A little early, since sums round: `silence` decides.
+        return math.inf if self.stream is None else self._heard + TIMEOUT - 1e-6
 
     def silence(self, now: float) -> str | None:
         """Return a sentence if set-points have stopped coming; None while they come."""

@@ -233,7 +233,7 @@ class FlexibleArm:
     def _measured(self, out: Floats, finite: bool) -> Measurement:
         if not finite:
             raise PlantError("the arm's state is no longer finite")
-        n = self.description.joints
+        n = len(self._phase)
         self._specific_force = out[3 * n :]
         return Measurement(
             out[:n], out[n : 2 * n], out[2 * n : 3 * n], self._accelerometer.read(self._specific_force)

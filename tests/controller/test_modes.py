@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.overload import TICKS, Overload
+from tvist_controller.protection import TICKS, Overload
 from tvist_controller.safety import REDUCED_SHARE
 from tvist_controller.session import NoControlError, Session
 from tvist_protocol import commands as c

@@ -86,7 +86,7 @@ class ProgramPlayer:
         """Programs in order of age."""
         self._starved: set[_Running] = set()
         """Programs for which nothing of the last tick's evaluations was left."""
-        self._left = 0
+        self._left = EVALUATIONS
         """Evaluations that the last tick left; below 0 they are a debt, which is paid before any program goes on."""
         self._now: _Running | None = None
         """The one whose turn it is."""
@@ -128,6 +128,11 @@ class ProgramPlayer:
     def steadiness(self) -> Steadiness:
         """The past postures of the arm."""
         return self._access.steadiness
+
+    @property
+    def idle(self) -> bool:
+        """Whether no program runs, and no debt of evaluations is left, so that `advance` has nothing to do."""
+        return not self._all and self._left >= EVALUATIONS
 
     def advance(self, tick: int) -> None:
         """Give every thread its turn; called first in every tick.
