@@ -88,9 +88,7 @@ class Controller:
             compensate_sag=setup.compensate_sag,
         )  # fmt: skip
         if setup.truth:
-            truth_of(
-                self.cycle.line.plant
-            )  # raises now rather than at the first tick if the plant has no truth
+            truth_of(self.cycle.line.plant)  # raises now, not at the first tick, if the plant has no truth
         self._seed = setup.seed
         self._reporter = Reporter(setup.description)
         self._wrench = ToolWrench(setup.description)
@@ -102,7 +100,7 @@ class Controller:
         )
         self.stepping = self._authority.stepping
         self._setpoints = Setpoints(self.session, self.motion, self.counters)
-        safety = SafetyControl(self.motion, self._emit)
+        self._safety = safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
         self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
         guidance = Guidance(self.motion)
@@ -230,9 +228,10 @@ class Controller:
         """Compute the rest of a control period that has begun."""
         try:
             sample = self.motion.step()
+            self._safety.watch(sample)
         except PlantError as error:
             self._faults.clear()
-            sample = self.motion.recover(error, self._seed)
+            sample = self._safety.recover(error, self._seed)
             self._reporter.restart()
             self._payload.begin_anew()
             self._changed = True
@@ -383,7 +382,7 @@ class Controller:
         if command.seed is not None:
             self._seed = command.seed
         self.cycle.reset(q, carried=carried, seed=self._seed)
-        self.motion.put(command.mode)
+        self._safety.put(command.mode)
         if command.mode is not None:
             self._stop_reasons.forget()
         self._reporter.restart()

@@ -7,9 +7,8 @@ from typing import Unpack
 
 import numpy as np
 
-from tvist_controller.activities import PUT, at_rest, runtime_of
+from tvist_controller.activities import PUT, runtime_of
 from tvist_controller.arm_power import ArmPower
-from tvist_controller.brakes import brake
 from tvist_controller.collision import CollisionModel
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.events import Emit, Told
@@ -18,7 +17,6 @@ from tvist_controller.motions import Motions
 from tvist_controller.outlook import Outlook
 from tvist_controller.planning.basis import FilterBasis, MotionBasis
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.protection import Protection
 from tvist_controller.refusal import RefusalError, out_of_turn
 from tvist_controller.safety import StreamTorqueRoom
 from tvist_controller.safety_system import SafetySystem
@@ -27,8 +25,8 @@ from tvist_controller.stops import StopPlan
 from tvist_controller.streaming import Streaming
 from tvist_controller.trajectory import MotionLimits, SetpointStream
 from tvist_controller.way_ahead import WayAhead
-from tvist_plant.plant import PERIOD, Placeable, PlantError
-from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_plant.plant import PERIOD
+from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_protocol.replies import Code
 from tvist_protocol.stream import EventKind
 from tvist_protocol.transitions import Activity, after
@@ -60,8 +58,8 @@ class MotionControl:
         """Forecast of the control line's motion."""
         self.ahead = WayAhead(cycle, self.outlook, collisions)
         """Collision check of that motion."""
-        self._protection = Protection(cycle)
-        self._power = ArmPower.of(cycle.line.plant)
+        self.power = ArmPower.of(cycle.line.plant)
+        """Power of an arm that has one."""
         self.motions = Motions(cycle, self.safety, emit)
         """Motions by number, and their speed."""
         self.ahead.coming = lambda: self.motions.coming
@@ -154,80 +152,10 @@ class MotionControl:
         """Present safety mode."""
         return self.safety.mode(self.activity)
 
-    def power_on(self, *, release_brakes: bool = True) -> None:
-        """Power the arm and release its brakes.
-
-        Args:
-            release_brakes: False to leave the brakes of an arm without power closed.
-
-        Raises:
-            RefusalError: The arm is moving, or is in a protective stop.
-        """
-        self.go("power_on" if release_brakes else "power")
-        if self.cycle.mode.at_rest and not isinstance(self.cycle.line.plant, Placeable):
-            # Without power the arm may have been moved, and its brakes stop it where they do.
-            self.cycle.reset(self.cycle.line.shaped.joints.position)
-
-    def brake(self, why: str) -> None:
-        """Stop with category 0: the power is off, and the brakes close at once.
-
-        Args:
-            why: The reason, for people.
-        """
-        target, plan, cycle = after(self.activity, "brakes"), None, self.cycle
-        if self._power is not None:
-            self._power.stop()
-        self.activity = target or self.activity
-        if target is not None and not cycle.mode.at_rest:
-            stop = brake(cycle.description, cycle.line.plant.payload, cycle.line.shaped.joints.newest, PERIOD)
-            way = float(np.abs(stop.end - cycle.line.shaped.joints.position).max())
-            plan = StopPlan(None, None, limited=False, duration=stop.duration, way=way)
-            self.outlook.brake(stop)
-        self._tell_end(plan, why, None, "safety_stop", 0)
-
     def protect(self, why: str, code: Code | None = None) -> None:
         """Make a protective stop; do nothing if the brakes hold the arm or its power is being switched off."""
         if after(self.activity, "protective_stop") is not None:
             self.end("protective_stop", why, code, kind="protective_stop")
-
-    def unlock(self) -> None:
-        """Unlock a protective stop.
-
-        Raises:
-            RefusalError: There is no protective stop, or the arm is still stopping.
-        """
-        self.go("unlock_protective_stop")
-        self._protection.forget()
-
-    def recover(self, error: PlantError, seed: int) -> Sample:
-        """Go on after the arm has failed: a simulated one is placed at rest at its reference, in a protective stop.
-
-        One that cannot be placed gets no power until the safety system is restarted.
-
-        Args:
-            error: The plant's error.
-            seed: Seed of the noise and gear errors.
-
-        Returns:
-            Signals with the new state.
-        """
-        cycle, simulated = self.cycle, isinstance(self.cycle.line.plant, Placeable)
-        why = f"{error}: the simulation put the arm at rest at its reference" if simulated else str(error)
-        self.abandon(why, "plant_failure")
-        sample = cycle.reset(cycle.line.shaped.joints.position, seed=seed)
-        self._protection.forget()
-        if not simulated:
-            if self._power is not None:
-                self._power.stop()
-            self.activity = Activity.POWER_OFF
-            if self.safety.latched is None:  # while an arm does not answer, every tick fails
-                self.safety.latched = "fault"
-                self._emit("safety_stop", code="plant_failure", why=why, category=0)
-            return sample
-        if after(self.activity, "plant_failure") is not None:
-            self.go("plant_failure")
-        self._emit("protective_stop", code="plant_failure", why=why)
-        return cycle.step()
 
     def check(self, trigger: str) -> Activity:
         """Return the activity that a trigger leads to.
@@ -239,7 +167,7 @@ class MotionControl:
         if target is None:
             raise out_of_turn(trigger, self.activity)
         self.safety.check(trigger, self.activity)
-        if target.moving and self._power is not None and not (self._moving or self._power.condition.ready):
+        if target.moving and self.power is not None and not (self._moving or self.power.condition.ready):
             raise RefusalError(
                 "wrong_mode", "", "the drives of the arm are not ready: wait until they hold it"
             )
@@ -337,11 +265,11 @@ class MotionControl:
             kept = "the motion's own" if plan.acceleration is None else f"{plan.acceleration:.3g} rad/s²"
             why = f"{why}; deceleration is {kept}, limited from {deceleration:.3g}"
         bare = not self.motions.running  # the end of a numbered motion reports the limit itself
-        self._tell_end(plan, why, code, kind, category)
+        self.tell_end(plan, why, code, kind, category)
         if bare and plan is not None and plan.limited:
             self._emit("warning", code="limit_acceleration", why=why)
 
-    def _tell_end(
+    def tell_end(
         self, plan: StopPlan | None, why: str, code: Code | None, kind: EventKind | None, category: int
     ) -> None:
         """Report a stop and what it has ended."""
@@ -359,15 +287,6 @@ class MotionControl:
         self._end_stream(why, code)
         self.motions.stopped(why, code)
 
-    def put(self, mode: ResetMode | None) -> None:
-        """Set the robot mode of an arm that was placed somewhere at rest; None for the present mode, at rest."""
-        if mode is not None:
-            self.activity = PUT[mode]
-            self.safety.clear()
-        else:
-            self.activity = at_rest(self.activity, emergency=bool(self.safety.emergencies))
-        self._protection.forget()
-
     def watch(self, now: float) -> None:
         """End a stream that is no longer fed."""
         silence = self.streams.silence(now)
@@ -380,8 +299,8 @@ class MotionControl:
         Raises:
             PlantError: The arm's state is no longer finite; call `recover`.
         """
-        if self._power is not None:
-            self._power.follow(self.robot_mode)
+        if self.power is not None:
+            self.power.follow(self.robot_mode)
         sample = self.cycle.step()
         if sample.refused is not None and self.activity is not Activity.STOPPING:
             self.end("interruption", *sample.refused)
@@ -390,14 +309,6 @@ class MotionControl:
             if not goes_on:
                 self.activity = target
                 self.motions.done()
-        if self.robot_mode is RobotMode.RUNNING:
-            for danger in self._protection.dangers(sample):
-                self.protect(danger.why, danger.code)
-        if self._power is not None:
-            trouble = self._power.trouble(self.robot_mode, sample.measured.timestamp)
-            if trouble is not None and self.safety.latched is None:
-                self.safety.latched = "fault"
-                self.brake(trouble)
         return sample
 
     def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:

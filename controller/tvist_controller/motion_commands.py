@@ -37,7 +37,7 @@ class MotionCommands:
             Row(c.SetSpeed, self._set_speed, changes_io=True),
             Row(c.PowerOn, self._power_on),
             Row(c.PowerOff, self._power_off),
-            Row(c.UnlockProtectiveStop, lambda _: motion.unlock()),
+            Row(c.UnlockProtectiveStop, lambda _: safety.unlock()),
             Row(c.RestartSafety, lambda _: motion.safety.restart()),
         )
 
@@ -68,7 +68,7 @@ class MotionCommands:
         self._motion.motions.set_speed(call.command.fraction)
 
     def _power_on(self, call: Call[c.PowerOn]) -> None:
-        self._motion.power_on(release_brakes=call.command.release_brakes)
+        self._safety.power_on(release_brakes=call.command.release_brakes)
 
     def _power_off(self, _: Call[c.PowerOff]) -> None:
         why = "power_off was commanded"

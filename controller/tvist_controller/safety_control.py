@@ -1,14 +1,24 @@
-"""Actions of the safety system: reduced speed, and stops of UR's categories 0, 1 and 2."""
+"""Actions of the safety system: reduced speed, stops of UR's categories 0, 1 and 2, power and protective stops."""
 
+import numpy as np
+
+from tvist_controller.activities import PUT, at_rest
+from tvist_controller.brakes import brake
 from tvist_controller.events import Emit
 from tvist_controller.motion import MotionControl
+from tvist_controller.protection import Protection
 from tvist_controller.safety import REDUCED_SHARE
 from tvist_controller.safety_system import Emergency, Latched
+from tvist_controller.sample import Sample
+from tvist_controller.stops import StopPlan
+from tvist_plant.plant import PERIOD, Placeable, PlantError
+from tvist_protocol.modes import RobotMode
 from tvist_protocol.transitions import Activity, after
+from tvist_protocol.values import ResetMode
 
 
 class SafetyControl:
-    """Carries out what the safety system's inputs request and what its faults require.
+    """Carries out what the safety system's inputs request, what its faults require, and what becomes of the power.
 
     Args:
         motion: The robot's motion.
@@ -17,6 +27,7 @@ class SafetyControl:
 
     def __init__(self, motion: MotionControl, emit: Emit) -> None:
         self._motion, self._emit = motion, emit
+        self._protection = Protection(motion.cycle)
         self._goes_on = False
         """Whether the motion that a safeguard has paused resumes by itself when the safeguard is released."""
 
@@ -83,13 +94,102 @@ class SafetyControl:
         self.safeguard(stopped=False)
         self._motion.safety.emergencies.clear()
 
+    # ------------------------------------------------------------------ power, brakes and protective stops
+
+    def power_on(self, *, release_brakes: bool = True) -> None:
+        """Power the arm and release its brakes.
+
+        Args:
+            release_brakes: False to leave the brakes of an arm without power closed.
+
+        Raises:
+            RefusalError: The arm is moving, or is in a protective stop.
+        """
+        motion, cycle = self._motion, self._motion.cycle
+        motion.go("power_on" if release_brakes else "power")
+        if cycle.mode.at_rest and not isinstance(cycle.line.plant, Placeable):
+            # Without power the arm may have been moved, and its brakes stop it where they do.
+            cycle.reset(cycle.line.shaped.joints.position)
+
     def cut_power(self, why: str, latched: Latched | None = None) -> None:
-        """Stop with category 0: the brakes close at once.
+        """Stop with category 0: the power is off, and the brakes close at once.
 
         Args:
             why: The reason, for people.
             latched: Violation or fault that the safety system latches until it is restarted; None if there is none.
         """
+        motion, cycle, plan = self._motion, self._motion.cycle, None
         if latched is not None:
-            self._motion.safety.latched = latched
-        self._motion.brake(why)
+            motion.safety.latched = latched
+        if motion.power is not None:
+            motion.power.stop()
+        target = after(motion.activity, "brakes")
+        motion.activity = target or motion.activity
+        if target is not None and not cycle.mode.at_rest:
+            joints = cycle.line.shaped.joints
+            stop = brake(cycle.description, cycle.line.plant.payload, joints.newest, PERIOD)
+            way = float(np.abs(stop.end - joints.position).max())
+            plan = StopPlan(None, None, limited=False, duration=stop.duration, way=way)
+            motion.outlook.brake(stop)
+        motion.tell_end(plan, why, None, "safety_stop", 0)
+
+    def unlock(self) -> None:
+        """Unlock a protective stop.
+
+        Raises:
+            RefusalError: There is no protective stop, or the arm is still stopping.
+        """
+        self._motion.go("unlock_protective_stop")
+        self._protection.forget()
+
+    def watch(self, sample: Sample) -> None:
+        """Stop the arm if the latest tick has shown a danger, or the arm says that it cannot go on."""
+        motion = self._motion
+        if motion.robot_mode is RobotMode.RUNNING:
+            for danger in self._protection.dangers(sample):
+                motion.protect(danger.why, danger.code)
+        if motion.power is not None:
+            trouble = motion.power.trouble(motion.robot_mode, sample.measured.timestamp)
+            if trouble is not None and motion.safety.latched is None:
+                self.cut_power(trouble, "fault")
+
+    def recover(self, error: PlantError, seed: int) -> Sample:
+        """Go on after the arm has failed: a simulated one is placed at rest at its reference, in a protective stop.
+
+        One that cannot be placed gets no power until the safety system is restarted.
+
+        Args:
+            error: The plant's error.
+            seed: Seed of the noise and gear errors.
+
+        Returns:
+            Signals with the new state.
+        """
+        motion, cycle = self._motion, self._motion.cycle
+        simulated = isinstance(cycle.line.plant, Placeable)
+        why = f"{error}: the simulation put the arm at rest at its reference" if simulated else str(error)
+        motion.abandon(why, "plant_failure")
+        sample = cycle.reset(cycle.line.shaped.joints.position, seed=seed)
+        self._protection.forget()
+        if not simulated:
+            if motion.power is not None:
+                motion.power.stop()
+            motion.activity = Activity.POWER_OFF
+            if motion.safety.latched is None:  # while an arm does not answer, every tick fails
+                motion.safety.latched = "fault"
+                self._emit("safety_stop", code="plant_failure", why=why, category=0)
+            return sample
+        if after(motion.activity, "plant_failure") is not None:
+            motion.go("plant_failure")
+        self._emit("protective_stop", code="plant_failure", why=why)
+        return cycle.step()
+
+    def put(self, mode: ResetMode | None) -> None:
+        """Set the robot mode of an arm that was placed somewhere at rest; None for the present mode, at rest."""
+        motion = self._motion
+        if mode is not None:
+            motion.activity = PUT[mode]
+            motion.safety.clear()
+        else:
+            motion.activity = at_rest(motion.activity, emergency=bool(motion.safety.emergencies))
+        self._protection.forget()
