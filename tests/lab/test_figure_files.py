@@ -41,7 +41,7 @@ def found():
 @pytest.fixture(scope="module")
 def make(drawn, recorded, found):
     """Make a figure by its name, from small data."""
-    from tvist_lab.figures.compared import compared_figure
+    from tvist_lab.figures import compared_figure
 
     def judged(count, *, counts=True):
         return [
