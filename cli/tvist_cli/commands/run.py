@@ -91,14 +91,14 @@ def run(
     job.tell(watch)
     job.tell.clear()
     if json:
-        from tvist_lab.programs.report import as_dict
+        from tvist_lab.programs.watch import as_dict
 
         print_json(
             {"file": named(program), "lockstep": lockstep, "recording": checked.record, **as_dict(watch)}
         )
     failure = _failure(program, watch, errors)
     if failure is None and not json:
-        from tvist_lab.programs.report import summary
+        from tvist_lab.programs.watch import summary
 
         say(summary(watch))
     sys.stdout.flush()

@@ -13,13 +13,21 @@ from tvist_lab.metrics.common_clock import (
 )
 from tvist_lab.metrics.comparison import ComparedMotion, Comparison, compare
 from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.measured import Measured
 from tvist_lab.metrics.motion import MotionRows, motions
-from tvist_lab.metrics.notes import grouped_notes
 from tvist_lab.metrics.residual import ModalResidual, Residual, residual, residual_by_modes
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
 from tvist_lab.metrics.settling import Settling, attained_position, distance, settling
-from tvist_lab.metrics.table import MotionResult, Runs, Table, analyze, measure, table_2, table_notes
+from tvist_lab.metrics.table import (
+    Measured,
+    MotionResult,
+    Runs,
+    Table,
+    analyze,
+    grouped_notes,
+    measure,
+    table_2,
+    table_notes,
+)
 from tvist_lab.metrics.vibration import amplitude, best_tool_acceleration, tool_acceleration
 
 __all__ = [

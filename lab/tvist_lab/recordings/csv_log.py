@@ -59,8 +59,8 @@ def read_csv(path: Path, columns: str | None = None) -> Recording:
         columns: Names of its columns, as `named` reads them; None for RTDE's.
 
     Raises:
-        LogError: The file has no header of several names, cells that are no numbers, decimal commas between commas, or no rows;
-            or see `named` and `recording_of`.
+        LogError: The file has no header of several names, cells that are no numbers, decimal commas between commas, or
+            no rows; or see `named` and `recording_of`.
         OSError: The file cannot be read.
     """
     lines = _lines(path)
