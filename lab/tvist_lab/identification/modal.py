@@ -16,7 +16,7 @@ from tvist_lab.identification.fit import spread
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.modal_calibration import TOLD, ModeErrors, calibrate
 from tvist_lab.identification.modal_plan import ModalPlan, check, free_configurations
-from tvist_lab.identification.ring_downs import Jog, Ringing, listen
+from tvist_lab.identification.ring_downs import Jog, Ringing, listen, or_none
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats, RecordingError
 from tvist_plant.description import RobotDescription
@@ -140,12 +140,8 @@ async def _carry(control: Arm, payload: Payload) -> None:
 async def _ringing(robot: Robot, control: Arm, q: Floats, payload: int, jog: Jog) -> Ringing | None:
     """Measure the ring-down at a configuration; return None if it cannot be reached or was not received completely."""
     try:
-        return await listen(robot, control, q, payload, jog)
+        return await or_none(listen(robot, control, q, payload, jog))
     except RecordingError:
-        return None
-    except RefusedError as error:
-        if error.reply.code != "collision":
-            raise
         return None
 
 
