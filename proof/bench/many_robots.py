@@ -9,7 +9,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from tvist_client.transports.session import close_session, open_session
-from tvist_lab.bench.process import cpu_seconds
+from tvist_lab.bench.one_robot import cpu_seconds
 from tvist_lab.served import served
 from tvist_protocol import keys
 

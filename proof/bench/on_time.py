@@ -11,7 +11,7 @@ import numpy as np
 from scipy import stats
 
 from proof.bench.readers import helper, readers
-from tvist_lab.bench.lateness import missed_share
+from tvist_lab.bench.one_robot import missed_share
 from tvist_lab.served import Served, served
 from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import Telemetry

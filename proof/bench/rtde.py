@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 from proof.bench.figure import Figure, figure
 from proof.bench.readers import helper, readers
-from tvist_lab.bench.one_robot import punctuality
-from tvist_lab.bench.process import cpu_seconds
+from tvist_lab.bench.one_robot import cpu_seconds, punctuality
 from tvist_lab.served import free_port, served
 from tvist_plant.plant import PERIOD
 from tvist_server.ur_ports import UrPorts
