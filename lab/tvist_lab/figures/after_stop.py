@@ -47,6 +47,8 @@ HEADROOM = 1.6
 """Height of the axis over the larger peak [-]: the end of the braking shows, and the peaks are not small."""
 WORDS_AT = 0.1
 """Where the curves' names begin [s]."""
+BEFORE, AFTER = 0.1, 0.6
+"""Time shown before and after the stop in the first of several recordings [s]."""
 
 
 @dataclass(frozen=True)
@@ -162,10 +164,6 @@ def _curve(recorded: Recorded, length: float) -> _Curve:
     except NotMeasurableError:
         still = None
     return _Curve(time, alpha, counts, peak, at, still)
-
-
-BEFORE, AFTER = 0.1, 0.6
-"""Time shown before and after the stop in the first recording [s]."""
 
 
 def compared_figure(name: str, recorded: Sequence[tuple[str, Recorded]]) -> Figure:

@@ -29,7 +29,7 @@ from tvist_lab.metrics.settling import REPEATABILITY, Settling, distance, settli
 from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 
 BEFORE, AFTER = 0.06, 0.15
-"""Time shown before the stop of the unshaped reference and after the last of the marked times [s]."""
+"""Time shown in figure 15 before the stop of the unshaped reference and after the last of the marked times [s]."""
 SYMBOLS = {
     "$E$": "distance of the tool from where it comes to rest",
     r"$t_b$, $t_b^*$": "stop of the reference and of the shaped one",
@@ -39,6 +39,16 @@ SYMBOLS = {
     r"$t_\mathrm{stb}$": "stabilisation time",
     r"$e_\mathrm{os}$": "overshoot",
 }
+LEAD = 0.1
+"""Time shown in figure 16 before the unshaped reference stops [s]."""
+TAIL = 0.4
+"""Time shown in figure 16 after the shaped reference stops [s]."""
+QUIET = 0.2
+"""Time at the end of the recorded rest that tells the noise [s]."""
+LOUD = 1.2
+"""Height over the largest noise from which a peak is one of a vibration [-]; a decay needs two of them."""
+DASHES = (0, (4, 2))
+"""Dash pattern of a fitted curve."""
 
 
 def figure_15(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
@@ -128,18 +138,6 @@ def _span(panel: Axes, left: float, right: float, height: float, words: str) -> 
         va="bottom",
         bbox={"boxstyle": "square,pad=0.1", "facecolor": tint(INK, 0.0), "edgecolor": "none"},
     )
-
-
-LEAD = 0.1
-"""Time shown before the unshaped reference stops [s]."""
-TAIL = 0.4
-"""Time shown after the shaped reference stops [s]."""
-QUIET = 0.2
-"""Time at the end of the recorded rest that tells the noise [s]."""
-LOUD = 1.2
-"""Height over the largest noise from which a peak is one of a vibration [-]; a decay needs two of them."""
-DASHES = (0, (4, 2))
-"""Dash pattern of a fitted curve."""
 
 
 def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
