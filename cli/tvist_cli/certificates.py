@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Literal, Self
 
 from cryptography import x509
-from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
@@ -132,14 +131,6 @@ class CertificateAuthority(Pair):
         if pair.until > self.until:
             raise CertificateError(f"days is {days}: the authority itself expires on {self.until:%Y-%m-%d}")
         return pair
-
-    def signed(self, certificate: x509.Certificate) -> bool:
-        """Whether this authority signed a certificate."""
-        try:
-            certificate.verify_directly_issued_by(self.certificate)
-        except (ValueError, TypeError, InvalidSignature):
-            return False
-        return True
 
 
 def common_name(certificate: x509.Certificate) -> str:

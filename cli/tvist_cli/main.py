@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tvist_cli.overview import ABOUT, overview
 from tvist_cli.study_names import STUDY
 from tvist_server.ending import end_like_interrupted, ending_signals
 
 if TYPE_CHECKING:
     import cyclopts
 
+ABOUT = "A robot controller for a flexible arm in simulation, with time-varying input shaping."
 LOG = {
     "record": "Record a served robot as MCAP.",
     "info": "Print what a recording holds.",
@@ -123,6 +123,22 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
     return app
 
 
+def _overview() -> str:
+    """Return the help of the program, made without the parser, which takes longer to import."""
+    width = max(map(len, COMMANDS)) + 2
+    lines = ["Usage: tvist COMMAND", "", ABOUT, ""]
+    for group, commands in GROUPS.items():
+        lines += [f"{group}:", *(f"  {name:<{width}}{what}" for name, what in commands.items()), ""]
+    return "\n".join(
+        [
+            *lines,
+            "Options:",
+            f"  {'--help':<{width}}Print this list; after a command, print what it does and its options.",
+            f"  {'--version':<{width}}Print the version.",
+        ]
+    )
+
+
 def _known(chain: Sequence[str]) -> Mapping[str, str]:
     """Return the commands among which one was sought."""
     return OF_GROUPS.get(chain[0], COMMANDS) if chain else COMMANDS
@@ -148,7 +164,7 @@ def _run() -> None:
         end_like_interrupted()
     if sys.argv[1:] in (["--help"], ["-h"]):
         try:
-            print(overview(GROUPS), flush=True)
+            print(_overview(), flush=True)
         except BrokenPipeError:  # the reader has seen enough
             os._exit(1)
         return

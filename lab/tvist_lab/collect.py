@@ -22,11 +22,13 @@ class Collected:
 
         On a network the truth of a tick may come before or after its state.
         """
+        from tvist_lab.recordings.recorded_columns import recording_of_messages
+
         states = self.states
         if self.truths:
             first, last = self.truths[0].tick, self.truths[-1].tick
             states = [state for state in states if first <= state.tick <= last]
-        return Recording.from_states(states, self.events, self.truths)
+        return recording_of_messages(states, self.events, self.truths)
 
 
 @contextmanager

@@ -7,8 +7,7 @@ from typing import Any
 
 from tvist_lab.metrics import motions
 from tvist_lab.recordings import Recording, RecordingError, mcap_file, read
-from tvist_lab.recordings.description import ordered
-from tvist_lab.recordings.units import meaning_of
+from tvist_lab.recordings.description import meaning_of, ordered
 
 
 def summary(path: str | os.PathLike[str], columns: str | None = None) -> dict[str, Any]:

@@ -1,9 +1,12 @@
-"""Processor time of a tick: of the plant, the filter, Figure 6 and the whole line, relative to MuJoCo's tick."""
+"""Processor time of ticks beside MuJoCo's: of plant, filter, Figure 6 and the whole line; and of a whole motion."""
 
+import time
 from collections.abc import Callable
 
+import numpy as np
+
 from proof.bench.figure import Figure, figure, in_alternation
-from tvist_controller.api.line import body
+from tvist_controller.api.line import DrivenLine, body, respond
 from tvist_lab.bench.moving import (
     Run,
     arm_tick,
@@ -16,14 +19,19 @@ from tvist_lab.bench.moving import (
 )  # fmt: skip
 from tvist_lab.in_process import free_setup
 from tvist_lab.second_opinion import SecondOpinion
+from tvist_lab.studies.paper.published import pose
+from tvist_lab.study.line import Unchanged, point_to_point
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD
+from tvist_shaping import TvistFilter, shaper
 
-REPETITIONS = 20
+OF_TICKS = 20
 SHAPERS = ("zv", "auto")
 """Filters with which the line is measured; the first one is that of a robot without options."""
 MUJOCO_STEP = 0.00025
 """Step at which MuJoCo agrees with our plant [s]."""
 MUJOCO = "MuJoCo's tick"
+OF_MOTIONS = 30
 
 
 def line(tell: Callable[[str], None]) -> dict[str, Figure]:
@@ -37,7 +45,7 @@ def line(tell: Callable[[str], None]) -> dict[str, Figure]:
         "mujoco": _mujoco_tick(), "plant": plant_tick(), "filter": _filter_tick(), "cycle": cycle_tick(),
         **{_key(name): line_tick(name) for name in SHAPERS},
     }  # fmt: skip
-    found = in_alternation(runs, REPETITIONS)
+    found = in_alternation(runs, OF_TICKS)
     mujoco, usual = found.pop("mujoco"), SHAPERS[0]
     said = {
         "plant": "2 ms of the flexible arm",
@@ -79,3 +87,51 @@ def _filter_tick() -> Run:
         return us_per_tick(go)
 
     return run
+
+
+def whole_motion(tell: Callable[[str], None]) -> dict[str, Figure]:
+    """Measure a whole motion and its arm.
+
+    The motion goes from Q1 to Q3, shaped by zv. What counts is what a study repeats: the filter, the line to the drives
+    and the arm, of which each is prepared once.
+
+    Args:
+        tell: Called with a description of the measurement before it starts.
+    """
+    tell("a whole motion in one go, and its arm alone")
+    setup = free_setup(truth=False, shaper="zv")
+    start, target, payload = np.array(pose("Q1")), np.array(pose("Q3")), body(setup.payload)
+    reference = point_to_point(start, target)
+    whole = np.concatenate([reference, np.tile(target, (200, 1))])
+    tvist = TvistFilter(shaper(setup.shaper), setup.estimator(), joints=len(start))
+    line, arm = (
+        DrivenLine(setup.description, Unchanged(len(start)), start, payload),
+        FlexibleArm(setup.description, payload),
+    )
+
+    def shaped() -> None:
+        tvist.reset(start)
+        respond(arm, line.drive(start, tvist.filter_all(whole), len(whole)), 0)
+
+    tvist.reset(start)
+    driven = line.drive(start, tvist.filter_all(whole), len(whole))
+
+    def alone() -> None:
+        respond(arm, driven, 0)
+
+    ticks = len(whole)
+    found = in_alternation(
+        {"whole": lambda: _us(shaped, ticks), "alone": lambda: _us(alone, ticks)}, OF_MOTIONS
+    )
+    return {
+        "motion_us_per_tick": figure(
+            "a whole motion in one go", "µs per tick", found["whole"], "its arm alone", found["alone"]
+        )
+    }
+
+
+def _us(call: Callable[[], None], ticks: int) -> float:
+    """Processor time of a call for each of its ticks [us]."""
+    began = time.thread_time()
+    call()
+    return 1e6 * (time.thread_time() - began) / ticks

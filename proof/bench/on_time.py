@@ -4,15 +4,14 @@ import asyncio
 import json
 import os
 import signal
-import sys
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, nullcontext
 
 import numpy as np
 from scipy import stats
 
-from proof.bench.readers import readers
-from tvist_lab.bench.lateness import missed_share
+from proof.bench.readers import helper, readers
+from tvist_lab.bench.one_robot import missed_share
 from tvist_lab.served import Served, served
 from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import Telemetry
@@ -99,20 +98,14 @@ async def _robot_missed(server: Served) -> float:
 
 @asynccontextmanager
 async def _bare_thread() -> AsyncIterator[Callable[[], "asyncio.Future[float]"]]:
-    pipe = asyncio.subprocess.PIPE
-    command = [sys.executable, "-m", "proof.bench.bare_thread", str(SEGMENT)]
-    process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe)
-    assert process.stdin is not None
-    assert process.stdout is not None
-    told, answers = process.stdin, process.stdout
+    async with helper("bare_thread", str(SEGMENT)) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        told, answers = process.stdin, process.stdout
 
-    async def measure() -> float:
-        told.write(b"\n")
-        counted = json.loads(await answers.readline())
-        return float(100.0 * counted["missed"] / counted["ticks"])
+        async def measure() -> float:
+            told.write(b"\n")
+            counted = json.loads(await answers.readline())
+            return float(100.0 * counted["missed"] / counted["ticks"])
 
-    try:
         yield lambda: asyncio.ensure_future(measure())
-    finally:
-        told.close()
-        await process.wait()

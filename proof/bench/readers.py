@@ -1,10 +1,30 @@
-"""Clients that only read, in a separate process, and their final counts."""
+"""Helpers of a measurement in processes of their own, which end with their stdin: readers, and others."""
 
-import asyncio
 import json
 import sys
+from asyncio.subprocess import PIPE, Process, create_subprocess_exec
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+
+
+@asynccontextmanager
+async def helper(module: str, *arguments: str) -> AsyncIterator[Process]:
+    """Run a module of this package, and end it by the end of its stdin.
+
+    Args:
+        module: Name of the module.
+        arguments: Arguments of the module.
+    """
+    command = [sys.executable, "-m", f"proof.bench.{module}", *arguments]
+    process = await create_subprocess_exec(*command, stdin=PIPE, stdout=PIPE)
+    try:
+        yield process
+        if process.returncode is None:
+            await process.communicate(b"")
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
 
 
 @asynccontextmanager
@@ -18,17 +38,10 @@ async def readers(module: str, *arguments: str) -> AsyncIterator[list[dict[str, 
     Yields:
         A list, which at the end contains the numbers received and lost of each client.
     """
-    command = [sys.executable, "-m", f"proof.bench.{module}", *arguments]
-    pipe = asyncio.subprocess.PIPE
-    process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe)
     said: list[dict[str, int]] = []
-    try:
+    async with helper(module, *arguments) as process:
         assert process.stdout is not None
         await process.stdout.readline()  # all clients are reading
         yield said
-        out, _ = await process.communicate(b"")  # closes its stdin
+        out, _ = await process.communicate(b"")
         said += json.loads(out)
-    finally:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()

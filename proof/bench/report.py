@@ -7,14 +7,12 @@ from typing import Any
 import msgspec
 
 from proof.bench.figure import Figure, figure
-from proof.bench.line import line
-from proof.bench.many_robots import us_per_robot_and_tick
-from proof.bench.memory import memory
+from proof.bench.line import line, whole_motion
+from proof.bench.many_robots import memory, us_per_robot_and_tick
 from proof.bench.observed import observed
 from proof.bench.programs import programs
 from proof.bench.rtde import rtde
 from proof.bench.start import start
-from proof.bench.whole_motion import whole_motion
 from tvist_lab.bench.machine import this_machine
 from tvist_lab.bench.many_robots import robots_at_500_hz
 from tvist_lab.bench.moving import line_tick

@@ -1,15 +1,12 @@
 """What clients of RTDE cost a served robot, beside a process that only sends."""
 
 import asyncio
-import sys
 import time
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Callable
 
 from proof.bench.figure import Figure, figure
-from proof.bench.readers import readers
-from tvist_lab.bench.one_robot import punctuality
-from tvist_lab.bench.process import cpu_seconds
+from proof.bench.readers import helper, readers
+from tvist_lab.bench.one_robot import cpu_seconds, punctuality
 from tvist_lab.served import free_port, served
 from tvist_plant.plant import PERIOD
 from tvist_server.ur_ports import UrPorts
@@ -35,7 +32,7 @@ async def rtde(seconds: float, tell: Callable[[str], None]) -> dict[str, Figure]
     port, bare_port = str(free_port()), str(free_port())
     part, several = max(SHORTEST, seconds / ROUNDS), str(CLIENTS)
     ours, theirs = [], []
-    async with served(_options(port)) as server, _sender(bare_port) as sender:
+    async with served(_options(port)) as server, helper("bare_send", ADDRESS, bare_port) as sender:
         await server.robot.state()
         for number in range(ROUNDS):
             tell(
@@ -46,26 +43,15 @@ async def rtde(seconds: float, tell: Callable[[str], None]) -> dict[str, Figure]
                 _, share = await punctuality(server, part)
             assert all(one["received"] for one in said), "a client has received nothing"
             ours.append(share - alone)
-            alone = await _share(sender, part)
+            alone = await _share(sender.pid, part)
             async with readers("rtde_clients", ADDRESS, bare_port, several):
-                theirs.append(await _share(sender, part) - alone)
+                theirs.append(await _share(sender.pid, part) - alone)
     scale = 1e6 * PERIOD / CLIENTS
     found = figure(
         "an RTDE client, of ten with different recipes", "µs per tick", [scale * share for share in ours],
         "a bare send() of as many bytes", [scale * share for share in theirs],
     )  # fmt: skip
     return {"rtde_us_per_client_and_tick": found}
-
-
-@asynccontextmanager
-async def _sender(port: str) -> AsyncIterator[int]:
-    """Run the process that only sends; yield its number."""
-    command = [sys.executable, "-m", "proof.bench.bare_send", ADDRESS, port]
-    process = await asyncio.create_subprocess_exec(*command, stdin=asyncio.subprocess.PIPE)
-    try:
-        yield process.pid
-    finally:
-        await process.communicate(b"")
 
 
 async def _share(pid: int, seconds: float) -> float:

@@ -20,8 +20,7 @@ from proof.bench.readers import readers
 from tvist_client.arm import Arm
 from tvist_client.errors import StreamStoppedError
 from tvist_client.servo import Servo
-from tvist_lab.bench.lateness import missed_share, over_all
-from tvist_lab.bench.process import cpu_seconds, rss_mb
+from tvist_lab.bench.one_robot import cpu_seconds, missed_share, over_all, rss_mb
 from tvist_lab.served import Served, served
 from tvist_plant.plant import PERIOD
 from tvist_protocol.recorded import END_METADATA, TICK_NS

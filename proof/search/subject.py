@@ -1,18 +1,33 @@
 """The robot under test: a controller in this process, driven tick by tick, with a record of its motion."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import msgspec
 import numpy as np
 
-from proof.search.own_calibration import own_calibration
-from tvist_controller.api.line import STILL, InverseDynamics, Setup, body, central_differences
+from tvist_controller.api.line import (
+    STILL,
+    InverseDynamics,
+    Setup,
+    body,
+    calibrations,
+    central_differences,
+    default_calibration,
+    drivetrain,
+    load_calibration,
+    paper_payload,
+)
 from tvist_controller.api.robot import Controller
+from tvist_lab.identification.modal_calibration import mode_range
 from tvist_lab.recordings import Floats
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
+from tvist_plant.model import flexible_model
 from tvist_plant.plant import PERIOD, Measurement
 from tvist_protocol import commands as c
+from tvist_protocol.calibration import Calibration, ModalParameter, Quantity
 from tvist_protocol.info import Clock
 from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_protocol.stream import Event
@@ -21,6 +36,8 @@ from tvist_protocol.values import Payload as Declared
 
 CLIENT, SESSION = "searcher", "5e55"
 """Name and session of the client in control."""
+_OF_DRIVES: tuple[Quantity, ...] = ("gear_stiffness", "rotor_inertia", "velocity_gain", "position_gain")
+_made: dict[str, Calibration] = {}
 
 
 class RigidArm:
@@ -164,3 +181,36 @@ def speeds(description: RobotDescription, references: Floats) -> tuple[float, fl
 def refused(reply: Reply) -> bool:
     """Return whether a reply is a refusal."""
     return isinstance(reply, Refused)
+
+
+def own_calibration(arm: RobotDescription) -> Calibration:
+    """Return the calibration that `tvist serve` uses, or if none is modal what a perfect identification would find."""
+    model = arm.robot.model
+    if any(one.robot == model and one.modal is not None for one in map(load_calibration, calibrations())):
+        return load_calibration(str(default_calibration(model)))
+    if model not in _made:
+        _made[model] = _of_its_file(arm)
+    return _made[model]
+
+
+def _of_its_file(arm: RobotDescription) -> Calibration:
+    drives, joints, replace = arm.drives, range(arm.joints), msgspec.structs.replace
+    rows: list[tuple[Quantity, Sequence[float], Sequence[int]]] = [
+        *((name, getattr(drives, name), joints) for name in _OF_DRIVES),
+        ("damping_time", np.divide(drives.gear_damping, drives.gear_stiffness).tolist(), joints),
+        ("bending_stiffness", arm.link_flexibility.stiffness, arm.link_flexibility.links),
+    ]
+    parameters = tuple(
+        ModalParameter(
+            quantity=name, joints=(at,), value=value, deviation=0.0, interval=(value, value), status="assumed"
+        )
+        for name, values, places in rows
+        for at, value in zip(places, values, strict=True)
+    )
+    springs = drivetrain(parameters, arm, flexible_model(arm, body(paper_payload(arm))))
+    f_d_min, zeta_max = mode_range(arm, springs)
+    pattern = load_calibration("ur5e_modal")  # for the rest, such as ring-downs
+    assert pattern.modal is not None
+    modal = replace(pattern.modal, parameters=parameters, f_d_min=f_d_min, zeta_max=zeta_max)
+    own = replace(pattern.provenance, arm=None)
+    return replace(pattern, name="assumed", robot=arm.robot.model, modal=modal, provenance=own)

@@ -114,3 +114,17 @@ def recorded(one_motion, ring):
         return recording, motions(recording)[0]
 
     return make(0, 1.0), make(37, 0.1)
+
+
+@pytest.fixture(scope="session")
+def figures():
+    """The package, imported where it is used: matplotlib takes a second that other tests need not wait."""
+    import tvist_lab.figures
+
+    return tvist_lab.figures
+
+
+@pytest.fixture(scope="session")
+def style(figures):
+    """The style of all figures."""
+    return figures.style

@@ -5,7 +5,6 @@ import pytest
 
 from tvist_lab.metrics import (
     NotMeasurableError,
-    common_clock,
     envelope,
     in_motion_rms,
     motions,
@@ -14,6 +13,7 @@ from tvist_lab.metrics import (
     peak_velocity,
     rigid_acceleration,
     still_after,
+    vibration_after_stop,
 )
 from tvist_lab.recordings import RecordingError
 
@@ -67,13 +67,13 @@ def test_the_declared_delay_is_granted_to_a_shaper_and_no_more(one_motion):
     truth[: 501 + 37 + 1, 0] = 2.0
     truth[501 + 37 + 1, 0] = 0.5
     recording = one_motion(37, truth=truth, shaper_delay=np.full(TICKS, 0.074))
-    assert common_clock(*with_motion(recording)).peak == pytest.approx(0.5)
+    assert vibration_after_stop(*with_motion(recording))[0] == pytest.approx(0.5)
 
 
 def test_a_waiting_shaper_that_declares_no_delay_is_judged_while_it_still_moves(one_motion):
     truth = np.zeros((TICKS, 3))
     truth[: 501 + 38, 0] = 2.0
-    assert common_clock(*with_motion(one_motion(37, truth=truth))).peak == pytest.approx(2.0)
+    assert vibration_after_stop(*with_motion(one_motion(37, truth=truth)))[0] == pytest.approx(2.0)
 
 
 def test_the_envelope_of_a_lightly_damped_ring_down_is_its_amplitude_and_slow_drift_is_none(ring):
@@ -100,8 +100,6 @@ def test_the_rigid_acceleration_of_a_turning_tool_points_to_its_axis(make_record
     vibration[motion.start : motion.start + len(rigid)] = rigid + np.array([0.0, 0.3, 0.4])
     shaken = make_recording(q, np.roll(q, 1), truth=vibration)
     assert in_motion_rms(shaken, motion, kinematics) == pytest.approx(0.5)
-    assert common_clock(shaken, motion, kinematics).in_motion == pytest.approx(0.5)
-    assert np.isnan(common_clock(shaken, motion).in_motion)
 
 
 def test_the_rigid_motion_cannot_be_told_where_ticks_are_missing(one_motion):

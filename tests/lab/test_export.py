@@ -14,9 +14,9 @@ from tvist_cli.commands.log.export import export as export_command
 from tvist_cli.commands.log.info import info as info_command
 from tvist_cli.failure import Failure
 from tvist_lab.recordings import Recording, RecordingError, read
-from tvist_lab.recordings.description import KEY, sidecar
+from tvist_lab.recordings.description import KEY, meaning_of, sidecar
 from tvist_lab.recordings.export import FORMATS, ExportError, export
-from tvist_lab.recordings.units import meaning_of
+from tvist_lab.recordings.recorded_columns import recording_of_messages
 from tvist_protocol import Event, Info, Io, State, Truth
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.recorded import topics
@@ -49,7 +49,7 @@ def recording(rows=40):
     ]
     truths = [msgspec.structs.replace(TRUTH, tick=state.tick) for state in states[3:]]
     events = [Event(tick=9, kind="motion_started", id=1), Event(tick=11, kind="warning", why="“N m²”, \n2")]
-    return Recording.from_states(states, events, truths, INFO)
+    return recording_of_messages(states, events, truths, INFO)
 
 
 def assert_equal(found, expected):

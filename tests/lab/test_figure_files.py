@@ -21,14 +21,6 @@ LEAST_POINTS = {1: 5.5, 2: 7.0}
 
 
 @pytest.fixture(scope="module")
-def drawn():
-    """The module, imported where it is used: matplotlib takes a second that other tests need not wait."""
-    import tvist_lab.figures
-
-    return tvist_lab.figures
-
-
-@pytest.fixture(scope="module")
 def found():
     grid = np.linspace(6.0, 15.0, 9).reshape(3, 3)
     told = {"f_d_hz": grid, "zeta": 0.02 * grid, "delay_ms": 500.0 / grid}
@@ -39,9 +31,9 @@ def found():
 
 
 @pytest.fixture(scope="module")
-def make(drawn, recorded, found):
+def make(figures, recorded, found):
     """Make a figure by its name, from small data."""
-    from tvist_lab.figures.compared import compared_figure
+    from tvist_lab.figures import compared_figure
 
     def judged(count, *, counts=True):
         return [
@@ -72,34 +64,34 @@ def make(drawn, recorded, found):
     f_d, zeta = np.linspace(7.0, 9.0, 5), np.linspace(0.2, 0.3, 5)
     known = SHAPERS.values()
     makers = {
-        "figure_1": drawn.figure_1,
-        "figure_3": drawn.figure_3,
-        "figure_4": drawn.figure_4,
-        "figure_7": drawn.figure_7,
-        "figure_8": drawn.figure_8,
-        "figure_12": lambda: drawn.motion_figure("Q1-Q2", *recorded),
-        "observed": lambda: drawn.observed_figure("motion 1", recorded[0]),
-        "figure_15": lambda: drawn.figure_15("Q1-Q2", *recorded),
-        "figure_16": lambda: drawn.figure_16({"Q1-Q2": recorded}),
-        "after_stop": lambda: drawn.after_stop_figure(*recorded, "Q1-Q2"),
-        "ring_down": lambda: drawn.ring_down_figure("Q1-Q2", recorded[0]),
-        "catalogue": lambda: drawn.catalogue_figure(known),
-        "sensitivity": lambda: drawn.sensitivity_figure([SHAPERS["zv"]], 0.0, np.linspace(-0.4, 0.6, 51)),
-        "settling_against_delay": lambda: drawn.settling_against_delay_figure(known, 10.0, 0.1),
-        "elastic": drawn.elastic_figure,
-        "mean_delay": drawn.mean_delay_figure,
-        "pareto": lambda: drawn.pareto_figure(leaderboard("leaderboard")),
-        "settling": lambda: drawn.settling_figure(leaderboard("leaderboard")),
-        "robustness": lambda: drawn.robustness_figure(leaderboard("robustness")),
-        "moves": lambda: drawn.residual_by_move_figure(judged(4)),
-        "one_move": lambda: drawn.vibration_figure(recorded[0][0], recorded[1][0], 3),
-        "paths": lambda: drawn.path_shaping_figure(paths()),
-        "identified": lambda: drawn.identified_figure(calibration, q, f_d, zeta, f_d, zeta),
-        "map": lambda: drawn.workspace_map_figure(found, "f_d_hz", "an arm", 1),
-        "map over two columns": lambda: drawn.workspace_map_figure(found, "zeta", "an arm", 2),
+        "figure_1": figures.figure_1,
+        "figure_3": figures.figure_3,
+        "figure_4": figures.figure_4,
+        "figure_7": figures.figure_7,
+        "figure_8": figures.figure_8,
+        "figure_12": lambda: figures.motion_figure("Q1-Q2", *recorded),
+        "observed": lambda: figures.observed_figure("motion 1", recorded[0]),
+        "figure_15": lambda: figures.figure_15("Q1-Q2", *recorded),
+        "figure_16": lambda: figures.figure_16({"Q1-Q2": recorded}),
+        "after_stop": lambda: figures.after_stop_figure(*recorded, "Q1-Q2"),
+        "ring_down": lambda: figures.ring_down_figure("Q1-Q2", recorded[0]),
+        "catalogue": lambda: figures.catalogue_figure(known),
+        "sensitivity": lambda: figures.sensitivity_figure([SHAPERS["zv"]], 0.0, np.linspace(-0.4, 0.6, 51)),
+        "settling_against_delay": lambda: figures.settling_against_delay_figure(known, 10.0, 0.1),
+        "elastic": figures.elastic_figure,
+        "mean_delay": figures.mean_delay_figure,
+        "pareto": lambda: figures.pareto_figure(leaderboard("leaderboard")),
+        "settling": lambda: figures.settling_figure(leaderboard("leaderboard")),
+        "robustness": lambda: figures.robustness_figure(leaderboard("robustness")),
+        "moves": lambda: figures.residual_by_move_figure(judged(4)),
+        "one_move": lambda: figures.vibration_figure(recorded[0][0], recorded[1][0], 3),
+        "paths": lambda: figures.path_shaping_figure(paths()),
+        "identified": lambda: figures.identified_figure(calibration, q, f_d, zeta, f_d, zeta),
+        "map": lambda: figures.workspace_map_figure(found, "f_d_hz", "an arm", 1),
+        "map over two columns": lambda: figures.workspace_map_figure(found, "zeta", "an arm", 2),
         "compared": lambda: compared_figure("motion 1", [("one", recorded[0]), ("other", recorded[1])]),
-        "sweep": lambda: drawn.sweep_figure(entries(), ["5 kg", "1 kg"] * 2),
-        "no move that counts": lambda: drawn.residual_by_move_figure(judged(2, counts=False)),
+        "sweep": lambda: figures.sweep_figure(entries(), ["5 kg", "1 kg"] * 2),
+        "no move that counts": lambda: figures.residual_by_move_figure(judged(2, counts=False)),
     }
     return lambda name: makers[name]()
 
@@ -113,7 +105,7 @@ NAMES = [
 
 
 def words_of(figure):
-    """All text that is drawn."""
+    """All text that is figures."""
     from matplotlib.text import Text
 
     return [
@@ -158,45 +150,49 @@ def test_axes_have_units_and_text_is_large_enough_and_within_the_figure(make, na
 
 
 @pytest.mark.parametrize(("columns", "millimetres"), [(1, 89.0), (2, 183.0)])
-def test_a_file_has_the_width_of_its_columns(drawn, tmp_path, columns, millimetres):
+def test_a_file_has_the_width_of_its_columns(figures, tmp_path, columns, millimetres):
     from PIL import Image
 
-    files = drawn.FigureFiles(tmp_path / "new", "png", 120, columns)
-    with Image.open(files.write(drawn.figure_4(), "figure")) as image:
+    files = figures.FigureFiles(tmp_path / "new", "png", 120, columns)
+    with Image.open(files.write(figures.figure_4(), "figure")) as image:
         assert image.info["dpi"] == pytest.approx((120.0, 120.0), abs=0.1)
         assert 25.4 * image.width / 120.0 == pytest.approx(millimetres, abs=0.3)
-    svg = drawn.FigureFiles(tmp_path, "svg", columns=columns).write(drawn.figure_4(), "figure").read_text()
+    svg = (
+        figures.FigureFiles(tmp_path, "svg", columns=columns).write(figures.figure_4(), "figure").read_text()
+    )
     assert 25.4 / 72.0 * float(re.search(r'width="([\d.]+)pt"', svg)[1]) == pytest.approx(
         millimetres, abs=0.1
     )
-    pdf = drawn.FigureFiles(tmp_path, "pdf", columns=columns).write(drawn.figure_4(), "figure").read_bytes()
+    pdf = (
+        figures.FigureFiles(tmp_path, "pdf", columns=columns).write(figures.figure_4(), "figure").read_bytes()
+    )
     box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", pdf)
     assert 25.4 / 72.0 * float(box[1]) == pytest.approx(millimetres, abs=0.1)
     assert b"/Type3" not in pdf
 
 
-def test_resolution_multiplies_the_pixels_of_a_bitmap(drawn, tmp_path):
+def test_resolution_multiplies_the_pixels_of_a_bitmap(figures, tmp_path):
     from PIL import Image
 
     sizes = []
     for dpi in (60, 180):
-        with Image.open(drawn.save(drawn.figure_4(), tmp_path / f"{dpi}.png", dpi=dpi)) as image:
+        with Image.open(figures.save(figures.figure_4(), tmp_path / f"{dpi}.png", dpi=dpi)) as image:
             sizes.append(image.size)
     assert np.array(sizes[1]) == pytest.approx(3.0 * np.array(sizes[0]), abs=3)
 
 
 @pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
-def test_equal_figures_give_equal_files(drawn, tmp_path, suffix):
+def test_equal_figures_give_equal_files(figures, tmp_path, suffix):
     first, second = (
-        drawn.save(drawn.figure_4(), tmp_path / f"{name}.{suffix}").read_bytes() for name in "ab"
+        figures.save(figures.figure_4(), tmp_path / f"{name}.{suffix}").read_bytes() for name in "ab"
     )
     assert first == second
 
 
-def test_a_figure_can_be_written_twice_without_shrinking(drawn, tmp_path):
-    figure = drawn.figure_4()
+def test_a_figure_can_be_written_twice_without_shrinking(figures, tmp_path):
+    figure = figures.figure_4()
     for columns in (1, 1, 2):
-        drawn.save(figure, tmp_path / "x.png", dpi=50, columns=columns)
+        figures.save(figure, tmp_path / "x.png", dpi=50, columns=columns)
     assert figure.axes[0].xaxis.label.get_fontsize() == pytest.approx(9.0)
 
 
@@ -204,7 +200,7 @@ def test_a_figure_of_no_counted_move_has_no_empty_panel(make):
     assert len(make("no move that counts").axes) == 1
 
 
-def test_a_triangle_is_one_that_exceeds_a_limit_by_more_than_a_percent(drawn):
+def test_a_triangle_is_one_that_exceeds_a_limit_by_more_than_a_percent(figures):
     row = {
         "ranked": True, "pareto": False, "residual_m_s2": {"median": 0.1}, "time_until_still_ms": {"median": 50.0},
         "peak_velocity_ratio": {"max": 1.0}, "keeps_limits": False,
@@ -213,7 +209,7 @@ def test_a_triangle_is_one_that_exceeds_a_limit_by_more_than_a_percent(drawn):
         row | {"name": "near", "peak_acceleration_ratio": {"max": 1.003}},
         row | {"name": "far", "peak_acceleration_ratio": {"max": 2.5}, "residual_m_s2": {"median": 0.2}},
     ]
-    (panel,) = drawn.pareto_figure(rows).axes
+    (panel,) = figures.pareto_figure(rows).axes
     markers = [line.get_marker() for line in panel.get_lines() if len(line.get_xdata()) == 1]
     assert markers == ["o", "^"]
     assert [text.get_text() for text in panel.texts] == ["near", "far (2.5×)"]

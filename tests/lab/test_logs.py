@@ -230,6 +230,10 @@ def test_what_cannot_be_measured_is_refused_with_file_cause_and_line(tmp_path, k
         (bytes(range(256)) * 40, "neither a recording nor a log"),
         (b"\x89PNG\r\n\x1a\n" + bytes(500), "neither a recording nor a log"),
         (b"\xff\xfe\xfa\xfb hello", "no text"),
+        (
+            b"root:x:0:0:root:/root:/bin/sh\nmail:x:8:8:mail:/var/mail:/bin/sh\n",
+            "neither a recording nor a log",
+        ),
         (b"Dear diary, nothing moved today.\n", "no rows|no column"),
     ],
 )

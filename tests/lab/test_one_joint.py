@@ -10,9 +10,8 @@ from msgspec.structs import replace
 
 from tvist_controller.api.line import body, estimator_of, load_calibration, paper_payload
 from tvist_lab.one_joint.closed_form import FlexibleShoulder
-from tvist_lab.one_joint.lesson import ANGLES, MASSES, lesson
+from tvist_lab.one_joint.lesson import ANGLES, MASSES, lesson, pluck
 from tvist_lab.one_joint.markdown import page
-from tvist_lab.one_joint.plucked import pluck
 from tvist_plant.description import load
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm

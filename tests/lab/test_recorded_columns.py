@@ -7,8 +7,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from tvist_lab.recordings import Recording, mcap_file
+from tvist_lab.recordings import mcap_file
 from tvist_lab.recordings.mcap_file import RecordingFileError, read
+from tvist_lab.recordings.recorded_columns import recording_of_messages
 from tvist_protocol import Event, Info, Io, State, Truth
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.recorded import topics
@@ -44,7 +45,7 @@ def assert_equal(found, expected):
 
 
 def of_objects(content):
-    return Recording.from_states(content.states, content.events, content.truths, content.info)
+    return recording_of_messages(content.states, content.events, content.truths, content.info)
 
 
 @pytest.fixture(params=[mcap_file.BLOCK, 7])

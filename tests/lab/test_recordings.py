@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tvist_lab.recordings import STATE_COLUMNS, Recording, RecordingError
+from tvist_lab.recordings.recorded_columns import recording_of_messages
 from tvist_protocol.stream import Event, State, Truth
 
 ARRAYS = ("reference_q", "target_q", "target_qd", "target_qdd", "target_moment", "actual_q", "actual_qd")
@@ -27,27 +28,27 @@ def truth(tick):
 
 def test_every_field_of_a_state_is_a_column_of_its_name():
     assert set(STATE_COLUMNS) == set(State.__struct_fields__)
-    recording = Recording.from_states([state(3), state(4)])
+    recording = recording_of_messages([state(3), state(4)])
     assert set(recording.columns) == set(STATE_COLUMNS)
     assert recording["reference_q"].shape == (2, 2)
     assert recording["timestamp"].tolist() == [0.006, 0.008]
 
 
 def test_states_are_put_in_order_and_one_that_came_twice_counts_once():
-    recording = Recording.from_states([state(5), state(4), state(5), state(6)])
+    recording = recording_of_messages([state(5), state(4), state(5), state(6)])
     assert recording["tick"].tolist() == [4, 5, 6]
     assert len(recording) == 3
 
 
 def test_joints_and_period_come_from_the_data_even_where_ticks_are_missing():
-    recording = Recording.from_states([state(10), state(11), state(15)])
+    recording = recording_of_messages([state(10), state(11), state(15)])
     assert recording.joints == 2
     assert recording.period == pytest.approx(0.002)
     assert recording.missing_ticks == 3
 
 
 def test_null_and_lists_of_changing_length_become_nan():
-    recording = Recording.from_states(
+    recording = recording_of_messages(
         [state(0), state(1, setpoint_sequence=8, estimated_f_d=[6.7, 9.0]), state(2, estimated_f_d=[])]
     )
     np.testing.assert_array_equal(recording["setpoint_sequence"], [np.nan, 8.0, np.nan])
@@ -55,12 +56,12 @@ def test_null_and_lists_of_changing_length_become_nan():
 
 
 def test_a_shaper_without_modes_leaves_an_empty_column():
-    recording = Recording.from_states([state(0, estimated_f_d=[]), state(1, estimated_f_d=[])])
+    recording = recording_of_messages([state(0, estimated_f_d=[]), state(1, estimated_f_d=[])])
     assert recording["estimated_f_d"].shape == (2, 0)
 
 
 def test_truth_is_aligned_by_tick_and_nan_where_it_is_missing():
-    recording = Recording.from_states([state(1), state(2)], truths=[truth(2), truth(7)])
+    recording = recording_of_messages([state(1), state(2)], truths=[truth(2), truth(7)])
     column = recording["truth_tool_acceleration"]
     assert np.isnan(column[0]).all()
     assert column[1].tolist() == [1.0, 2.0, 9.81]
@@ -70,7 +71,7 @@ def test_truth_is_aligned_by_tick_and_nan_where_it_is_missing():
 
 def test_a_slice_keeps_rows_and_events_of_its_ticks_both_ends_included():
     events = [Event(tick=tick, kind="warning") for tick in (9, 2, 4, 5)]
-    part = Recording.from_states([state(tick) for tick in range(10)], events, info="info").between(2, 4)
+    part = recording_of_messages([state(tick) for tick in range(10)], events, info="info").between(2, 4)
     assert part["tick"].tolist() == [2, 3, 4]
     assert [event.tick for event in part.events] == [2, 4]
     assert part.info == "info"
@@ -78,11 +79,11 @@ def test_a_slice_keeps_rows_and_events_of_its_ticks_both_ends_included():
 
 def test_a_slice_without_states_is_refused():
     with pytest.raises(RecordingError, match="no state between ticks 5 and 9"):
-        Recording.from_states([state(1)]).between(5, 9)
+        recording_of_messages([state(1)]).between(5, 9)
 
 
 def test_a_missing_column_is_named_with_those_there_are():
-    recording = Recording.from_states([state(1)])
+    recording = recording_of_messages([state(1)])
     with pytest.raises(RecordingError, match=r"no column colour; it has .*reference_q"):
         recording["colour"]
     with pytest.raises(RecordingError, match="was truth recorded"):
@@ -91,7 +92,7 @@ def test_a_missing_column_is_named_with_those_there_are():
 
 def test_no_states_columns_that_do_not_fit_and_ticks_that_stand_still_are_refused():
     with pytest.raises(RecordingError, match="at least one state"):
-        Recording.from_states([])
+        recording_of_messages([])
     with pytest.raises(RecordingError, match="needs the column tick"):
         Recording({})
     with pytest.raises(RecordingError, match="column timestamp has 1 rows, column tick 2"):
@@ -99,9 +100,9 @@ def test_no_states_columns_that_do_not_fit_and_ticks_that_stand_still_are_refuse
     with pytest.raises(RecordingError, match="must increase"):
         Recording({"tick": np.zeros(2)})
     with pytest.raises(RecordingError, match="two states"):
-        _ = Recording.from_states([state(1)]).period
+        _ = recording_of_messages([state(1)]).period
 
 
 def test_the_columns_of_a_recording_cannot_be_exchanged():
     with pytest.raises(TypeError):
-        Recording.from_states([state(1)]).columns["tick"] = np.zeros(1)
+        recording_of_messages([state(1)]).columns["tick"] = np.zeros(1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_lab.metrics import NotMeasurableError, motions, residual, residual_by_modes
+from tvist_lab.metrics import NotMeasurableError, motions, residual
 
 STOP = 501
 TICKS = 1500
@@ -78,34 +78,3 @@ def test_a_recording_that_ends_too_early_is_not_measurable(one_motion):
     recording = one_motion(ticks=600)
     with pytest.raises(NotMeasurableError, match=r"only 0\.196 s were recorded after the stop"):
         residual(recording, motions(recording)[0])
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_rv_by_modes_is_the_amplitude_whatever_the_phase_and_noise(one_motion, ring, seed):
-    random = np.random.default_rng(seed)
-    alpha = ring(TICKS, STOP, 6.7, 0.34, 1.3, axis=random.normal(size=3), phase=random.uniform(0.0, 6.0))
-    recording, motion = rung(one_motion, alpha + 0.03 * random.standard_normal((TICKS, 3)), truth=alpha)
-    noisy = residual_by_modes(recording, motion, [6.7], [0.34])
-    assert noisy.value == pytest.approx(1.3, rel=0.06)
-    assert noisy.rms == pytest.approx(0.03, rel=0.15)
-    assert residual_by_modes(recording, motion, [6.7], [0.34], truth=True).value == pytest.approx(1.3)
-
-
-def test_rv_by_modes_ignores_the_end_of_the_deceleration_ramp(one_motion, ring):
-    alpha = ring(TICKS, STOP, 15.0, 0.14, 0.8)
-    alpha[STOP : STOP + 6, 1] += 2.0
-    recording, motion = rung(one_motion, alpha)
-    assert residual_by_modes(recording, motion, [15.0], [0.14]).value == pytest.approx(0.8)
-
-
-def test_rv_of_two_modes_is_told_apart_and_nearly_equal_modes_do_not_blow_it_up(one_motion, ring):
-    alpha = ring(TICKS, STOP, 15.0, 0.14, 0.8) + ring(TICKS, STOP, 21.0, 0.14, 0.2, axis=(0.0, 1.0, 0.0))
-    recording, motion = rung(one_motion, alpha)
-    np.testing.assert_allclose(
-        residual_by_modes(recording, motion, [15.0, 21.0], [0.14, 0.14]).amplitudes, [0.8, 0.2]
-    )
-    noise = 0.03 * np.random.default_rng(3).standard_normal((TICKS, 3))
-    recording, motion = rung(one_motion, ring(TICKS, STOP, 6.7, 0.34, 1.3) + noise)
-    assert residual_by_modes(recording, motion, [6.70, 6.71], [0.340, 0.341]).value == pytest.approx(
-        1.3, rel=0.15
-    )

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from proof.__main__ import main
 from proof.search import draws, programs, sequences, stops
-from proof.search.own_calibration import own_calibration
 from proof.search.report import Counts, broken, search, tables
-from proof.search.subject import Subject, speeds
+from proof.search.subject import Subject, own_calibration, speeds
 
 from tvist_controller.api.line import paper_payload
 from tvist_controller.trajectory import PathStop

@@ -9,7 +9,7 @@ import pytest
 from tests.conformance.served import free_endpoint
 
 from tvist_cli import main
-from tvist_cli.removed import INSTEAD
+from tvist_cli.misuse import INSTEAD
 
 MSGSPEC = re.compile(
     r"Expected `|Object (missing|contains)|Invalid enum|at `\$|is malformed|Traceback|Errno|Unused"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from tvist_lab.metrics import motions, peak_after_stop
-from tvist_lab.recordings import Recording
+from tvist_lab.recordings.recorded_columns import recording_of_messages
 from tvist_protocol import decode_state, decode_truth
 from tvist_protocol.generate import FOLDER as PROTOCOL
 from tvist_protocol.modes import RuntimeState
@@ -82,7 +82,7 @@ def test_residual_vibration_is_the_laboratorys(tvist_robot):
     with tvist_robot.control("me") as arm:
         arm.move_j(TARGET)
     value = assert_residual_vibration_below(tvist_robot, 2.0)
-    recording = Recording.from_states(states, truths=truths)
+    recording = recording_of_messages(states, truths=truths)
     (motion,) = motions(recording)
     assert value == pytest.approx(peak_after_stop(recording, motion), rel=1e-9)
     with pytest.raises(AssertionError, match=r"residual vibration of ur5e is .* above 0.1 m/s²\n.*largest"):

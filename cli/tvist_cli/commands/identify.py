@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -17,7 +18,7 @@ from tvist_cli.poses import pose
 if TYPE_CHECKING:
     from tvist_client.arm import Arm
     from tvist_client.robot import Robot
-    from tvist_lab.identification.modal import ModalIdentification
+    from tvist_lab.identification.identify import Identification
     from tvist_lab.identification.payload import PayloadFound
     from tvist_plant.description import RobotDescription
     from tvist_protocol.info import Info
@@ -172,6 +173,17 @@ class _Place:
 
         return asyncio.run(whole())
 
+    def calibrate(self, ring_downs: int, doing: Callable[..., Awaitable[Any]], output: Path) -> Any:
+        """Run an identification that makes so many ring-downs, and write its calibration."""
+        from tvist_lab.identification.fit import FitError
+        from tvist_protocol.calibration import calibration_to_json
+
+        with told(FitError, OSError):
+            with progress(ring_downs, "ring-downs") as bar:
+                done = self.run(partial(doing, progress=lambda: bar(1, None)))
+            output.write_bytes(calibration_to_json(done.calibration))
+        return done
+
     @asynccontextmanager
     async def _controlled(self) -> "AsyncIterator[tuple[Robot, Arm]]":
         from tvist_client.robot import Robot
@@ -201,24 +213,16 @@ def _polynomial(
     *,
     json: bool,
 ) -> None:
-    from tvist_lab.identification.fit import FitError
     from tvist_lab.identification.identify import MeasurementPlan
     from tvist_lab.identification.identify import identify as run
-    from tvist_protocol.calibration import calibration_to_json
 
     plan = MeasurementPlan(
         configurations=configurations, anchors=tuple(anchors), repeats=repeats, seed=place.seed
     )
     command = f"tvist identify --configurations {configurations} --repeats {repeats} --seed {place.seed}"
     command += place.options if place.mass is None else f"{place.options} --payload {place.mass:g}"
-    with told(FitError, OSError):
-        with progress(configurations + len(anchors), "ring-downs") as bar:
-            done = place.run(
-                lambda client, control: run(
-                    client, control, plan, name=name, command=command, progress=lambda: bar(1, None)
-                )
-            )
-        output.write_bytes(calibration_to_json(done.calibration))
+    doing = partial(run, plan=plan, name=name, command=command)
+    done: Identification = place.calibrate(configurations + len(anchors), doing, output)
     if figures is not None:
         from tvist_lab.figures import identified_figure
 
@@ -244,7 +248,6 @@ def _modal(
     from tvist_controller.setup import paper_payload
     from tvist_lab.identification.modal import identify_modal
     from tvist_lab.identification.modal_plan import ModalPlan, jog_of
-    from tvist_protocol.calibration import calibration_to_json
 
     carried = () if masses is None else tuple(paper_payload(arm, mass) for mass in _masses(masses))
     plan = ModalPlan(ring_downs=ring_downs, payloads=carried, seed=place.seed, jog=jog_of(arm))
@@ -254,18 +257,8 @@ def _modal(
         command += f" --payloads {masses}"
     elif place.mass is not None:
         command += f" --payload {place.mass:g}"
-
-    with told(OSError):
-        with progress(ring_downs, "ring-downs") as bar:
-
-            async def run(client: "Robot", control: "Arm") -> "ModalIdentification":
-                return await identify_modal(
-                    client, control, arm, plan, name=name, command=command, progress=lambda: bar(1, None)
-                )
-
-            done = place.run(run)
-        output.write_bytes(calibration_to_json(done.calibration))
-    report_modal(done, output, place.options, json=json)
+    doing = partial(identify_modal, description=arm, plan=plan, name=name, command=command)
+    report_modal(place.calibrate(ring_downs, doing, output), output, place.options, json=json)
 
 
 def _payload(place: _Place, arm: "RobotDescription", poses: int, *, declare: bool, json: bool) -> None:

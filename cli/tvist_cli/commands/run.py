@@ -2,6 +2,7 @@
 
 import asyncio
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,23 +10,27 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, interrupted, told
-from tvist_cli.output import print_json, say
-from tvist_cli.program_output import Tell
+from tvist_cli.output import err, print_json, say
 from tvist_cli.robot_options import configuration, content_of, with_robot_options
 from tvist_cli.scripts import check_scripts, named, placed, read_script
 from tvist_cli.serving import compile_if_new, introduction, leave, say_recorded, say_who_can_reach
+from tvist_protocol.errors import harmless
 from tvist_server.config import ConfigError, ServeConfig
 
 if TYPE_CHECKING:
-    from tvist_lab.programs.watch import ProgramWatch
+    from tvist_lab.programs.watch import ProgramWatch, Said
     from tvist_server.server import Server
-
 
 OPTIONS = {
     "robot", "profile", "payload", "overload", "shaper", "shape_servo", "plant", "start", "seed", "record", "truth",
     "listen", "ur", "ur_allow",
 }  # fmt: skip
 """Options of `tvist serve` that one robot which ends with its program can do with."""
+
+SHOWN_EVERY = 0.1
+"""Time between two changes of the progress line [s]."""
+_CLEAR = "\r\x1b[K"
+"""Returns to the beginning of the terminal's line and clears it."""
 
 
 @with_robot_options(OPTIONS)
@@ -81,19 +86,19 @@ def run(
     text = read_script(program)
     _check(program, text, json=json)
     checked = _configuration(given, config, lockstep=lockstep)
-    job = _Job(program, text, inputs or (), timeout, Tell(quiet=json))
+    job = _Job(program, text, inputs or (), timeout, _Tell(quiet=json))
     watch, errors, server = job.in_lockstep(checked) if lockstep else job.in_real_time(checked)
     job.tell(watch)
     job.tell.clear()
     if json:
-        from tvist_lab.programs.report import as_dict
+        from tvist_lab.programs.watch import as_dict
 
         print_json(
             {"file": named(program), "lockstep": lockstep, "recording": checked.record, **as_dict(watch)}
         )
     failure = _failure(program, watch, errors)
     if failure is None and not json:
-        from tvist_lab.programs.report import summary
+        from tvist_lab.programs.watch import summary
 
         say(summary(watch))
     sys.stdout.flush()
@@ -143,7 +148,7 @@ class _Job:
     """A program to run, and whom to tell."""
 
     def __init__(
-        self, file: Path, text: str, inputs: Sequence[str], timeout: float | None, tell: Tell
+        self, file: Path, text: str, inputs: Sequence[str], timeout: float | None, tell: "_Tell"
     ) -> None:
         self.file, self.text, self.inputs, self.timeout, self.tell = file, text, inputs, timeout, tell
 
@@ -208,3 +213,50 @@ def _failure(file: Path, watch: "ProgramWatch", errors: list[str]) -> Failure | 
         case "signal" if watch.why is not None and watch.why.startswith("SIGINT"):
             return interrupted(f"{named(file)} had run for {watch.seconds:.1f} s of robot time")
     return Failure(f"{named(file)} failed {after}: {watch.why}")
+
+
+class _Tell:
+    """Prints what a program says as it comes, and on a terminal a line with its progress.
+
+    Args:
+        quiet: Whether to print no messages, since they are part of the one JSON object.
+    """
+
+    def __init__(self, *, quiet: bool) -> None:
+        self._quiet = quiet
+        self._shown, self._visible = 0.0, False
+
+    def __call__(self, watch: "ProgramWatch") -> None:
+        """Print what is new."""
+        while watch.news:
+            said = watch.news.popleft()
+            if not self._quiet:
+                self.clear()
+                _print(said)
+        now = time.monotonic()
+        if err.is_terminal and now - self._shown >= SHOWN_EVERY:
+            self._shown, self._visible = now, True
+            place = f", line {watch.line}" if watch.line else ""
+            move = f", move {len(watch.moves)}" if watch.moves else ""
+            progress = f"{watch.name}: {watch.seconds:.1f} s{place}{move}"
+            sys.stderr.write(_CLEAR + harmless(progress)[: max(err.width - 1, 1)])
+            sys.stderr.flush()
+
+    def clear(self) -> None:
+        """Remove the progress line."""
+        if self._visible:
+            sys.stderr.write(_CLEAR)
+            sys.stderr.flush()
+            self._visible = False
+
+
+def _print(said: "Said") -> None:
+    """Print a message on stdout, a warning on stderr."""
+    match said.kind:
+        case "text":
+            print(harmless(said.text), flush=True)
+        case "popup":
+            level = "" if said.level in {None, "message"} else f" ({said.level})"
+            print(harmless(f"popup{level}: {said.title}: {said.text}"), flush=True)
+        case "warning":
+            say(f"warning: {said.text}")

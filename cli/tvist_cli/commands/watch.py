@@ -1,22 +1,28 @@
-"""`tvist watch`: show live in the terminal what a robot is doing."""
+"""`tvist watch`: show live in the terminal what a robot, or many, are doing."""
 
 import asyncio
 import contextlib
+import time
+from collections.abc import Coroutine
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from tvist_cli.failure import Failure
+from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import out, print_json
-from tvist_cli.watching import watch_for
 
 if TYPE_CHECKING:
+    from tvist_client.many_states import ManyStates
     from tvist_client.robot import Robot
     from tvist_protocol.stream import Event, State, Telemetry
+EVERY = 0.1
+"""Time between two looks [s]."""
+STALE_S = 1.0
+"""Age of a newest state from which on it is shown in red [s]."""
 
 
 def watch(
@@ -50,9 +56,7 @@ def watch(
 
     selector, endpoint = _places(where, ENDPOINT)
     if selector is not None:
-        from tvist_cli.many import watch_many
-
-        watch_many(selector, endpoint, namespace, security, seconds, json=json)
+        _watch_many(selector, endpoint, namespace, security, seconds, json=json)
         return
     command = unlock_command(endpoint, name, security, namespace)
 
@@ -73,7 +77,7 @@ def watch(
                         print_json(state)
                     await asyncio.sleep(0.1)
 
-    watch_for(seconds, run(), "the robot keeps running")
+    _watch_for(seconds, run(), "the robot keeps running")
 
 
 def _places(where: tuple[str, ...], default: str) -> tuple[str | None, str]:
@@ -152,3 +156,92 @@ def _screen(state: "State", events: "list[Event]", standing: Text, told: "list[T
         ),
         *(Text(f"tick {e.tick}: {e.kind} {e.id or ''} {e.why or ''}", style="dim") for e in events),
     )
+
+
+def _watch_many(
+    selector: str,
+    endpoint: str,
+    namespace: str,
+    security: Path | None,
+    seconds: float | None,
+    *,
+    json: bool,
+) -> None:
+    """Show the newest states of all robots that a key selects, until Control+C.
+
+    Args:
+        selector: Key with wildcards that ends in `/state`.
+        endpoint: Endpoint of a router, or of one server.
+        namespace: Namespace that precedes the key.
+        security: Folder with this client's certificate.
+        seconds: Stop after this many seconds.
+        json: Print one JSON object per line for each new state, ten times a second at most.
+    """
+    from tvist_client.errors import MisuseError
+    from tvist_client.many_states import ManyStates
+
+    with told(MisuseError, code=2):
+        states = ManyStates(selector, endpoint, security=security, namespace=namespace)
+
+    async def run() -> None:
+        async with states:
+            if json:
+                await _print(states)
+            with Live(console=out, auto_refresh=False) as live:
+                since = time.monotonic()
+                while True:
+                    await asyncio.sleep(EVERY)
+                    now, since = time.monotonic() - since, time.monotonic()
+                    live.update(_table(states, now), refresh=True)
+
+    _watch_for(seconds, run(), "the robots keep running")
+
+
+async def _print(states: "ManyStates") -> None:
+    while True:
+        await asyncio.sleep(EVERY)
+        for place, newest in states.look().items():
+            if newest.received:
+                print_json({"namespace": place.namespace, "robot": place.robot, "state": newest.state})
+
+
+def _table(states: "ManyStates", seconds: float) -> Table:
+    from tvist_client.readiness import mode_name
+    from tvist_protocol.modes import RobotMode, SafetyMode
+
+    drawn = Table(show_edge=False, pad_edge=False)
+    for column in ("robot", "robot mode", "safety mode"):
+        drawn.add_column(column, no_wrap=True)
+    for column in ("tick", "states/s", "age s", "missed", "fastest joint rad/s", "TCP x, y, z m"):
+        drawn.add_column(column, justify="right")
+    now = asyncio.get_running_loop().time()
+    for place, (state, received, at) in states.look().items():
+        drawn.add_row(
+            str(place),
+            mode_name(RobotMode, state.robot_mode),
+            mode_name(SafetyMode, state.safety_mode),
+            str(state.tick),
+            f"{received / seconds:.0f}",
+            f"{now - at:.1f}",
+            str(state.missed_ticks),
+            f"{max(map(abs, state.actual_qd)):.3f}",
+            ", ".join(f"{value:.3f}" for value in state.actual_TCP_pose[:3]),
+            style="bold red" if now - at > STALE_S else "",
+        )
+    return drawn
+
+
+def _watch_for(seconds: float | None, watching: Coroutine[Any, Any, None], meanwhile: str) -> None:
+    """Watch until the time is over or Control+C ends it, which is a failure with exit code 130.
+
+    Args:
+        seconds: Longest time [s]; None: until Control+C.
+        watching: What watches, and shows what it sees.
+        meanwhile: What goes on without it, such as "the robot keeps running".
+    """
+    began = time.monotonic()
+    with told(), contextlib.suppress(TimeoutError):
+        try:
+            asyncio.run(asyncio.wait_for(watching, seconds))
+        except KeyboardInterrupt:
+            raise interrupted(f"watched for {time.monotonic() - began:.1f} s; {meanwhile}") from None

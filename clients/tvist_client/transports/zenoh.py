@@ -48,12 +48,14 @@ class ZenohTransport(Transport):
         session: An open session, which `close` closes.
         endpoint: Endpoint that it is connected to, for error messages.
         robot: Name of the robot.
+        namespace: Namespace of the session, for error messages.
     """
 
-    def __init__(self, session: zenoh.Session, endpoint: str, robot: str) -> None:
+    def __init__(self, session: zenoh.Session, endpoint: str, robot: str, namespace: str = "") -> None:
         self._session = session
         self._endpoint = endpoint
         self._robot = robot
+        self._namespace = namespace
         self._loop = asyncio.get_running_loop()
         self._mailbox = Inbox(self._loop)
         self._alive, self._losses = asyncio.Event(), 0
@@ -87,7 +89,7 @@ class ZenohTransport(Transport):
         """
         keys.check_robot_name(robot)
         session = await asyncio.to_thread(open_session, endpoint, security, namespace)
-        transport = cls(session, endpoint, robot)
+        transport = cls(session, endpoint, robot, namespace)
         try:
             await transport._find()
         except BaseException:
@@ -257,8 +259,13 @@ class ZenohTransport(Transport):
             there = f"the robots there are {', '.join(robots)}" if robots else "there are no robots"
             # Access control denies silently, too.
             secured = ", and that the robot lists the name of this certificate"
-            check = f"check name and endpoint{secured if self._endpoint.startswith('tls/') else ''}"
-            why = f"there is no robot {self._robot!r} at {self._endpoint}; {there}: {check}"
+            where, what = (
+                (f"{self._endpoint} in namespace {self._namespace}", "name, namespace and endpoint")
+                if self._namespace
+                else (self._endpoint, "name and endpoint")
+            )
+            check = f"check {what}{secured if self._endpoint.startswith('tls/') else ''}"
+            why = f"there is no robot {self._robot!r} at {where}; {there}: {check}"
             raise NotConnectedError(why) from None
 
 

@@ -10,7 +10,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from tvist_client.transports.session import close_session, open_session
-from tvist_lab.bench.lateness import missed_share
+from tvist_lab.bench.one_robot import missed_share
 from tvist_lab.served import ServedError, served
 from tvist_protocol import keys
 from tvist_protocol.codec import decode_telemetry

@@ -1,29 +1,26 @@
 """The paper's figures, drawn from recordings and from the shaping library."""
 
-from tvist_lab.figures.after_stop import after_stop_figure
-from tvist_lab.figures.catalogue import catalogue_figure
+from tvist_lab.figures.after_stop import after_stop_figure, compared_figure, vibration_figure
+from tvist_lab.figures.calibration import identified_figure, workspace_map_figure
 from tvist_lab.figures.convolution import figure_3
 from tvist_lab.figures.delay_filter import figure_8
 from tvist_lab.figures.discretisation import figure_7
-from tvist_lab.figures.elastic import elastic_figure
-from tvist_lab.figures.evaluated import residual_by_move_figure, vibration_figure
 from tvist_lab.figures.files import FORMATS, FigureFiles, save
 from tvist_lab.figures.flexibility import figure_1
-from tvist_lab.figures.frequency_error import sensitivity_figure, settling_against_delay_figure
-from tvist_lab.figures.identified import identified_figure
-from tvist_lab.figures.mean_delay import mean_delay_figure
 from tvist_lab.figures.one_joint import figure_2
+from tvist_lab.figures.paper_metrics import figure_15, figure_16
 from tvist_lab.figures.pareto import pareto_figure, settling_figure
 from tvist_lab.figures.path_shaping import corner_figure, path_shaping_figure
 from tvist_lab.figures.recorded import Recorded, motion_figure, observed_figure
-from tvist_lab.figures.residual import figure_16
 from tvist_lab.figures.ring_down import ring_down_figure
-from tvist_lab.figures.robustness import robustness_figure
-from tvist_lab.figures.sensitivity import figure_4
-from tvist_lab.figures.settling_times import figure_15
-from tvist_lab.figures.study import study_figure
-from tvist_lab.figures.sweep import sweep_figure
-from tvist_lab.figures.workspace_map import workspace_map_figure
+from tvist_lab.figures.studies import residual_by_move_figure, robustness_figure, study_figure, sweep_figure
+from tvist_lab.figures.through_filters import elastic_figure, mean_delay_figure
+from tvist_lab.figures.wrong_frequency import (
+    catalogue_figure,
+    figure_4,
+    sensitivity_figure,
+    settling_against_delay_figure,
+)
 
 __all__ = [
     "FORMATS",
@@ -31,6 +28,7 @@ __all__ = [
     "Recorded",
     "after_stop_figure",
     "catalogue_figure",
+    "compared_figure",
     "corner_figure",
     "elastic_figure",
     "figure_1",

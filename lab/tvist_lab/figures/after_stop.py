@@ -1,5 +1,6 @@
-"""One motion at a glance: how the tool shakes after it, without and with shaping."""
+"""How the tool shakes after a motion: without and with shaping, and in several recordings."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,15 +10,20 @@ from numpy.typing import NDArray
 
 from tvist_lab.figures.recorded import Recorded
 from tvist_lab.figures.style import (
+    ALPHA,
     FAINT,
     INK,
-    LIMIT,
     MUTED,
+    OF_ALPHA,
     OF_SHAPED,
     OF_UNSHAPED,
+    SERIES,
     SHAPED,
     UNSHAPED,
     Series,
+    dashed,
+    dotted,
+    legend,
     note,
     panels,
     tint,
@@ -27,11 +33,13 @@ from tvist_lab.metrics import (
     NotMeasurableError,
     amplitude,
     best_tool_acceleration,
+    motions,
     peak_after_stop,
     still_after,
 )
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL
-from tvist_lab.recordings import Floats
+from tvist_lab.metrics.felt import felt
+from tvist_lab.recordings import Floats, Recording
 
 SHOWN = (-0.05, 0.35)
 """Time shown before and after the end of the unshaped motion's reference [s]."""
@@ -39,6 +47,8 @@ HEADROOM = 1.6
 """Height of the axis over the larger peak [-]: the end of the braking shows, and the peaks are not small."""
 WORDS_AT = 0.1
 """Where the curves' names begin [s]."""
+BEFORE, AFTER = 0.1, 0.6
+"""Time shown before and after the stop in the first of several recordings [s]."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +100,7 @@ def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure
     _name(panel, before, f"without shaping: {before.peak:.2f} m/s²", 0.90 * top, UNSHAPED)
     words = f"with shaping: {after.peak:.2f} m/s², {_change(before.peak, after.peak)}"
     _name(panel, after, words, 0.76 * top, SHAPED)
-    panel.axhline(STILL, color=FAINT, linewidth=0.9, linestyle=LIMIT)
+    dashed(panel, STILL, color=FAINT, width=0.9)
     _compare_rest(panel, before.still, after.still)
     note(panel, "braking", (1e3 * SHOWN[0] + 5.0, 0.90 * top), color=MUTED)
     return figure
@@ -128,7 +138,7 @@ def _compare_rest(panel: Axes, before: float | None, after: float | None) -> Non
     limit = f"the tool is at rest (below {STILL:g} m/s²)"
     at = 1e3 * SHOWN[1]
     if before is None or after is None:
-        note(panel, limit, (at, STILL), xytext=(0, 3), textcoords="offset points", ha="right", color=MUTED)
+        note(panel, limit, (at, STILL), (0, 3), ha="right", color=MUTED)
         return
     for moment, color in ((before, UNSHAPED), (after, SHAPED)):
         panel.plot([1e3 * moment], [STILL], "|", color=color, markersize=14, markeredgewidth=2.2, zorder=5)
@@ -137,7 +147,7 @@ def _compare_rest(panel: Axes, before: float | None, after: float | None) -> Non
     panel.annotate("", (1e3 * after, STILL), (1e3 * before, STILL), arrowprops=arrow, zorder=5)
     gained = 1e3 * (before - after)
     words = f"{abs(gained):.0f} ms {'earlier' if gained >= 0.0 else 'later'} with shaping"
-    note(panel, f"{limit}\n{words}", (at, STILL), xytext=(0, 5), textcoords="offset points", ha="right")
+    note(panel, f"{limit}\n{words}", (at, STILL), (0, 5), ha="right")
 
 
 def _curve(recorded: Recorded, length: float) -> _Curve:
@@ -154,3 +164,53 @@ def _curve(recorded: Recorded, length: float) -> _Curve:
     except NotMeasurableError:
         still = None
     return _Curve(time, alpha, counts, peak, at, still)
+
+
+def compared_figure(name: str, recorded: Sequence[tuple[str, Recorded]]) -> Figure:
+    """|α| of one motion in up to eight recordings, on one clock that begins with the motion.
+
+    Args:
+        name: Name of the motion, used as the heading.
+        recorded: Name of each recording, and its motion.
+
+    Raises:
+        NotMeasurableError: The accelerometer was not recorded, or too little of the rest.
+    """
+    figure, (panel,) = panels(1, 3.2)
+    title(panel, name)
+    first, motion = recorded[0][1]
+    stop = float(first.time[motion.arm_stop(first)] - first.time[motion.start])
+    highest = STILL
+    for (label, (recording, its)), look in zip(recorded, SERIES, strict=False):
+        time, alpha = felt(recording, its, slice(its.start, its.end), smooth=True)
+        time = time - recording.time[its.start] - stop
+        size = amplitude(alpha)
+        panel.plot(time, size, **look.line(label=label))
+        highest = max(highest, float(np.max(size[(time > 0.0) & (time < AFTER)], initial=0.0)))
+    dashed(panel, STILL, color=FAINT, width=0.9)
+    note(panel, f"{STILL:g} m/s²", (AFTER, STILL), (-2, 2), ha="right")
+    panel.set(
+        xlim=(-BEFORE, AFTER), ylim=(0.0, 1.25 * highest), xlabel=f"Time after the stop in {recorded[0][0]} (s)",
+        ylabel=ALPHA,
+    )  # fmt: skip
+    legend(figure, panel, OF_ALPHA)
+    return figure
+
+
+def vibration_figure(unshaped: Recording, shaped: Recording, number: int) -> Figure:
+    """|α| of one move around its stop, unshaped and shaped; time is zero when the unshaped reference stops."""
+    figure, (panel,) = panels(1, 2.8)
+    for recording, style, label in ((unshaped, OF_UNSHAPED, "Unshaped"), (shaped, OF_SHAPED, "Shaped")):
+        motion = motions(recording)[0]
+        time = 1e3 * (recording.time - recording.time[motion.reference_stop])
+        panel.plot(time, amplitude(best_tool_acceleration(recording)), **style.line(1.2, label=label))
+        dotted(panel, time[motion.shaped_stop], color=style.color)
+    panel.plot([], [], color=FAINT, linewidth=0.9, linestyle=":", label="Stop of the reference")
+    panel.set(
+        xlim=(-150, 450),
+        xlabel="Time after the unshaped reference's stop (ms)",
+        ylabel=ALPHA,
+    )
+    title(panel, f"Move {number}")
+    legend(figure, panel, OF_ALPHA)
+    return figure

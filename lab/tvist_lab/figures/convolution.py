@@ -4,17 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import tvist_shaping
-from tvist_lab.figures.style import (
-    FAINT,
-    OF_SHAPED,
-    OF_THIRD,
-    OF_UNSHAPED,
-    explain,
-    legend,
-    note,
-    panels,
-    title,
-)
+from tvist_lab.figures.style import OF_SHAPED, OF_THIRD, OF_UNSHAPED, dotted, legend, note, panels, title
 from tvist_lab.recordings import Floats
 
 F_D, ZETA = 10.0, 0.1
@@ -40,8 +30,7 @@ def figure_3() -> Figure:
             sequence,
             f"$A_{number}$ = {A:.3f} at $\\tau_{number}$ = {1e3 * tau:.0f} ms",
             (1e3 * tau, float(A)),
-            xytext=(8, -4),
-            textcoords="offset points",
+            (8, -4),
         )
         responses.plot(1e3 * time, A * _response(time - tau), **style.line(1.4, label=f"From $A_{number}$"))
     total = sum(A * _response(time - tau) for A, tau in zip(impulses.A, impulses.tau, strict=True))
@@ -53,26 +42,14 @@ def figure_3() -> Figure:
     shaped = sum(A * _reference(time - tau) for A, tau in zip(impulses.A, impulses.tau, strict=True))
     references.plot(1e3 * time, _reference(time), **OF_UNSHAPED.line(1.4))
     references.plot(1e3 * time, shaped, **OF_SHAPED.line(1.8))
-    note(
-        references,
-        "$x$",
-        (1e3 * 0.35 * RISE, float(_reference(np.array(0.35 * RISE)))),
-        xytext=(-10, 4),
-        textcoords="offset points",
-    )
-    note(
-        references,
-        "$x^*$",
-        (1e3 * RISE, float(np.interp(RISE, time, shaped))),
-        xytext=(8, -8),
-        textcoords="offset points",
-    )
+    note(references, "$x$", (1e3 * 0.35 * RISE, float(_reference(np.array(0.35 * RISE)))), (-10, 4))
+    note(references, "$x^*$", (1e3 * RISE, float(np.interp(RISE, time, shaped))), (8, -8))
     references.set(ylabel="Reference (–)", xlabel="Time (ms)", xlim=(-4.0, 1e3 * DURATION))
     for panel in (sequence, responses, references):
-        panel.axvline(1e3 * float(impulses.tau[1]), color=FAINT, linewidth=0.8, linestyle=":")
-    legend(figure, responses)
-    explain(
+        dotted(panel, 1e3 * float(impulses.tau[1]), width=0.8)
+    legend(
         figure,
+        responses,
         {
             r"$A_j$, $\tau_j$": "amplitude and time of an impulse",
             "$x$": "reference",

@@ -12,7 +12,7 @@ from tvist_lab.figures.style import (
     OF_SHAPED,
     OF_THIRD,
     OF_UNSHAPED,
-    explain,
+    dotted,
     legend,
     note,
     panels,
@@ -71,11 +71,10 @@ def figure_8() -> Figure:
             weights,
             f"$A_{number}$ = {A:.2f} at {delay:.2f} ticks",
             (-delay, A),
-            xytext=(-6, 3) if number == 1 else (6, 3),
-            textcoords="offset points",
+            (-6, 3) if number == 1 else (6, 3),
             ha="right" if number == 1 else "left",
         )
-        samples.axvline(-delay, color=FAINT, linewidth=0.8, linestyle=":")
+        dotted(samples, -delay, width=0.8)
     weights.set(
         ylabel="Amplitude (–)",
         xlabel="Time from this tick (ticks of 2 ms)",
@@ -83,9 +82,9 @@ def figure_8() -> Figure:
         ylim=(0.0, 0.9),
     )
     title(weights, r"$I_i$: impulses of this tick, from $f_d$ and $\zeta$")
-    legend(figure, samples)
-    explain(
+    legend(
         figure,
+        samples,
         {
             "$x_i$": "reference at tick $i$",
             r"$f_d$, $\zeta$": "damped frequency and damping ratio, estimated from $x^*_{i-1}$",

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import tvist_shaping
-from tvist_lab.figures.style import INK, LIMIT, OF_SHAPED, OF_UNSHAPED, explain, legend, note, panels
+from tvist_lab.figures.style import OF_SHAPED, OF_UNSHAPED, dashed, legend, note, panels
 from tvist_lab.recordings import Floats
 
 PERIOD = 0.002
@@ -45,14 +45,9 @@ def figure_7() -> Figure:
         qdd = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / PERIOD**2
         accelerations.plot(when, qdd[1:-1], **dots)
     errors.set(ylabel=r"Error of $q^*$ (mrad)")
-    accelerations.axhline(ACCELERATION, color=INK, linewidth=0.8, linestyle=LIMIT)
+    dashed(accelerations, ACCELERATION)
     note(
-        accelerations,
-        f"asked: {ACCELERATION:g} rad/s²",
-        (0.54 * when[-1], ACCELERATION),
-        xytext=(0, 6),
-        textcoords="offset points",
-        ha="center",
+        accelerations, f"asked: {ACCELERATION:g} rad/s²", (0.54 * when[-1], ACCELERATION), (0, 6), ha="center"
     )
     accelerations.set(
         xlabel="Time (ms)",
@@ -61,9 +56,9 @@ def figure_7() -> Figure:
         ylim=(-400.0, 400.0),
     )
     accelerations.set_yscale("symlog", linthresh=10.0)
-    legend(figure, delays)
-    explain(
+    legend(
         figure,
+        delays,
         {
             r"$\tau_2$": "delay of the second impulse",
             r"$q^*$, $\ddot q^*$": "shaped reference and its acceleration",

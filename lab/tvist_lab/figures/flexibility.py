@@ -144,14 +144,7 @@ def _draw_arm(panel: Axes, bent: Bent) -> None:
     panel.margins(0.08, 0.35)
     panel.set(xlabel="Along the arm (m)", ylabel="Height (m)")
     gone = 1e3 * np.linalg.norm(bent.line()[-1] - rigid[-1])
-    note(
-        panel,
-        f"flange {gone:.2f} mm away",
-        (tool[0], tool[2]),
-        xytext=(6, 12),
-        textcoords="offset points",
-        ha="right",
-    )
+    note(panel, f"flange {gone:.2f} mm away", (tool[0], tool[2]), (6, 12), ha="right")
 
 
 def largest_deflection(description: RobotDescription) -> Bent:

@@ -12,10 +12,10 @@ from tvist_lab.figures.style import (
     MUTED,
     SERIES,
     UNSHAPED,
-    explain,
     legend,
     note,
     panels,
+    remark,
     title,
 )
 from tvist_lab.one_joint.lesson import Lesson, PoseResult
@@ -61,22 +61,20 @@ def figure_2(lesson: Lesson) -> Figure:
     frequencies.set_ylabel("Damped frequency $f_d$ (Hz)")
     frequencies.tick_params(labelbottom=False)
     dampings.set(ylabel="Damping ratio ζ (–)", xlabel="Elbow $q$, 0 stretched out (°)")
-    note(
+    remark(
         frequencies,
         r"$f_d = \frac{1}{2\pi}\sqrt{\frac{K}{I(q)}\,}\sqrt{1 - \zeta^2}$"
         f"    simulated within {lesson.worst_f_d:.2f} %",
         (0.02, 0.1),
-        xycoords="axes fraction",
     )
-    note(
+    remark(
         dampings,
         r"$\zeta = \frac{D}{2\sqrt{K I(q)}}$" + f"    simulated within {lesson.worst_zeta:.1f} %",
         (0.02, 0.14),
-        xycoords="axes fraction",
     )
-    legend(figure, frequencies)
-    explain(
+    legend(
         figure,
+        frequencies,
         {"$I$": "inertia about the shoulder", "$K$, $D$": "stiffness and damping of its flexible drive"},
     )
     figure.align_ylabels([frequencies, dampings])

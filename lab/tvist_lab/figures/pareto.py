@@ -7,8 +7,18 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvist_lab.figures.naming import name_over
-from tvist_lab.figures.style import FAINT, INK, OF_SHAPED, OF_UNSHAPED, decades, legend, note, panels, title
+from tvist_lab.figures.style import (
+    FAINT,
+    INK,
+    OF_SHAPED,
+    OF_UNSHAPED,
+    decades,
+    legend,
+    name_over,
+    note,
+    panels,
+    title,
+)
 
 NOTICEABLE = 1.01
 """Largest peak over its limit that is drawn as one that keeps it [-]; a filter's own ripple stays below."""

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 
 from tvist_lab.figures.style import (
     FAINT,
-    LIMIT,
     OF_SHAPED,
     OF_UNSHAPED,
     Series,
+    dashed,
     decades,
     legend,
     panels,
@@ -83,7 +83,7 @@ def path_shaping_figure(paths: Sequence[dict[str, Any]]) -> Figure:
     above, middle, below = panes
     above.set_yscale("log")
     decades(above, "y")
-    above.axhline(5.0, color=FAINT, linewidth=0.8, linestyle=LIMIT)
+    dashed(above, 5.0, color=FAINT)
     above.set_ylabel("Peak over unshaped (%)")
     middle.axhline(1.0, color=FAINT, linewidth=0.8)
     middle.set_ylabel("RMS over unshaped (–)")

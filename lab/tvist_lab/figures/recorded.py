@@ -8,13 +8,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from tvist_lab.figures.style import (
+    ALPHA,
     FAINT,
-    LIMIT,
     MUTED,
     OF_SHAPED,
     OF_UNSHAPED,
     Series,
-    explain,
+    dashed,
     legend,
     note,
     panels,
@@ -81,19 +81,18 @@ def _figure(name: str, drawn: Sequence[tuple[Recorded, Series, str]]) -> Figure:
     accelerations, errors, alphas, frequencies, dampings = axes
     _name_joints(accelerations, drawn[0][0])
     title(accelerations, name)
-    errors.axhline(1e3 * REPEATABILITY, color=FAINT, linewidth=0.9, linestyle=LIMIT)
+    dashed(errors, 1e3 * REPEATABILITY, color=FAINT, width=0.9)
     note(
         errors,
         f"repeatability, {1e3 * REPEATABILITY:g} mm",
         (0.0, 1e3 * REPEATABILITY),
+        (3, 2),
         xycoords=("axes fraction", "data"),
-        xytext=(3, 2),
-        textcoords="offset points",
         color=MUTED,
     )
     accelerations.set_ylabel(r"$\ddot q^*$ (rad/s²)")
     errors.set(ylabel=r"$E$ (mm)", ylim=(0.0, NEAR), yticks=np.linspace(0.0, NEAR, 4))
-    alphas.set_ylabel(r"$|\alpha|$ (m/s²)")
+    alphas.set_ylabel(ALPHA)
     alphas.set_ylim(bottom=0.0)
     frequencies.set_ylabel(r"Estimated $f_d$ (Hz)")
     _grow(frequencies, 5.0, 16.0)
@@ -103,8 +102,7 @@ def _figure(name: str, drawn: Sequence[tuple[Recorded, Series, str]]) -> Figure:
     dampings.set_xlabel("Time (s)")
     ends = [recording.time[m.shaped_stop] - recording.time[m.start] for (recording, m), _, _ in drawn]
     dampings.set_xlim(-LEAD, max(ends) + REST)
-    legend(figure, accelerations)
-    explain(figure, SYMBOLS)
+    legend(figure, accelerations, SYMBOLS)
     return figure
 
 
@@ -143,14 +141,7 @@ def _name_joints(panel: Axes, recorded: Recorded) -> None:
     for values, joints in groups:
         words = ", ".join(rf"$\ddot q^*_{joint}$" for joint in joints)
         height = float(values[plateau])
-        note(
-            panel,
-            words,
-            (at, height),
-            xytext=(0, -3 if height > 0 else 3),
-            textcoords="offset points",
-            va="top" if height > 0.0 else "bottom",
-        )
+        note(panel, words, (at, height), (0, -3 if height > 0 else 3), va="top" if height > 0.0 else "bottom")
 
 
 def _alike(qdd: Floats) -> list[tuple[Floats, list[int]]]:

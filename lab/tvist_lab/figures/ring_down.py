@@ -8,14 +8,14 @@ from scipy.signal import spectrogram
 
 from tvist_lab.figures.recorded import Recorded
 from tvist_lab.figures.style import (
-    FAINT,
-    INK,
     OF_SHAPED,
     OF_UNSHAPED,
-    explain,
+    color_bar,
+    dotted,
     legend,
     note,
     panels,
+    remark,
     tint,
     title,
 )
@@ -66,9 +66,9 @@ def ring_down_figure(name: str, recorded: Recorded) -> Figure:
     _draw_course(course, time, alpha - ring.mean(axis=0), after, fit)
     _draw_spectrum(spectrum, ring, period, fit)
     _draw_levels(figure, levels, (time, alpha), period, fit)
-    legend(figure, course)
-    explain(
+    legend(
         figure,
+        course,
         {
             r"$\alpha$": "acceleration of the tool, without gravity",
             "$f_d$": "damped frequency",
@@ -103,12 +103,12 @@ def _draw_course(panel: Axes, time: Floats, alpha: Floats, after: NDArray[np.boo
         low, high = fit.zeta_interval
         words = f"$f_d$ = {fit.f_d:.2f} Hz, $\\zeta$ = {fit.zeta:.3f} (95 %: {low:.3f} to {high:.3f})"
     loudest = 1.3 * float(np.max(np.abs(along[after])))
-    panel.axvline(0.0, color=FAINT, linewidth=0.9, linestyle=":")
+    dotted(panel, 0.0)
     panel.set(
         xlabel="Time after the stop (ms)", ylabel=r"$\alpha$ (m/s²)", ylim=(-loudest, loudest),
         xlim=(-1e3 * BEFORE, 1e3 * time[-1]),
     )  # fmt: skip
-    note(panel, words, (0.99, 0.95), xycoords="axes fraction", ha="right", va="top")
+    remark(panel, words, (0.99, 0.95), ha="right", va="top")
 
 
 def _draw_spectrum(panel: Axes, ring: Floats, period: float, fit: RingDown) -> None:
@@ -143,18 +143,10 @@ def _draw_levels(
         shading="nearest",
         rasterized=True,
     )
-    panel.axvline(0.0, color=FAINT, linewidth=0.9, linestyle=":")
+    dotted(panel, 0.0)
     if fit.ok:
         panel.axhline(fit.f_d, color="white", linewidth=1.2, linestyle=(0, (5, 3)))
-        note(
-            panel,
-            "$f_d$",
-            (1.0, fit.f_d),
-            xycoords=("axes fraction", "data"),
-            xytext=(-3, 3),
-            textcoords="offset points",
-            ha="right",
-        )
+        note(panel, "$f_d$", (1.0, fit.f_d), (-3, 3), xycoords=("axes fraction", "data"), ha="right")
     panel.grid(visible=False)
     panel.set(
         xlabel="Time after the stop (ms)",
@@ -162,9 +154,7 @@ def _draw_levels(
         ylim=(0.0, HIGHEST),
         xlim=(-1e3 * BEFORE, 1e3 * (time[-1] - 0.5 * BLOCK)),
     )
-    bar = figure.colorbar(drawn, ax=panel, pad=0.01)
-    bar.set_label("Level (dB)", fontsize=9, color=INK)
-    bar.ax.tick_params(labelsize=8, colors=INK)
+    color_bar(figure, drawn, panel, "Level (dB)", pad=0.01)
 
 
 def _power(alpha: Floats, period: float) -> tuple[Floats, Floats, Floats]:

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.ticker import Formatter
+from numpy.typing import NDArray
 
 UNSHAPED = "#D55E00"
 """Vermilion (Okabe and Ito), of medium lightness."""
@@ -35,6 +36,12 @@ DPI = 150
 """Resolution of bitmaps unless another one is asked for [dots per inch]."""
 LIMIT = (0, (4, 3))
 """Dashes of limits and other auxiliary lines."""
+ALPHA = r"$|\alpha|$ (m/s²)"
+"""Label of the axis of the tool's acceleration."""
+OF_ALPHA = {r"$|\alpha|$": "acceleration of the tool, without gravity"}
+"""What its symbol means."""
+NEAR = 0.035
+"""Points that are closer than this share of the axis share a name [-]."""
 
 
 class Series(NamedTuple):
@@ -173,8 +180,14 @@ def title(panel: Axes, words: str) -> None:
     panel.set_title(words, loc="left", fontsize=9.5, color=INK, fontweight="bold")
 
 
-def legend(figure: Figure, panel: Axes) -> None:
-    """Draw one legend for the whole figure above its panels, with the entries of one panel."""
+def legend(figure: Figure, panel: Axes, symbols: Mapping[str, str] | None = None) -> None:
+    """Draw one legend for the whole figure above its panels, with the entries of one panel.
+
+    Args:
+        figure: The figure.
+        panel: The panel.
+        symbols: Symbols to explain below the panels, see `explain`.
+    """
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(
         handles,
@@ -186,6 +199,22 @@ def legend(figure: Figure, panel: Axes) -> None:
         labelcolor=INK,
         handlelength=2.4,
     )
+    if symbols:
+        explain(figure, symbols)
+
+
+def legend_beside(panel: Axes, color: str | None = None) -> None:
+    """Draw a panel's legend on its right."""
+    panel.legend(
+        loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False, labelcolor=color, handlelength=3.0
+    )  # fmt: skip
+
+
+def color_bar(figure: Figure, drawn: Any, axes: Axes | Sequence[Axes], words: str, **how: Any) -> None:
+    """Draw the scale of a coloured area beside its panels."""
+    bar = figure.colorbar(drawn, ax=axes, **how)
+    bar.set_label(words, fontsize=9, color=INK)
+    bar.ax.tick_params(labelsize=8, colors=INK)
 
 
 def explain(figure: Figure, symbols: Mapping[str, str]) -> None:
@@ -215,7 +244,65 @@ def literal(words: str) -> str:
     return f" {plain}" if plain.startswith("_") else plain
 
 
-def note(panel: Axes, words: str, at: tuple[float, float], *, color: str = INK, **how: Any) -> Text:
-    """Write small text within a panel, at a point in data coordinates."""
+def dashed(panel: Axes, height: float, *, color: str = INK, width: float = 0.8, **how: Any) -> None:
+    """Draw a limit: a dashed line across a panel."""
+    panel.axhline(height, color=color, linewidth=width, linestyle=LIMIT, **how)
+
+
+def dotted(panel: Axes, at: float, *, color: str = FAINT, width: float = 0.9) -> None:
+    """Draw a moment: a dotted line from the bottom to the top of a panel."""
+    panel.axvline(at, color=color, linewidth=width, linestyle=":")
+
+
+def note(
+    panel: Axes,
+    words: str,
+    at: tuple[float, float],
+    offset: tuple[float, float] | None = None,
+    *,
+    color: str = INK,
+    **how: Any,
+) -> Text:
+    """Write small text within a panel.
+
+    Args:
+        panel: The panel.
+        words: The text.
+        at: Point, in data coordinates unless `xycoords` names others.
+        offset: Distance of the text from the point [pt].
+        color: Colour of the text.
+        how: Further arguments of `annotate`.
+    """
     backing = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
+    if offset is not None:
+        how |= {"xytext": offset, "textcoords": "offset points"}
     return panel.annotate(words, at, **{"color": color, "fontsize": 8, "bbox": backing, "zorder": 6.0, **how})
+
+
+def remark(panel: Axes, words: str, at: tuple[float, float], **how: Any) -> Text:
+    """Write small text at a place of a panel, as shares of its width and height; see `note`."""
+    return note(panel, words, at, xycoords="axes fraction", **how)
+
+
+def name_over(
+    panel: Axes, x: NDArray[np.float64], highest: NDArray[np.float64], names: Sequence[str]
+) -> None:
+    """Write names upwards from the highest point at each place; names of places that are close share a line.
+
+    Args:
+        panel: The panel.
+        x: Places, shape (N,).
+        highest: Highest point at each place, shape (N,).
+        names: N names.
+    """
+    near = NEAR * float(np.ptp(x))
+    groups: list[list[int]] = []
+    for place in map(int, np.argsort(x, kind="stable")):
+        if groups and x[place] - x[groups[-1][0]] <= near:
+            groups[-1].append(place)
+        else:
+            groups.append([place])
+    for group in groups:
+        words = ", ".join(names[place] for place in group)
+        at = float(x[group].mean()), float(highest[group].max())
+        note(panel, words, at, (0, 6), rotation=90, ha="center", va="bottom", bbox=None)

@@ -12,12 +12,10 @@ from tvist_client.robot import Robot
 from tvist_controller.api.line import estimator_of
 from tvist_lab.collect import collect
 from tvist_lab.identification.fit import Fit, check_count, fit_polynomials, spread
-from tvist_lab.identification.ring_downs import Jog, measure
-from tvist_lab.metrics import RingDown
+from tvist_lab.identification.ring_downs import Jog, measure, or_none
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import identified
 from tvist_protocol.calibration import Calibration, Provenance, Spread
-from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
 
 CONFIGURATIONS = 160
@@ -136,8 +134,8 @@ async def identify(
     for number, q in enumerate(anchors + spread_out):
         if len(kept) == len(anchors) + plan.configurations:
             break
-        ring = await _ring_down(robot, arm, q, plan)
-        if ring is None:
+        ring = await or_none(measure(robot, arm, q, plan.jog, plan.repeats))
+        if ring is None or not ring.ok:
             rejected += 1
             continue
         kept.append(q)
@@ -165,17 +163,6 @@ async def identify(
         "the arm's true lowest mode, by fits that did not see the configuration",
         spread(fit.unseen_f_d, true_f_d), spread(fit.unseen_zeta, true_zeta), named,
     )  # fmt: skip
-
-
-async def _ring_down(robot: Robot, arm: Arm, q: Floats, plan: MeasurementPlan) -> RingDown | None:
-    """Measure the ring-down at a configuration; return None if it cannot be reached or fitted."""
-    try:
-        ring = await measure(robot, arm, q, plan.jog, plan.repeats)
-    except RefusedError as error:
-        if error.reply.code != "collision":
-            raise
-        return None
-    return ring if ring.ok else None
 
 
 async def _true_mode(robot: Robot) -> tuple[float, float] | None:

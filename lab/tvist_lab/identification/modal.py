@@ -2,23 +2,29 @@
 
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from tvist_client.arm import Arm
 from tvist_client.errors import ClientError
 from tvist_client.robot import Robot
+from tvist_controller.api.line import modal_estimator, paper_payload
+from tvist_lab.collect import collect
 from tvist_lab.identification.design import choose
+from tvist_lab.identification.fit import spread
 from tvist_lab.identification.identify import IdentificationError
-from tvist_lab.identification.modal_calibration import ModeErrors, calibrate
+from tvist_lab.identification.modal_calibration import TOLD, ModeErrors, calibrate
 from tvist_lab.identification.modal_plan import ModalPlan, check, free_configurations
-from tvist_lab.identification.modal_truth import against_truth
-from tvist_lab.identification.ring_downs import Jog, Ringing, listen
+from tvist_lab.identification.ring_downs import Jog, Ringing, listen, or_none
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats, RecordingError
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.errors import RefusedError
+from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
+from tvist_shaping.errors import EstimatorError
 
 CANDIDATES = 60
 """Number of configurations to choose from."""
@@ -27,6 +33,8 @@ SPARE = 4
 QUIET = 2.0
 """A ring-down whose rms is less than this times its noise contains no information [-]."""
 Progress = Callable[[], None]
+UNSEEN = 60
+"""Number of configurations and payloads at which the truth is requested, if there is one."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +87,7 @@ async def identify_modal(
     try:
         ringings, rejected = await _measure(robot, control, arm, candidates, plan, progress)
         calibration = calibrate(arm, ringings, info, plan, rejected, name=name, command=command)
-        errors = await against_truth(robot, control, calibration, description, plan, info)
+        errors = await _against_truth(robot, control, calibration, description, plan, info)
     finally:
         if plan.payloads:
             with contextlib.suppress(ClientError, RefusedError):
@@ -132,10 +140,49 @@ async def _carry(control: Arm, payload: Payload) -> None:
 async def _ringing(robot: Robot, control: Arm, q: Floats, payload: int, jog: Jog) -> Ringing | None:
     """Measure the ring-down at a configuration; return None if it cannot be reached or was not received completely."""
     try:
-        return await listen(robot, control, q, payload, jog)
+        return await or_none(listen(robot, control, q, payload, jog))
     except RecordingError:
         return None
-    except RefusedError as error:
-        if error.reply.code != "collision":
-            raise
+
+
+async def _against_truth(
+    robot: Robot,
+    control: Arm,
+    calibration: Calibration,
+    description: RobotDescription,
+    plan: ModalPlan,
+    info: Info,
+) -> tuple[ModeErrors, ...] | None:
+    """Errors at random configurations that were not measured; None if the robot does not publish the truth.
+
+    If the arm was made to carry several payloads, the payloads are random, too; otherwise the declared one is used.
+    """
+    with collect(robot) as collected:
+        start = (await robot.state()).target_q
+        await robot.advance(2)
+    if not collected.truths:
         return None
+    rng = np.random.default_rng(plan.seed + 1)
+    places = free_configurations(
+        description,
+        (paper_payload(description, description.limits.payload),),
+        UNSEEN,
+        replace(plan, seed=plan.seed + 1),
+    )
+    pairs = []
+    for q in places:
+        payload = info.payload
+        if plan.payloads:
+            payload = paper_payload(description, float(rng.uniform(0.0, description.limits.payload)))
+        with collect(robot) as collected:
+            await control.reset(q=q, payload=payload if plan.payloads else None)
+            await robot.advance(1)
+        truth = collected.truths[-1]
+        try:
+            f_d, zeta = modal_estimator(calibration, description, payload, TOLD).estimate(q)
+        except EstimatorError:
+            continue
+        pairs.append((f_d, truth.f_d[:TOLD], zeta, truth.zeta[:TOLD]))
+    await control.reset(q=start)
+    f_d, true_f_d, zeta, true_zeta = np.array(pairs).transpose(1, 2, 0)
+    return tuple(ModeErrors(spread(f_d[k], true_f_d[k]), spread(zeta[k], true_zeta[k])) for k in range(TOLD))

@@ -20,13 +20,12 @@ from tvist_client.robot import Robot
 from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.identify import IdentificationError
-from tvist_lab.identification.ring_downs import reach
+from tvist_lab.identification.ring_downs import or_none, reach
 from tvist_lab.recordings import Floats, Recording
 from tvist_lab.workspace import ranges, workspace
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import carries_weight, rigid_model
-from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
 
@@ -112,15 +111,12 @@ async def identify_payload(
     for q in arm.choose(_free(description, info.payload, seed), 3 * poses):
         if rested == poses:
             break
-        try:
-            sides = [await _hold(robot, control, q + side * ASIDE, q, period) for side in (-1.0, 1.0)]
-        except RefusedError as error:
-            if error.reply.code != "collision":
-                raise
+        held = await or_none(_hold(robot, control, q, period))
+        if held is None:
             continue
         rested += 1
         progress()
-        at, torque = (np.mean(values, axis=0) for values in zip(*sides, strict=True))
+        at, torque = held
         rows.append(arm.static(at))
         torques.append(torque - arm.torque(at, np.zeros_like(at), np.zeros_like(at)))
     if rested < LEAST:
@@ -273,15 +269,19 @@ def _free(description: RobotDescription, declared: Payload, seed: int) -> list[F
     return found
 
 
-async def _hold(robot: Robot, control: Arm, aside: Floats, q: Floats, period: float) -> tuple[Floats, Floats]:
-    """Return angles and torques at rest in a pose, approached from another one."""
-    await reach(control, aside)
-    await control.move_j(q, acceleration=1.0)
-    await robot.advance(round(REST / period))
-    with collect(robot) as collected:
-        await robot.advance(round(LOOK / period))
-    recording = collected.recording()
-    return recording["actual_q"].mean(axis=0), recording["actual_moment"].mean(axis=0)
+async def _hold(robot: Robot, control: Arm, q: Floats, period: float) -> tuple[Floats, Floats]:
+    """Return angles and torques at rest in a pose, the means of approaches from both sides."""
+    angles, torques = [], []
+    for side in (-1.0, 1.0):
+        await reach(control, q + side * ASIDE)
+        await control.move_j(q, acceleration=1.0)
+        await robot.advance(round(REST / period))
+        with collect(robot) as collected:
+            await robot.advance(round(LOOK / period))
+        recording = collected.recording()
+        angles.append(recording["actual_q"].mean(axis=0))
+        torques.append(recording["actual_moment"].mean(axis=0))
+    return np.mean(angles, axis=0), np.mean(torques, axis=0)
 
 
 async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Recording:
@@ -291,11 +291,7 @@ async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Record
     swing[1:4] = SWING
     for share in shares:
         with collect(robot) as collected:
-            try:
-                await control.move_j(q + share * swing)
-            except RefusedError as error:
-                if error.reply.code != "collision":
-                    raise
+            if await or_none(control.move_j(q + share * swing)) is None:
                 continue
             await control.move_j(q)
             await robot.advance(round(LOOK / period))

@@ -1,6 +1,8 @@
 """Measurement of ring-downs: make the arm vibrate at a configuration and record it."""
 
+from collections.abc import Awaitable
 from dataclasses import asdict, dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +13,8 @@ from tvist_lab.collect import collect
 from tvist_lab.metrics import RingDown, fit_ring_down, motions, tool_acceleration
 from tvist_lab.recordings import Floats, RecordingError
 from tvist_protocol.errors import RefusedError
+
+Measured = TypeVar("Measured")
 
 LISTEN = 0.6
 """Time recorded after a jog [s]."""
@@ -74,17 +78,23 @@ class Ringing:
         return float(np.sqrt(np.mean((self.force - self.force.mean(axis=0)) ** 2)))
 
 
+async def or_none(measuring: Awaitable[Measured]) -> Measured | None:
+    """Wait for a motion or a measurement; return None if the robot refuses it because of a collision."""
+    try:
+        return await measuring
+    except RefusedError as error:
+        if error.reply.code != "collision":
+            raise
+        return None
+
+
 async def reach(arm: Arm, q: Floats) -> None:
     """Move to a configuration; if there would be a collision on the straight line, via the upright arm.
 
     Raises:
         RefusedError: That way is not clear either; code `collision`.
     """
-    try:
-        await arm.move_j(q)
-    except RefusedError as error:
-        if error.reply.code != "collision":
-            raise
+    if await or_none(arm.move_j(q)) is None:
         upright = np.zeros_like(q)
         upright[[joint for joint in (1, 3) if joint < len(q)]] = -np.pi / 2
         await arm.move_j(upright)

@@ -1,8 +1,6 @@
 """Metrics of a recording: those of the paper, and those on a common clock."""
 
 from tvist_lab.metrics.common_clock import (
-    CommonClock,
-    common_clock,
     envelope,
     in_motion_rms,
     peak_acceleration,
@@ -10,25 +8,32 @@ from tvist_lab.metrics.common_clock import (
     peak_velocity,
     rigid_acceleration,
     still_after,
+    vibration_after_stop,
 )
 from tvist_lab.metrics.comparison import ComparedMotion, Comparison, compare
 from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.measured import Measured
 from tvist_lab.metrics.motion import MotionRows, motions
-from tvist_lab.metrics.notes import grouped_notes
-from tvist_lab.metrics.residual import ModalResidual, Residual, residual, residual_by_modes
+from tvist_lab.metrics.residual import Residual, residual
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
 from tvist_lab.metrics.settling import Settling, attained_position, distance, settling
-from tvist_lab.metrics.table import MotionResult, Runs, Table, analyze, measure, table_2, table_notes
+from tvist_lab.metrics.table import (
+    Measured,
+    MotionResult,
+    Runs,
+    Table,
+    analyze,
+    grouped_notes,
+    measure,
+    table_2,
+    table_notes,
+)
 from tvist_lab.metrics.vibration import amplitude, best_tool_acceleration, tool_acceleration
 
 __all__ = [
     "SLOW_POLE",
-    "CommonClock",
     "ComparedMotion",
     "Comparison",
     "Measured",
-    "ModalResidual",
     "MotionResult",
     "MotionRows",
     "NotMeasurableError",
@@ -41,7 +46,6 @@ __all__ = [
     "analyze",
     "attained_position",
     "best_tool_acceleration",
-    "common_clock",
     "compare",
     "distance",
     "envelope",
@@ -54,11 +58,11 @@ __all__ = [
     "peak_after_stop",
     "peak_velocity",
     "residual",
-    "residual_by_modes",
     "rigid_acceleration",
     "settling",
     "still_after",
     "table_2",
     "table_notes",
     "tool_acceleration",
+    "vibration_after_stop",
 ]

@@ -1,7 +1,6 @@
 """Metrics on a common clock: all times count from the start of the reference before shaping."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import hilbert
@@ -27,40 +26,6 @@ RINGS = 0.5
 
 Kinematics = Callable[[Floats], tuple[Floats, Floats]]
 """Converts joint angles, shape (n,) [rad], to the flange's position, shape (3,) [m], and rotation, shape (3, 3)."""
-
-
-@dataclass(frozen=True)
-class CommonClock:
-    """Metrics of one motion on the common clock."""
-
-    still_after: float
-    """Last time at which |α| exceeds 0.1 m/s², from the start of the reference before shaping [s]."""
-    peak: float
-    """Largest |α| after the stop of that reference plus the declared delay [m/s²]."""
-    envelope: float
-    """Largest envelope of α within 3 to 60 Hz after the same moment [m/s²]."""
-    in_motion: float
-    """Vibration during the motion: rms of |α - rigid motion| [m/s²]; NaN without kinematics."""
-    peak_acceleration: float
-    """Largest |q̈*| of any joint [rad/s²]."""
-
-
-def common_clock(
-    recording: Recording, motion: MotionRows, kinematics: Kinematics | None = None
-) -> CommonClock:
-    """Compute all metrics of a motion on the common clock, from the truth channel if there is one.
-
-    Raises:
-        NotMeasurableError: The arm was not still at the end of the recording.
-    """
-    peak, largest = vibration_after_stop(recording, motion)
-    return CommonClock(
-        still_after=still_after(recording, motion),
-        peak=peak,
-        envelope=largest,
-        in_motion=float("nan") if kinematics is None else in_motion_rms(recording, motion, kinematics),
-        peak_acceleration=peak_acceleration(recording, motion),
-    )
 
 
 def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[float, float]:
@@ -107,14 +72,14 @@ def still_after(recording: Recording, motion: MotionRows, threshold: float = STI
     return float(time[loud[-1]] - recording.time[motion.start])
 
 
-def peak_after_stop(recording: Recording, motion: MotionRows, after: float = AFTER_STOP) -> float:
+def peak_after_stop(recording: Recording, motion: MotionRows) -> float:
     """Largest true |α| later than 10 ms after the shaped reference stops [m/s²], which `evaluate` uses.
 
     Raises:
         RecordingError: Truth was not recorded.
         NotMeasurableError: Nothing was recorded after that moment.
     """
-    return peak_later_than(recording, motion, recording.time[motion.shaped_stop] + after)
+    return peak_later_than(recording, motion, recording.time[motion.shaped_stop] + AFTER_STOP)
 
 
 def peak_later_than(recording: Recording, motion: MotionRows, moment: float) -> float:

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tvist_lab.metrics.measured import Measured
 from tvist_lab.metrics.motion import MotionRows
-from tvist_lab.metrics.table import IMPACTS, MotionResult, impact_percent
+from tvist_lab.metrics.table import IMPACTS, Measured, MotionResult, impact_percent
 from tvist_lab.recordings import Floats, Recording
 
 SAME = 0.02

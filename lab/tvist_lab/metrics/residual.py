@@ -9,15 +9,13 @@ from scipy.signal import find_peaks
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.felt import felt
 from tvist_lab.metrics.motion import MotionRows
-from tvist_lab.metrics.vibration import amplitude, tool_acceleration
+from tvist_lab.metrics.vibration import amplitude
 from tvist_lab.recordings import Floats, Recording
 
 WINDOW = 0.3
 """Time after the stop in which peaks are searched [s]."""
 PROMINENCE = 0.1
 """Smallest prominence of a peak [m/s²]: three times the sensor's noise."""
-SETTLE = 0.012
-"""Time after the stop before modes are fitted [s], since the end of the deceleration ramp is not a ring-down."""
 
 
 @dataclass(frozen=True)
@@ -41,18 +39,6 @@ class Residual:
         """The fitted decay at given times [m/s²]; constant if nothing was fitted."""
         rate = self.decay if self.fitted else 0.0
         return np.asarray(self.value * np.exp(-rate * (time - self.stop)), dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class ModalResidual:
-    """RV by linear least squares on known modes."""
-
-    value: float
-    """Amplitude of the vibration at the stop, all modes together [m/s²]."""
-    amplitudes: Floats
-    """Amplitude of each mode at the stop [m/s²], shape (M,). Nearly equal modes divide theirs arbitrarily."""
-    rms: float
-    """rms of the part that the modes do not explain, over all axes [m/s²]."""
 
 
 def residual(recording: Recording, motion: MotionRows) -> Residual:
@@ -91,56 +77,6 @@ def _exponential(t: Floats, y: Floats) -> tuple[float, float]:
         x_scale=[1.0, 10.0],
     )
     return float(fit.x[0]), float(fit.x[1])
-
-
-def residual_by_modes(
-    recording: Recording,
-    motion: MotionRows,
-    f_d: Floats | list[float],
-    zeta: Floats | list[float],
-    *,
-    truth: bool = False,
-) -> ModalResidual:
-    """RV by linear least squares of α's three axes on e^(-σt)(cos ω_d t, sin ω_d t) of known modes.
-
-    It uses every sample from 12 ms after the stop on, and is not biased by noise. Use it to rank shapers, and
-    `residual` to compare with the paper. At the stop the modes add up to α = Re z, z = Σ (c - i s) in each axis; the
-    value is the largest |α| of the ellipse that z describes in one turn.
-
-    Args:
-        recording: The recording.
-        motion: One of its motions.
-        f_d: Damped frequency of each mode at the end pose [Hz], shape (M,).
-        zeta: Damping ratio of each mode [-], shape (M,).
-        truth: Whether to use the truth channel, which is free of noise.
-
-    Raises:
-        NotMeasurableError: The recording ends, or the next motion starts, within the window.
-    """
-    window = _window(recording, motion, WINDOW)
-    time = recording.time[window] - recording.time[motion.shaped_stop]
-    alpha = tool_acceleration(recording, truth=truth, rows=window)
-    late = time >= SETTLE - 1e-9
-    omega = 2.0 * np.pi * np.asarray(f_d, dtype=np.float64)
-    damping = np.asarray(zeta, dtype=np.float64)
-    sigma = omega * damping / np.sqrt(1.0 - damping**2)
-    decay = np.exp(-np.outer(time[late], sigma))
-    phase = np.outer(time[late], omega)
-    basis = np.hstack([decay * np.cos(phase), decay * np.sin(phase)])
-    weights, *_ = np.linalg.lstsq(basis, alpha[late])
-    unexplained = alpha[late] - basis @ weights
-    cosine, sine = weights[: len(omega)], weights[len(omega) :]
-    amplitudes = np.array([_major_axis(c, s) for c, s in zip(cosine, sine, strict=True)])
-    return ModalResidual(
-        value=_major_axis(cosine.sum(axis=0), sine.sum(axis=0)),
-        amplitudes=amplitudes,
-        rms=float(np.sqrt(np.mean(unexplained**2))),
-    )
-
-
-def _major_axis(cosine: Floats, sine: Floats) -> float:
-    """Largest norm of c cos φ + s sin φ over φ."""
-    return float(np.linalg.norm(np.column_stack([cosine, sine]), ord=2))
 
 
 def _window(recording: Recording, motion: MotionRows, length: float) -> slice:

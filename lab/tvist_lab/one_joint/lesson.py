@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 
 from tvist_controller.api.line import body, default_calibration, estimator_of, load_calibration, paper_payload
-from tvist_lab.metrics import motions, peak_after_stop
+from tvist_lab.metrics import RingDown, fit_ring_down, motions, peak_after_stop
 from tvist_lab.one_joint.closed_form import FlexibleShoulder
-from tvist_lab.one_joint.plucked import pluck
 from tvist_lab.recordings import Floats, Recording
 from tvist_lab.study.line import ControlLine, point_to_point
 from tvist_lab.study.shaping import Running, shape
-from tvist_plant.description import RobotDescription, load
+from tvist_plant.description import Payload, RobotDescription, load
+from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.plant import PERIOD
 from tvist_shaping import Estimator, Fixed, TvistFilter, shaper
 
 ROBOT = "one-joint"
@@ -37,6 +38,14 @@ WAYS = {
     "tvist_identified": "TVIST-ZV, f_d(q) as identified",
 }
 """Ways to make a motion: in JSON, and for people."""
+TORQUE = 2.0
+"""Torque that twists the shoulder before it is let go [N m]."""
+HELD = 1.0
+"""Time for which it acts: the arm rests again before it is let go [s]."""
+LISTENED = 1.0
+"""Time that is recorded after that [s]."""
+GRAVITY = (0.0, 0.0, 9.81)
+"""What the accelerometer of an arm with vertical axes feels at rest [m/s²]."""
 
 
 @dataclass(frozen=True)
@@ -191,3 +200,25 @@ def _estimator(description: RobotDescription, way: str) -> Estimator:
     name = default_calibration(description.robot.model)
     assert name is not None
     return estimator_of(load_calibration(name))
+
+
+def pluck(description: RobotDescription, payload: Payload, elbow: float, seed: int = 0) -> RingDown:
+    """Twist the shoulder, let it go, and fit a damped sine to what the accelerometer feels.
+
+    The fit knows nothing of the arm: neither masses nor spring.
+
+    Args:
+        description: An arm with a shoulder and an elbow, about vertical axes.
+        payload: What it carries.
+        elbow: Angle of the elbow [rad].
+        seed: Seed of sensor noise and gear errors.
+    """
+    plant = FlexibleArm(description, payload)
+    still = DriveCommand(np.array([0.0, elbow]), np.zeros(2), np.zeros(2))
+    plant.reset(still, seed=seed)
+    plant.push(np.array([TORQUE, 0.0]))
+    for _ in range(round(HELD / PERIOD)):
+        plant.step(still)
+    plant.push(np.zeros(2))
+    felt: Floats = np.array([plant.step(still).accelerometer for _ in range(round(LISTENED / PERIOD))])
+    return fit_ring_down(felt - GRAVITY, PERIOD)

@@ -59,8 +59,8 @@ def read_csv(path: Path, columns: str | None = None) -> Recording:
         columns: Names of its columns, as `named` reads them; None for RTDE's.
 
     Raises:
-        LogError: The file has no header of names, cells that are no numbers, decimal commas between commas, or no rows;
-            or see `named` and `recording_of`.
+        LogError: The file has no header of several names, cells that are no numbers, decimal commas between commas, or
+            no rows; or see `named` and `recording_of`.
         OSError: The file cannot be read.
     """
     lines = _lines(path)
@@ -137,6 +137,11 @@ def _header(path: Path, lines: list[bytes]) -> tuple[int, list[str], str]:
     names = [
         name.strip().strip('"') for name in (header.split() if separator == " " else header.split(separator))
     ]
+    if len(names) == 1:
+        raise LogError(
+            f"{path} is neither a recording nor a log: its line {top + 1} does not name columns, as in "
+            "timestamp,actual_q_0"
+        )
     if not any(re.match(r"[A-Za-z_]", name) for name in names):
         raise LogError(
             f"{path}, line {top + 1}: there must be a header with RTDE's names, as in timestamp,actual_q_0"

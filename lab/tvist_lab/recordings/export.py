@@ -11,9 +11,8 @@ import msgspec
 import numpy as np
 import polars as pl
 
-from tvist_lab.recordings.description import KEY, describe, ordered, sidecar
+from tvist_lab.recordings.description import KEY, describe, meaning_of, ordered, sidecar
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
-from tvist_lab.recordings.units import meaning_of
 from tvist_lab.whole_file import whole_file
 
 EXACT = 2.0**53

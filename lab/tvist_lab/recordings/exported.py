@@ -1,7 +1,6 @@
 """Recordings from Parquet, npz and mat: those of `tvist log export`, and others with columns of RTDE's names."""
 
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,55 +20,18 @@ class ExportedError(RecordingError):
     """A file is no recording that was exported; the message names it."""
 
 
-def read_parquet(path: str | os.PathLike[str]) -> Recording:
-    """Read a table in Parquet.
+def read_exported(path: Path) -> Recording:
+    """Read a table in Parquet, arrays that NumPy saved, or a MAT-file of version 4 to 7, by the ending of its name.
 
     Raises:
         RecordingError: The file cannot be read, or holds no recording.
     """
-    path = Path(path)
-    flat = _read(path, read_apart)
-    text = flat.pop(KEY, None)
-    if text is None:
-        return _log(path, flat)
-    description = _described(path, str(text))
-    columns = {}
-    rows = len(next(iter(flat.values()), ()))
-    for name, about in description.columns.items():
-        names = [name] if about.width is None else [f"{name}_{index}" for index in range(about.width)]
-        if missing := next((entry for entry in names if entry not in flat), None):
-            raise ExportedError(f"{path} has no column {missing}, which its description names")
-        parts = [flat[entry] for entry in names]
-        columns[name] = parts[0] if about.width is None else _joined(parts, rows)
-    return _recording(path, description, columns)
-
-
-def read_npz(path: str | os.PathLike[str]) -> Recording:
-    """Read arrays that NumPy saved.
-
-    Raises:
-        RecordingError: The file cannot be read, or holds no recording.
-    """
-    path = Path(path)
-    return _of_arrays(path, _read(path, unpacked))
-
-
-def read_mat(path: str | os.PathLike[str]) -> Recording:
-    """Read a MAT-file of version 4 to 7.
-
-    Raises:
-        RecordingError: The file cannot be read, or holds no recording.
-    """
-    path = Path(path)
-    return _of_arrays(path, _read(path, read_apart))
-
-
-READERS: dict[str, Callable[[Path], Recording]] = {
-    ".parquet": read_parquet,
-    ".npz": read_npz,
-    ".mat": read_mat,
-}
-"""Readers by the ending of a file's name."""
+    kind = path.suffix.lower()
+    try:
+        arrays = unpacked(path) if kind == ".npz" else read_apart(path)
+    except Exception as error:  # a damaged file can raise nearly anything
+        raise ExportedError(f"{path} cannot be read: {in_words(error)}") from error
+    return _of_table(path, arrays) if kind == ".parquet" else _of_arrays(path, arrays)
 
 
 def with_sidecar(recording: Recording, path: Path) -> Recording:
@@ -89,11 +51,21 @@ def with_sidecar(recording: Recording, path: Path) -> Recording:
     return replace(added, notes=(*added.notes, *recording.notes))
 
 
-def _read(path: Path, reader: Callable[[Path], Arrays]) -> Arrays:
-    try:
-        return reader(path)
-    except Exception as error:  # a damaged file can raise nearly anything
-        raise ExportedError(f"{path} cannot be read: {in_words(error)}") from error
+def _of_table(path: Path, flat: Arrays) -> Recording:
+    """Columns for each entry of a vector."""
+    text = flat.pop(KEY, None)
+    if text is None:
+        return _log(path, flat)
+    description = _described(path, str(text))
+    columns = {}
+    rows = len(next(iter(flat.values()), ()))
+    for name, about in description.columns.items():
+        names = [name] if about.width is None else [f"{name}_{index}" for index in range(about.width)]
+        if missing := next((entry for entry in names if entry not in flat), None):
+            raise ExportedError(f"{path} has no column {missing}, which its description names")
+        parts = [flat[entry] for entry in names]
+        columns[name] = parts[0] if about.width is None else _joined(parts, rows)
+    return _recording(path, description, columns)
 
 
 def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> Recording:

@@ -1,6 +1,6 @@
-"""Recorded messages of one kind as columns, decoded in blocks: no object is made for each message."""
+"""Messages of one kind as columns; recorded ones are decoded in blocks: no object is made for each message."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from types import UnionType
 from typing import Any, get_args, get_origin
@@ -131,8 +131,12 @@ class JsonColumns:
         return block
 
     def _one_by_one(self, messages: Sequence[bytes]) -> Block:
-        read = [self._reader.read(message) for message in messages]
-        return {name: _cells_of_values([getattr(message, name) for message in read]) for name in self._fields}
+        return block_of([self._reader.read(message) for message in messages], self._fields)
+
+
+def block_of(messages: Sequence[Any], names: Iterable[str]) -> Block:
+    """Return the fields of some names of messages, or of other objects that have them as attributes."""
+    return {name: _cells_of_values([getattr(message, name) for message in messages]) for name in names}
 
 
 def _type(annotation: Any) -> pl.DataType | type[pl.DataType] | None:
@@ -180,7 +184,7 @@ def _cells_of_values(values: list[Any]) -> Cells:
     null = np.array([value is None for value in values])
     if null.all():
         return Cells(None, null)
-    if not any(isinstance(value, list) for value in values):
+    if not any(isinstance(value, list | tuple | np.ndarray) for value in values):
         return Cells(np.array([np.nan if value is None else value for value in values], np.float64), null)
     column = np.full((len(values), max(len(value) for value in values if value is not None)), np.nan)
     for row, value in zip(column, values, strict=True):

@@ -11,10 +11,9 @@ from typing import IO, Any, TypeVar
 from mcap.records import Channel, McapRecord, Message, Metadata
 
 from tvist_lab.recordings.json_columns import Block, JsonColumns
-from tvist_lab.recordings.mcap_records import CUT, DAMAGE, MAGIC
+from tvist_lab.recordings.mcap_records import CUT, DAMAGE, MAGIC, TOPIC, opened, ring_records
 from tvist_lab.recordings.recorded_columns import recording_of_blocks
 from tvist_lab.recordings.recording import Recording, RecordingError
-from tvist_lab.recordings.ring_records import TOPIC, opened, ring_records
 from tvist_protocol.channels import tag
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError

@@ -53,9 +53,9 @@ def _read(path: Path, names: str | None) -> Recording:
     if head.startswith(MCAP):
         return _read_mcap(path)
     if path.suffix.lower() in (".parquet", ".npz", ".mat"):
-        from tvist_lab.recordings import exported
+        from tvist_lab.recordings.exported import read_exported
 
-        return exported.READERS[path.suffix.lower()](path)
+        return read_exported(path)
     if b"\0" in head:
         from tvist_lab.recordings.realtime_dump import read_dump
 

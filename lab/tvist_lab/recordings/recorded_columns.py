@@ -1,18 +1,46 @@
-"""Columns of a recording from decoded messages, equal to those that `Recording.from_states` makes."""
+"""Columns of a recording from messages, decoded in blocks or one by one."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tvist_lab.recordings.json_columns import Block, Cells
-from tvist_lab.recordings.recording import STATE_COLUMNS, TRUTH_PREFIX, Floats, Recording
+from tvist_lab.recordings.json_columns import Block, Cells, block_of
+from tvist_lab.recordings.recording import STATE_COLUMNS, TRUTH_PREFIX, Floats, Recording, RecordingError
 
 REGISTERS = "_register"
 """End of the names of banks of registers."""
 UNSHAPED = "unshaped_"
 """Prefix of columns that have the target's values where they are null."""
+
+
+def recording_of_messages(
+    states: Sequence[Any], events: Iterable[Any] = (), truths: Sequence[Any] = (), info: Any = None
+) -> Recording:
+    """Make a recording of messages, in any order; see `recording_of_blocks`.
+
+    A tick without truth has NaN in the truth columns.
+
+    Args:
+        states: Objects with the fields of `STATE_COLUMNS` as attributes.
+        events: Objects with the attribute `tick`.
+        truths: Objects with `tick` and other fields as attributes; each field becomes a column `truth_<field>`.
+        info: Stored unchanged.
+
+    Raises:
+        RecordingError: There is no state.
+    """
+    if not states:
+        raise RecordingError("a recording needs at least one state")
+    true = block_of(truths, _numeric(truths[0])) if truths else None
+    return recording_of_blocks(block_of(states, STATE_COLUMNS), true, None, events, info)
+
+
+def _numeric(message: Any) -> list[str]:
+    """Names of a message's fields that are no text, from a msgspec struct or a plain object."""
+    names = getattr(message, "__struct_fields__", None) or vars(message)
+    return [name for name in names if not isinstance(getattr(message, name), str)]
 
 
 def recording_of_blocks(

@@ -1,6 +1,6 @@
 """Recordings in memory: a robot's messages as one array per column, ready for metrics."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -98,41 +98,6 @@ class Recording:
             raise RecordingError("tick must increase from row to row")
         object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
 
-    @classmethod
-    def from_states(
-        cls,
-        states: Iterable[Any],
-        events: Iterable[Any] = (),
-        truths: Iterable[Any] = (),
-        info: Any = None,
-    ) -> "Recording":
-        """Convert messages to columns.
-
-        A repeated state (a robot in lockstep repeats its last one) counts once. A tick without truth has NaN in the
-        truth columns.
-
-        Args:
-            states: Objects with the fields of `STATE_COLUMNS` as attributes, in any order.
-            events: Objects with the attribute `tick`.
-            truths: Objects with `tick` and other fields as attributes; each field becomes a column `truth_<field>`.
-            info: Stored unchanged.
-
-        Raises:
-            RecordingError: There is no state.
-        """
-        by_tick = {int(state.tick): state for state in states}
-        if not by_tick:
-            raise RecordingError("a recording needs at least one state")
-        ticks = sorted(by_tick)
-        rows = [by_tick[tick] for tick in ticks]
-        columns = {name: _column([_value(row, name) for row in rows]) for name in STATE_COLUMNS}
-        true_by_tick = {int(truth.tick): truth for truth in truths}
-        if true_by_tick:
-            for name in _fields(next(iter(true_by_tick.values()))):
-                values = [getattr(true_by_tick.get(tick), name, None) for tick in ticks]
-                columns[TRUTH_PREFIX + name] = _column(values)
-        return cls(columns, tuple(sorted(events, key=lambda event: int(event.tick))), info)
-
     def __len__(self) -> int:
         return len(self.columns["tick"])
 
@@ -208,37 +173,3 @@ class Recording:
     def index(self, tick: int) -> int:
         """Index of the first row at or after a tick; the length of the recording if there is none."""
         return int(np.searchsorted(self["tick"], tick))
-
-
-def _fields(message: Any) -> list[str]:
-    """Names of a message's numeric fields except its time, from a msgspec struct or a plain object."""
-    names = getattr(message, "__struct_fields__", None)
-    names = list(vars(message)) if names is None else list(names)
-    return [
-        name
-        for name in names
-        if name not in ("tick", "timestamp") and not isinstance(getattr(message, name), str)
-    ]
-
-
-def _value(state: Any, name: str) -> Any:
-    """Value of a state's field; before shaping, null stands for the target's."""
-    value = getattr(state, name)
-    return getattr(state, name.replace("unshaped", "target")) if value is None else value
-
-
-def _column(values: list[Any]) -> Floats:
-    """Convert numbers or lists of numbers, one per row; null and missing entries become NaN."""
-    width = max(
-        (len(value) for value in values if isinstance(value, (list, tuple, np.ndarray))), default=None
-    )
-    if width is None:
-        return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
-    lengths = {-1 if value is None else len(value) for value in values}
-    if lengths == {width}:
-        return np.array(values, dtype=np.float64).reshape(len(values), width)
-    column = np.full((len(values), width), np.nan)
-    for row, value in zip(column, values, strict=True):
-        if value is not None:
-            row[: len(value)] = value
-    return column

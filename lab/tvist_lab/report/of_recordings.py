@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tvist_lab.figures.compared import compared_figure
+from tvist_lab.figures.after_stop import compared_figure
 from tvist_lab.figures.ring_down import ring_down_figure
 from tvist_lab.figures.style import literal
 from tvist_lab.metrics import (

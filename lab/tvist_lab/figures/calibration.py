@@ -1,4 +1,6 @@
-"""Maps of the first mode over the workspace, as it is identified and as it is."""
+"""Calibrations compared with the truth: at the configurations that were measured, and over the workspace."""
+
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -6,9 +8,22 @@ from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-from tvist_lab.figures.style import INK, explain, note, panels, title
+from tvist_controller.api.line import estimator_of
+from tvist_lab.figures.style import (
+    FAINT,
+    INK,
+    OF_SHAPED,
+    OF_UNSHAPED,
+    color_bar,
+    explain,
+    legend,
+    panels,
+    remark,
+    title,
+)
 from tvist_lab.recordings import Floats
 from tvist_lab.studies.workspace_map import WorkspaceMap
+from tvist_protocol.calibration import Calibration
 
 LABELS = {
     "f_d_hz": ("$f_d$", "damped frequency of the lowest mode", "Hz"),
@@ -18,6 +33,42 @@ LABELS = {
 """Key of a map to its symbol, its meaning and its unit."""
 LEVELS = 9
 """Largest number of levels of a map."""
+
+
+def identified_figure(
+    calibration: Calibration,
+    q: Floats,
+    f_d: Floats,
+    zeta: Floats,
+    true_f_d: Floats | None,
+    true_zeta: Floats | None,
+) -> Figure:
+    """Estimated against measured (f_d, ζ), one point per configuration, and against the truth if it is known.
+
+    Args:
+        calibration: Calibration with polynomials.
+        q: Configurations, shape (N, n) [rad].
+        f_d: Measured damped frequencies, shape (N,) [Hz].
+        zeta: Measured damping ratios, shape (N,) [-].
+        true_f_d: Damped frequency of the lowest true mode, shape (N,) [Hz].
+        true_zeta: Damping ratio of the lowest true mode, shape (N,) [-].
+    """
+    estimator = estimator_of(calibration)
+    estimated = np.array([np.concatenate(estimator.estimate(row)) for row in q]).T
+    figure, axes = panels(2, 7.6, share_x=False)
+    for panel, estimate, measured, true, name in (
+        (axes[0], estimated[0], f_d, true_f_d, "$f_d$ (Hz)"),
+        (axes[1], estimated[1], zeta, true_zeta, r"$\zeta$ (–)"),
+    ):
+        ends = [float(np.min(measured)), float(np.max(measured))]
+        panel.plot(ends, ends, color=FAINT, linewidth=1.0, label="Equal")
+        if true is not None:
+            panel.plot(true, estimate, **OF_UNSHAPED.points(2.5, label="Against the true lowest mode"))
+        panel.plot(measured, estimate, **OF_SHAPED.points(2.5, label="Against the ring-down"))
+        panel.set(xlabel=f"Measured or true {name}", ylabel=f"Calibration's {name}")
+    title(axes[0], f"{calibration.name}: {len(q)} configurations")
+    legend(figure, axes[0], {"$f_d$": "damped frequency", r"$\zeta$": "damping ratio"})
+    return figure
 
 
 def workspace_map_figure(found: WorkspaceMap, key: str, words: str, columns: int = 2) -> Figure:
@@ -44,10 +95,11 @@ def workspace_map_figure(found: WorkspaceMap, key: str, words: str, columns: int
     for panel, values, heading in zip(axes, both, ("Identified", "True"), strict=False):
         drawn = _map(panel, found, values, levels)
         title(panel, heading)
-    _bar(figure, drawn, list(axes[:2]), f"{symbol} ({unit})")
+    bar: dict[str, Any] = {"pad": 0.02, "aspect": 25.0, "format": lambda value, _: _short(value)}
+    color_bar(figure, drawn, axes[:2], f"{symbol} ({unit})", **bar)
     drawn = _map(axes[2], found, error, _levels(0.0, float(np.nanmax(error))))
     title(axes[2], "Size of the error")
-    _bar(figure, drawn, [axes[2]], "Error (%)")
+    color_bar(figure, drawn, axes[2:], "Error (%)", **bar)
     rows, across = (name.replace("_", " ").capitalize() for name in found.names)
     for panel in axes if columns == 2 else axes[-1:]:
         panel.set_xlabel(f"{across} (°)")
@@ -70,7 +122,7 @@ def _map(panel: Axes, found: WorkspaceMap, values: Floats, levels: Floats) -> Qu
     for axis in (panel.xaxis, panel.yaxis):
         axis.set_major_locator(MultipleLocator(60.0))
     if np.isnan(values).all():
-        note(panel, "no free configuration", (0.5, 0.5), xycoords="axes fraction", ha="center")
+        remark(panel, "no free configuration", (0.5, 0.5), ha="center")
     return drawn
 
 
@@ -81,9 +133,3 @@ def _levels(low: float, high: float) -> Floats:
 
 def _short(value: float) -> str:
     return f"{value:.3g}"
-
-
-def _bar(figure: Figure, drawn: QuadContourSet, axes: list[Axes], words: str) -> None:
-    bar = figure.colorbar(drawn, ax=axes, pad=0.02, aspect=25.0, format=lambda value, _: _short(value))
-    bar.set_label(words, fontsize=9, color=INK)
-    bar.ax.tick_params(labelsize=8, colors=INK)

@@ -1,0 +1,194 @@
+"""What shapers leave of the vibration where the frequency is another one than theirs, and what it costs in time."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import tvist_shaping
+from tvist_lab.figures.style import (
+    FAINT,
+    INK,
+    OF_SHAPED,
+    OF_UNSHAPED,
+    SERIES,
+    dashed,
+    legend,
+    legend_beside,
+    name_over,
+    note,
+    panels,
+    tint,
+    title,
+)
+from tvist_lab.frequency_error import ALLOWED, residual_over_error, settling_time
+from tvist_lab.recordings import Floats
+from tvist_shaping import Shaper, residual
+
+DESIGN = 10.5
+"""Middle of the frequency range over the workspace [Hz]."""
+SPAN = (6.0, 15.0)
+"""Range of the first mode's damped frequency over the UR5e's workspace with 5 kg [Hz]."""
+SHOWN_HZ = (5.5, 16.0)
+"""Frequencies on the axis of figure 4 [Hz]."""
+ERRORS = (0.0, 0.1, 0.2)
+"""Errors of the frequency for which settling is drawn [-]."""
+FAMILIES = {
+    "Zero vibration": ("zv", "mzv", "zvd", "zvdd", "zvddd"),
+    "Extra-insensitive": ("ei", "ei_exact", "si", "ei2", "ei2_exact", "ei3", "ei3_exact"),
+    "Negative impulses: short, but beyond the reference's limits": ("um_zv", "um_zvd"),
+}
+"""Panels and their shapers; those in none of them share a panel at the end."""
+SHOWN_SHARE = (0.4, 1.7)
+"""Range of the axis: true divided by assumed frequency [-]."""
+HIGHEST = 25.0
+"""Largest residual vibration on the axis [%]."""
+WIDEST = 1.6
+"""Largest width that is drawn; unlimited bands are drawn here [-]."""
+
+
+def figure_4() -> Figure:
+    """Residual vibration of ZV, ZVD and EI, undamped, over the true frequency."""
+    shapers = {"ZV": tvist_shaping.zv, "ZVD": tvist_shaping.zvd, "EI 5 %": tvist_shaping.ei}
+    figure, (panel,) = panels(1, 3.4)
+    f = np.linspace(*SHOWN_HZ, 1051)
+    worst = np.inf
+    panel.axvspan(*SPAN, color=tint(FAINT, 0.15), linewidth=0.0, label="First mode over the workspace")
+    for (name, function), style in zip(shapers.items(), SERIES, strict=False):
+        impulses = function(DESIGN, 0.0)
+        panel.plot(f, 100.0 * residual(f, 0.0, impulses), **style.line(1.6, label=name))
+        worst = min(worst, 100.0 * float(np.max(residual(np.array(SPAN), 0.0, impulses))))
+    dashed(panel, worst)
+    # Every curve is near zero in the middle, where the shapers are designed.
+    note(panel, f"{worst:.1f} %", (DESIGN, worst), (0, 4), ha="center")
+    title(panel, f"{SPAN[0]:g} to {SPAN[1]:g} Hz: at least {worst:.1f} % remains")
+    panel.set(xlim=SHOWN_HZ, ylim=(0.0, 72.0), xlabel="Frequency (Hz)", ylabel="Residual vibration (%)")
+    legend(figure, panel)
+    return figure
+
+
+def sensitivity_figure(shapers: Sequence[Shaper], zeta: float, errors: Floats) -> Figure:
+    """Draw the residual vibration of shapers over the error of the frequency.
+
+    Args:
+        shapers: The shapers.
+        zeta: Damping ratio, both assumed and true [-].
+        errors: Shares by which the assumed frequency is too high [-], shape (E,).
+    """
+    figure, (panel,) = panels(1, 3.6)
+    dashed(panel, 100.0 * ALLOWED, label=f"{100.0 * ALLOWED:g} %")
+    for place, shaper in enumerate(shapers):
+        left = 100.0 * residual_over_error(shaper, zeta, errors)
+        panel.plot(100.0 * errors, left, **SERIES[place % len(SERIES)].line(label=shaper.name))
+    panel.set(
+        xlim=(100.0 * errors[0], 100.0 * errors[-1]),
+        xlabel="Error of the assumed frequency (%)",
+        ylabel="Residual vibration (%)",
+    )
+    panel.set_ylim(bottom=0.0)
+    title(panel, f"Mode with a damping ratio of {zeta:g}")
+    legend(figure, panel)
+    return figure
+
+
+def settling_against_delay_figure(shapers: Iterable[Shaper], f_d: float, zeta: float) -> Figure:
+    """Draw how soon a mode settles with each shaper against the shaper's delay, for errors of the frequency.
+
+    Args:
+        shapers: The shapers; those that do not support this damping are left out.
+        f_d: True damped frequency [Hz].
+        zeta: Damping ratio, both assumed and true [-].
+    """
+    shown = [shaper for shaper in shapers if zeta < shaper.zeta_max]
+    delay = np.array([1e3 * shaper.impulses(f_d, zeta).duration for shaper in shown])
+    times = np.array([[1e3 * settling_time(one, f_d, zeta, error) for one in shown] for error in ERRORS])
+    known = times[np.isfinite(times)]
+    top = 1.15 * float(known.max()) if known.size else 1.0
+    figure, (panel,) = panels(1, 4.2)
+    panel.plot(
+        [0.0, top], [0.0, top], color=FAINT, linewidth=0.9, zorder=1, label="Settled when the reference stops"
+    )
+    for error, row, style in zip(ERRORS, times, SERIES, strict=False):
+        ends = np.where(np.isfinite(row), row, top)
+        panel.plot(delay, ends, **style.points(4.5, label=f"Frequency wrong by {100.0 * error:g} %"))
+    if not np.isfinite(times).all():
+        title(panel, "At the top: never, since nothing decays without damping")
+    name_over(panel, delay, np.where(np.isfinite(times), times, top).max(axis=0), [one.name for one in shown])
+    panel.set(
+        xlabel="Delay of the shaper (ms)",
+        ylabel="Settled after the unshaped stop (ms)",
+        ylim=(0.0, 1.75 * top),
+        xlim=(-0.04 * float(delay.max()), 1.06 * float(delay.max())),
+    )
+    legend(
+        figure,
+        panel,
+        {
+            "Settled": f"at {100.0 * ALLOWED:g} % of the unshaped vibration of a mode of {f_d:g} Hz, ζ = {zeta:g}"
+        },
+    )
+    return figure
+
+
+def catalogue_figure(shapers: Iterable[Shaper], zeta: float = 0.0) -> Figure:
+    """Residual vibration of each shaper against the true frequency, and the width of its band against its duration.
+
+    Args:
+        shapers: The shapers; those that do not support this damping, or do not shape, are left out.
+        zeta: Damping ratio, assumed and true [-].
+    """
+    shown = {shaper.name: shaper for shaper in shapers if zeta < shaper.zeta_max and shaper.duration_periods}
+    placed = {name for names in FAMILIES.values() for name in names}
+    families = FAMILIES | {"Others": tuple(name for name in shown if name not in placed)}
+    groups = {
+        words: group
+        for words, names in families.items()
+        if (group := [shown[name] for name in names if name in shown])
+    }
+    figure, axes = panels(len(groups) + 1, 1.0 + 2.1 * (len(groups) + 1), share_x=False)
+    for panel, (words, group) in zip(axes, groups.items(), strict=False):
+        title(panel, words)
+        _curves(panel, group, zeta)
+    axes[len(groups) - 1].set_xlabel("True over assumed frequency (–)")
+    title(axes[-1], "What insensitivity costs")
+    _price(axes[-1], list(shown.values()), zeta)
+    legend(figure, axes[-1])
+    return figure
+
+
+def _curves(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
+    f = np.linspace(*SHOWN_SHARE, 1301)
+    for place, shaper in enumerate(shapers):
+        left = 100.0 * residual(f, zeta, shaper.function(1.0, zeta))
+        panel.plot(f, left, **SERIES[place % len(SERIES)].line(label=shaper.name))
+    dashed(panel, 100.0 * ALLOWED)
+    panel.set(xlim=SHOWN_SHARE, ylim=(0.0, HIGHEST), ylabel="Residual vibration (%)")
+    legend_beside(panel, INK)
+
+
+def _price(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
+    points: dict[tuple[float, float], list[Shaper]] = {}
+    for shaper in shapers:
+        low, high = shaper.band(ALLOWED * (1.0 + 1e-4), zeta)  # count a hump of exactly 5 % as inside
+        width = min(high - low, WIDEST)
+        duration = shaper.function(1.0, zeta).duration
+        points.setdefault((round(duration, 2), round(width, 2)), []).append(shaper)
+    for place, group in sorted(points.items()):
+        style = OF_SHAPED if group[0].peak == 1.0 else OF_UNSHAPED
+        panel.plot(*place, **style.points(4.5))
+        words = ", ".join(shaper.name for shaper in group)
+        above, below = group[0].peak > 1.0, place[0] > 1.7
+        raised = 4 if words.endswith("_exact") and len(group) == 1 else 0
+        note(
+            panel,
+            words,
+            place,
+            (4, 4) if above else (4, -4) if below else (6, raised),
+            ha="right" if above or below else "left",
+            va="bottom" if above else "top" if below else "center",
+        )
+    panel.set(xlim=(0.0, 2.1), xlabel="Duration (damped periods)", ylabel="Width of the 5 % band (–)")
+    panel.margins(y=0.12)
+    panel.plot([], [], **OF_SHAPED.points(4.5, label="Keeps the reference's limits"))
+    panel.plot([], [], **OF_UNSHAPED.points(4.5, label="Exceeds them"))
