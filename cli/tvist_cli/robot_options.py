@@ -11,7 +11,8 @@ from msgspec.structs import FieldInfo, fields
 from tvist_cli.failure import Failure, told
 from tvist_cli.misuse import lower
 from tvist_protocol.schema import field_docs
-from tvist_server.config import ConfigError, ServeConfig, from_mapping, read_toml
+from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config_file import from_mapping, read_toml
 
 Command = TypeVar("Command", bound=Callable[..., object])
 _IN_ANY_CASE = ("profile", "shaper", "clock")

@@ -19,7 +19,7 @@ import sys
 import threading
 from typing import Any
 
-from tvist_server.config import from_mapping
+from tvist_server.config_file import from_mapping
 from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError
 from tvist_server.robot import ServedRobot

@@ -308,7 +308,8 @@ def _read_moves(path):
 
 def _read_config(path):
     from tvist_plant.user_file import UserFileError
-    from tvist_server.config import ConfigError, from_mapping, read_toml
+    from tvist_server.config import ConfigError
+    from tvist_server.config_file import from_mapping, read_toml
 
     return lambda path: from_mapping(read_toml(str(path)), f"configuration {path}"), (
         ConfigError,

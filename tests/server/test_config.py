@@ -12,7 +12,8 @@ from tvist_controller import calibrations
 from tvist_controller.setup import Setup, paper_payload
 from tvist_plant.user_file import UserFileError
 from tvist_protocol.calibration import calibration_to_json
-from tvist_server.config import ConfigError, ServeConfig, from_mapping, read_toml
+from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config_file import from_mapping, read_toml
 
 
 def config(**values) -> ServeConfig:

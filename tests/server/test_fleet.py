@@ -4,7 +4,8 @@ import importlib.resources
 
 import pytest
 
-from tvist_server.config import ConfigError, from_mapping
+from tvist_server.config import ConfigError
+from tvist_server.config_file import from_mapping
 from tvist_server.fleet import MOST, members, recording_of
 
 

@@ -22,7 +22,8 @@ from tvist_protocol.recorded import topics
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.values import Frequency
-from tvist_server.config import ConfigError, from_mapping, read_toml
+from tvist_server.config import ConfigError
+from tvist_server.config_file import from_mapping, read_toml
 from tvist_server.recording.writer import RecordingWriter, heading
 from tvist_shaping import FirShaper, Impulses, Shaper, zv
 from tvist_shaping.own import TRIED_F_D

@@ -13,7 +13,8 @@ from tvist_plant.user_file import UserFileError
 from tvist_protocol.codec import decode_info
 from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad, ProgramStop
 from tvist_protocol.replies import Done, Refused
-from tvist_server.config import ConfigError, from_mapping
+from tvist_server.config import ConfigError
+from tvist_server.config_file import from_mapping
 from tvist_server.polyscope import EXTERNAL_CONTROL, program, with_external_control
 from tvist_server.program_folder import ProgramFolder
 

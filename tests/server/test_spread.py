@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_server.config import ConfigError, from_mapping
+from tvist_server.config import ConfigError
+from tvist_server.config_file import from_mapping
 from tvist_server.gateways.access import open_access, with_robots_behind
 from tvist_server.spread import check_together, shares
 

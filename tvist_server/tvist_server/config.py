@@ -2,7 +2,6 @@
 
 import dataclasses
 import ipaddress
-import tomllib
 from pathlib import Path
 from typing import Annotated, TypeVar
 
@@ -15,8 +14,6 @@ from tvist_controller.setup import Setup, check_rating, paper_payload
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
 from tvist_protocol.calibration import Calibration
-from tvist_protocol.content import checked
-from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import Namespace, RobotName, Seed
 from tvist_server.allowed_hosts import AllowedHosts
@@ -31,11 +28,6 @@ from tvist_server.ur_ports import InterfaceName, UrPorts
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_NAME = "ur5e"
 T = TypeVar("T")
-_INSTEAD = {
-    "name": "leave name out, since several robots are named after their files",
-    "robot": "add it to the list of robots",
-}
-"""What to do with a key that excludes `robots`."""
 
 
 class ConfigError(ValueError):
@@ -353,34 +345,3 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 def _either(given: T | None, default: T) -> T:
     """Return what is given, or else the default."""
     return default if given is None else given
-
-
-def from_mapping(content: object, source: str) -> ServeConfig:
-    """Check a mapping of values and convert it.
-
-    Raises:
-        ConfigError: A key is unknown, a value is out of range, or one key excludes another.
-    """
-    if isinstance(content, dict) and content.get("robots") is not None:
-        for key in ("name", "robot"):
-            if content.get(key) is not None:
-                raise ConfigError(f"{source}: robots and {key} exclude each other: {_INSTEAD[key]}")
-    try:
-        return checked(content, ServeConfig)
-    except ProtocolError as error:
-        raise ConfigError(f"{source}: {error.why}") from error
-
-
-def read_toml(path: str) -> dict[str, object]:
-    """Return the unchecked content of a configuration file.
-
-    Raises:
-        ConfigError: The file cannot be read, or is not TOML.
-        UserFileError: The file is not text, too large or nested too deeply.
-    """
-    try:
-        return user_file.read_toml(path, "configuration")
-    except OSError as error:
-        raise ConfigError(f"configuration {path}: {error.strerror}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"configuration {path}: it is not valid TOML: {error}") from error

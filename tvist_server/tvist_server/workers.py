@@ -20,13 +20,14 @@ from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.planner import Planner
 from tvist_controller.setup import Setup
+from tvist_server.assembly import protected
 from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.ending import Ending
 from tvist_server.gateways.access import with_robots_behind
 from tvist_server.gateways.endpoints import protocol
 from tvist_server.gateways.starting import Prepare
 from tvist_server.own_folder import OwnFolder
-from tvist_server.server import Recording, protected
+from tvist_server.server import Recording
 from tvist_server.spread import LOCAL, Share, check_together, shares
 from tvist_server.ur_ports import InterfaceName
 from tvist_server.worker import END, Ended, First, Made, News, Ready, Refused, meet_clients, work

@@ -130,7 +130,8 @@ class _Place:
     ) -> None:
         from tvist_controller.setup import check_rating
         from tvist_lab.in_process import free_setup
-        from tvist_server.config import ConfigError, from_mapping
+        from tvist_server.config import ConfigError
+        from tvist_server.config_file import from_mapping
 
         self.endpoint, self.robot, self.mass, self.seed = endpoint, robot, mass, seed
         self.security, self.namespace = security, namespace

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from tvist_server.config import ConfigError, ServeConfig, from_mapping
+from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config_file import from_mapping
 from tvist_server.gateways.exposure import ExposureError, guarded_interfaces
 from tvist_server.ur_ports import WITHOUT_JOINTS, UrPorts
 

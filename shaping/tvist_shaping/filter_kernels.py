@@ -1,0 +1,144 @@
+"""What the TVIST filter computes in a tick, compiled."""
+
+import numpy as np
+import numpy.typing as npt
+
+from tvist_shaping._compiled import compiled
+from tvist_shaping._types import Floats
+from tvist_shaping.delay_line import gather
+from tvist_shaping.estimators.polynomial import evaluate
+from tvist_shaping.impulses import F_D_RANGE, decay
+
+Integers = npt.NDArray[np.int64]
+LOWEST, HIGHEST = F_D_RANGE
+
+
+@compiled
+def eased(
+    f_d: Floats, zeta: Floats, ease: float, quickest: tuple[float, float], period: float, state: Floats
+) -> None:
+    """Advance a critically damped low-pass of second order by one tick; its rates of change are limited.
+
+    Args:
+        f_d: Damped frequencies [Hz], shape (modes,).
+        zeta: Damping ratios [-], shape (modes,).
+        ease: Its natural frequency [1/s].
+        quickest: See `QUICKEST`.
+        period: Tick [s].
+        state: Damped frequencies and damping ratios that follow them, and their rates of change, shape (4, modes);
+            changed.
+    """
+    for k in range(f_d.shape[0]):
+        for row in range(2):
+            goal = f_d[k] if row == 0 else zeta[k]
+            most = 2.0 / ease * (quickest[0] * state[0, k] if row == 0 else quickest[1])
+            apart = min(max(goal - state[row, k], -most), most)
+            state[2 + row, k] += period * ease * (ease * apart - 2.0 * state[2 + row, k])
+            state[row, k] += period * state[2 + row, k]
+
+
+@compiled
+def shape(
+    f_d: Floats,
+    zeta: Floats,
+    zeta_max: float,
+    longest: float,
+    period: float,
+    train: Floats,
+    impulses: Floats,
+    ring: Floats,
+    head: int,
+    scratch: Floats,
+    out: Floats,
+) -> bool:
+    """Compute the impulses of a mode, and apply them to a delay line.
+
+    Args:
+        f_d: Damped frequency [Hz], shape (1,).
+        zeta: Damping ratio [-], shape (1,).
+        zeta_max: Exclusive upper limit of ζ [-].
+        longest: Longest delay [s].
+        period: Tick [s].
+        train: Amplitudes without damping [-] and times in damped periods [-], shape (2, N).
+        impulses: Result: amplitudes [-], times [s] and times in ticks, shape (3, N).
+        ring: `DelayLine.ring`.
+        head: `DelayLine.head`.
+        scratch: `DelayLine.scratch`.
+        out: Result: the shaped sample, shape (joints,).
+
+    Returns:
+        Whether the mode is in range and the delays are short enough; otherwise `out` is not changed.
+    """
+    f, z = f_d[0], zeta[0]
+    if not (LOWEST <= f <= HIGHEST and 0.0 <= z < zeta_max):
+        return False
+    A, tau, delays = impulses[0], impulses[1], impulses[2]
+    decay(train[0], train[1], f, z, A, tau)
+    for j in range(delays.shape[0]):
+        delays[j] = tau[j] / period
+    return tau[-1] <= longest and gather(ring, head, A, delays, scratch, out) < 0
+
+
+@compiled
+def shape_all(
+    samples: Floats,
+    joints: Integers,
+    trigonometric: bool,
+    centre: Floats,
+    scale: Floats,
+    multiples: Integers,
+    coefficients: Floats,
+    ranges: Floats,
+    zeta_max: float,
+    longest: float,
+    period: float,
+    train: Floats,
+    impulses: Floats,
+    ring: Floats,
+    head: int,
+    scratch: Floats,
+    q_star: Floats,
+    modes: Floats,
+    out: Floats,
+) -> tuple[int, bool]:
+    """Shape many samples with the paper's estimator, one by one.
+
+    Args:
+        samples: References, shape (T, joints) [rad].
+        joints: See `evaluate` of the estimator, as for the next six.
+        trigonometric: Likewise.
+        centre: Likewise.
+        scale: Likewise.
+        multiples: Likewise.
+        coefficients: Likewise.
+        ranges: Likewise.
+        zeta_max: See `shape`, as for the next seven.
+        longest: Likewise.
+        period: Likewise.
+        train: Likewise.
+        impulses: Likewise.
+        ring: Likewise.
+        head: Likewise.
+        scratch: Likewise.
+        q_star: Last shaped sample; changed, shape (joints,) [rad].
+        modes: Result: the last modes, shape (2, 1).
+        out: Result: shaped samples, shape (T, joints) [rad].
+
+    Returns:
+        Number of samples shaped before the first mode out of range, and whether the last estimate was clamped.
+    """
+    clamped = False
+    for i in range(samples.shape[0]):
+        head = head + 1 if head + 1 < ring.shape[0] else 0
+        for j in range(samples.shape[1]):
+            ring[head, j] = samples[i, j]
+        clamped = evaluate(
+            q_star, joints, trigonometric, centre, scale, multiples, coefficients, ranges, modes
+        )
+        if not shape(
+            modes[0], modes[1], zeta_max, longest, period, train, impulses, ring, head, scratch, q_star
+        ):
+            return i, clamped
+        for j in range(samples.shape[1]):
+            out[i, j] = q_star[j]
+    return samples.shape[0], clamped

@@ -1,0 +1,120 @@
+"""The parts of a server: robots, their interfaces, and what drives them."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from tvist_controller.controller import Controller
+from tvist_controller.setup import Setup
+from tvist_controller.sink import Sink
+from tvist_plant.plant import PERIOD
+from tvist_server.clock import Clock, Lockstep, Realtime
+from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.courier import Courier
+from tvist_server.fleet import recording_of
+from tvist_server.gateways.exposure import ExposureError, check_endpoints, guarded, guarded_interfaces
+from tvist_server.gateways.ur.interfaces import UrInterfaces
+from tvist_server.robot import ServedRobot
+
+
+def made_robot(
+    setup: Setup, config: ServeConfig, observe: Callable[[Controller], Sink] | None, *, several: bool
+) -> ServedRobot:
+    """Return a robot that is about to be served; see `Server`.
+
+    Raises:
+        ConfigError: It cannot be.
+    """
+    path = None
+    if config.record is not None:
+        path = recording_of(config.record, setup.name) if several else Path(config.record)
+    programs, dump, keep = config.program_folder(setup.name), config.dump_folder(), config.keep_ticks()
+    try:
+        return ServedRobot(setup, path, dump, observe, programs, config.allowed_hosts(), keep)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+
+
+def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
+    """Return the endpoints to listen on, and the settings that protect them.
+
+    Args:
+        config: Configuration.
+        names: Names of the robots that are reached there.
+
+    Raises:
+        ConfigError: An endpoint is none, or other machines could reach an unprotected one.
+    """
+    try:
+        check_endpoints("connect", config.connect)
+        # A router checks the certificates of those who reach the robot through it.
+        return guarded(
+            config.endpoints,
+            names,
+            security=None if config.connect else config.security,
+            insecure=config.insecure,
+            namespace=config.namespace or "",
+        )
+    except ExposureError as error:
+        raise ConfigError(str(error)) from error
+
+
+def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> UrInterfaces:
+    """Return UR's interfaces of a robot, whose number gives their address.
+
+    Raises:
+        ConfigError: Other machines could reach them unprotected, or they cannot be there.
+    """
+    address, ports = config.interfaces(number)
+    try:
+        guarded_interfaces(address, insecure=config.insecure)
+    except ExposureError as error:
+        raise ConfigError(str(error)) from error
+    setup, lockstep = robot.setup, config.clock != "realtime"
+    return UrInterfaces(
+        robot.reception,
+        setup.description,
+        setup.name,
+        address,
+        ports,
+        lockstep=lockstep,
+        programs=config.program_folder(setup.name),
+    )
+
+
+def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
+    """Check that an arm that gives the tick is alone, and that nothing else is to give it.
+
+    Raises:
+        ConfigError: It is not.
+    """
+    if not any(robot.driven.pace for robot in robots):
+        return
+    if config.clock != "realtime" or config.speed != 1.0:
+        wanted = f"clock is {config.clock}" if config.clock != "realtime" else f"speed is {config.speed:g}"
+        raise ConfigError(f"{wanted}, but the plant {config.plant} gives the tick: leave it out")
+    if len(robots) > 1:
+        raise ConfigError(
+            f"plant is {config.plant}, which gives the tick, and there are {len(robots)} robots: serve each by a "
+            "process of its own (workers), or alone"
+        )
+
+
+def drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Courier], list[Clock]]:
+    """Create couriers and clocks: one of each for all robots in real time, one of each per robot in lockstep.
+
+    In lockstep no message may be lost, so a courier waits for a slow client, and must not delay other robots.
+    """
+    if config.clock == "realtime":
+        courier, driven = Courier([robot.hand_on for robot in robots]), [robot.driven for robot in robots]
+        clock = Realtime(
+            driven,
+            courier.wake,
+            PERIOD,
+            config.speed,
+            priority=config.realtime_priority,
+            processor=config.processor,
+        )
+        return [courier], [clock]
+    couriers = [Courier([robot.hand_on]) for robot in robots]
+    return couriers, [Lockstep(robot.driven, robot.repeat) for robot in robots]
