@@ -31,7 +31,7 @@ class Ahead:
         """Samples of the shaped reference, one for each entry of `references`: path parameters, or else joint
         positions.
         """
-        self.references: list[Floats] = [shaped.joints.published.q, shaped.joints.position]
+        self.references: list[Floats] = [shaped.joints.published.q, shaped.position]
         """The last two shaped references played and the future ones, one for each tick, each of shape (n,) [rad]."""
         self.rests = False
         """True once the last reference is at rest, so that no more will follow."""
@@ -44,7 +44,7 @@ class Ahead:
             x_star = x if line_filter is None else line_filter.filter(x)
             target = self._shaped.update(x_star)
             self.samples.append(x_star)
-            self.references.append(self._shaped.joints.position)
+            self.references.append(self._shaped.position)
             settled = line_filter is None or line_filter.settled
             self.rests = trajectory.standing and settled and target.rests_at(self._shaped.posture(x), PERIOD)
 

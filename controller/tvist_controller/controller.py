@@ -371,7 +371,7 @@ class Controller:
                 "unknown_type", "type", f"the plant {name} cannot be put anywhere: it has no reset"
             )
         check_content(command, self.setup.description)
-        q = self.cycle.line.shaped.joints.position if command.q is None else np.array(command.q, dtype=float)
+        q = self.cycle.line.shaped.position if command.q is None else np.array(command.q, dtype=float)
         carried = None if command.payload is None else body(command.payload)
         self._check_place(command, q)
         self.programs.end("simulation.reset")

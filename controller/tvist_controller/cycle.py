@@ -84,7 +84,7 @@ class ControlCycle:
             mode, reference, line.shaped.joints.window, target, signals, command.torque, measured,
             line.drives.reference, refused,
         )  # fmt: skip
-        self._settle()
+        self._settle()  # last, so that the tick that comes to rest is still reported as one of the motion
         return self.sample
 
     def _references(self) -> tuple[Floats, Floats, Obstacle | None]:
@@ -96,6 +96,7 @@ class ControlCycle:
             assert guard is not None, "what may be stuck is guarded"
             return self._stopped(guard, guard.give_up(str(error)))
         x_star = self.line.filter.filter(x) if self.mode.shaped else x
+        # Judged after the filter, since it is the shaped reference from which the arm must be able to stop.
         if self.mode.guarded and guard is not None:
             stop = guard(self.line.shaped.joints.after(x_star))
             if stop is not None:
@@ -122,12 +123,12 @@ class ControlCycle:
         guard, path, line = guard or self.guard, trajectory.path, self.line
         check_change(self.mode, mode, guarded=guard is not None)
         if not mode.shaped:
+            # What the delay line still holds would carry the arm on after the stop: it is never played.
             if path is None:
-                line.shaped.enter(None, line.shaped.joints.position)
+                line.shaped.enter(None, line.shaped.position)
             line.filter.cut()
         elif path is not None and path.posture_of != line.shaped.posture_of:
-            line.shaped.enter(path.posture_of, path.start)
-            line.filter.begin(line.filter.tvist, path.start, path.posture_of)
+            line.enter(path.start, path.posture_of)
         if mode.shaped and trajectory.limits is not None:
             line.filter.limits = trajectory.limits
         self.trajectory, self.mode, self.guard = trajectory, mode, guard
@@ -144,7 +145,7 @@ class ControlCycle:
         """
         line_filter, drives = self.line.filter, self.line.drives
         drives.use(elastic)
-        if self.mode.at_rest:
+        if self.mode.at_rest:  # both kinds of feed-forward are equal there, so that none has to fade
             drives.rest()
         if self.mode.at_rest or not self.mode.shaped:
             line_filter.begin(tvist, self.sample.reference)
@@ -162,8 +163,7 @@ class ControlCycle:
             return
         on_path = line.shaped.posture_of is not None
         if on_path or not mode.shaped:  # the delay line restarts from where the motion ended
-            line.shaped.enter(None, reference)
-            line.filter.begin(line.filter.tvist, reference)
+            line.enter(reference)
         if on_path or not trajectory.finished:  # a motion that ran out while paused ends here
             self.trajectory = Rest(reference)
         self.mode, self.guard = LineMode.REST, None
@@ -179,11 +179,7 @@ class ControlCycle:
         """
         line, q = self.line, posture_of(self.line.plant, q)
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
-        line.dynamics.settle()
-        line.filter.begin(line.filter.tvist, q)
-        line.shaped.reset(q)
-        line.drives.reset(line.dynamics.gravity(q))
-        signals = line.to_drives(q)
+        signals = line.rest_at(q)
         target = Target(*signals[Q:TORQUE])
         command = line.drives.command(target, signals, line.dynamics.carried)
         measured = placed(line.plant, command, payload=carried, seed=seed)

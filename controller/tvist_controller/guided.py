@@ -108,7 +108,7 @@ class Guidance:
             angular_acceleration: Angular deceleration [rad/s^2].
         """
         cycle = self._cycle
-        state, present, tool = cycle.line.shaped.joints.newest, cycle.trajectory, self._tool
+        state, present, tool = cycle.line.shaped.newest, cycle.trajectory, self._tool
         fastest, twist = float(np.abs(state.qd).max()), tool.jacobian(state.q) @ state.qd
         duration = max(
             float(np.linalg.norm(twist[:3])) / acceleration,
@@ -158,9 +158,9 @@ class Guidance:
         if self._continues(shaped) and isinstance(present, Guided):
             return present.state
         if cycle.mode.at_rest:
-            q = cycle.sample.reference if shaped else cycle.line.shaped.joints.position
+            q = cycle.sample.reference if shaped else cycle.line.shaped.position
             return q, np.zeros_like(q), np.zeros_like(q)
-        newest = cycle.line.shaped.joints.newest
+        newest = cycle.line.shaped.newest
         return newest.q, newest.qd, newest.qdd
 
     def _follow(self, trigger: str, trajectory: Guided, shaped: bool) -> int:

@@ -14,7 +14,7 @@ from tvist_controller.line_filter import LineFilter
 from tvist_controller.safety import arm_limits
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import PERIOD, Plant
-from tvist_shaping.base import Filter
+from tvist_shaping.base import Filter, Posture
 
 
 class Boxes(Struct, frozen=True, eq=False):
@@ -56,6 +56,19 @@ class Boxes(Struct, frozen=True, eq=False):
         """Links, gravity, scratch and joint controllers, as `line_tick` takes them."""
         dynamics = self.dynamics
         return dynamics.chain, dynamics.gravitation, dynamics.scratch, self.drives.rows
+
+    def rest_at(self, q: Floats) -> Floats:
+        """Restart at rest at joint positions q, shape (n,) [rad], and return the signals there, see `to_drives`."""
+        self.dynamics.settle()
+        self.shaped.reset(q)
+        self.filter.begin(self.filter.tvist, q)
+        self.drives.reset(self.dynamics.gravity(q))
+        return self.to_drives(q)
+
+    def enter(self, sample: Floats, posture_of: Posture | None = None) -> None:
+        """Accept samples of another kind from rest on, see `ShapedReference.enter`."""
+        self.shaped.enter(posture_of, sample)
+        self.filter.begin(self.filter.tvist, sample, posture_of)
 
     def to_drives(self, reference: Floats) -> Floats:
         """Return the signals from the shaped reference to the drives, shape (9, n), see `line_tick`.

@@ -73,7 +73,9 @@ class LineFilter:
         if fade is None:
             return self.tvist.filter(reference)
         shaped = fade.filter(reference)
-        if fade.new is not self.tvist:  # it waits for the present transition to end
+        if (
+            fade.new is not self.tvist
+        ):  # it waits for the present transition to end, and must know the references
             self.tvist.filter(reference)
         if fade.finished:
             self._fade = None if fade.new is self.tvist else self._fade_to(fade.new, self.tvist)

@@ -139,6 +139,7 @@ class LookAhead:
     def _permitted(self, state: Target) -> Callable[[], JointStop] | None:
         """Return a function that makes a clear stop; None if there is none."""
         self._age += 1
+        # In free space a bound of the stop's way is enough, and its acceleration may be some ticks old.
         if self._age <= FRESH and self._is_spacious_for(state):
             return self._within(state, self._acceleration)
         allowed = MARGIN * self._torque.acceleration(state.q, state.qd)

@@ -90,7 +90,7 @@ class Outlook:
     def brake(self, trajectory: Trajectory) -> None:
         """Follow the arm while its brakes bring it to rest; no stop replaces this."""
         self._cycle.begin(trajectory, LineMode.STOPPING)
-        self._wanted = math.inf
+        self._wanted = math.inf  # as if the hardest stop had been asked for
 
     def plan_stop(self, deceleration: float | None) -> StopPlan | None:
         """Return the quickest permitted stop from the present state, without starting it; see `stop`."""
@@ -100,22 +100,21 @@ class Outlook:
     def _by_joints(self, deceleration: float | None) -> StopPlan | None:
         cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
         stop = self.stops.by_joints(
-            cycle.line.shaped.joints.newest, deceleration, _anywhere if guard is None else guard.clear
+            cycle.line.shaped.newest, deceleration, _anywhere if guard is None else guard.clear
         )
+        # A stop that goes on is replaced by a harder one only: each new one begins with a ramp of its own.
         braking = cycle.mode is LineMode.STOPPING or present.acceleration > 0.0
         if braking and (stop is None or stop.acceleration <= present.acceleration):
             return None
         if stop is None:  # no stop is clear and within the torque limits
             hardest = self.stops.highest
-            stop = (
-                self.stops.stop(cycle.line.shaped.joints.newest, hardest)
-                if guard is None
-                else guard.fallback()
-            )
+            stop = self.stops.stop(cycle.line.shaped.newest, hardest) if guard is None else guard.fallback()
         return self._plan(stop, deceleration, stop.duration, stop.end)
 
     def _on_path(self, forecast: Forecast, deceleration: float | None) -> StopPlan | None:
         cycle, forecast = self._cycle, self._shaped(forecast)
+        # Stops on a path are sought in the order of their cost: by bounds alone, then beside the motion simulated for
+        # as long as a stop lasts, then beside the whole of it.
         state, newest = cycle.line.shaped.along.published, cycle.line.shaped.along.position
         stop = self.stops.on_path(state, newest, forecast, deceleration)
         lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
@@ -141,7 +140,7 @@ class Outlook:
         self, stop: JointStop | PathStop | None, wanted: float | None, duration: float, end: Floats
     ) -> StopPlan:
         kept = None if stop is None else stop.acceleration
-        way = float(np.abs(end - self._cycle.line.shaped.joints.position).max())
+        way = float(np.abs(end - self._cycle.line.shaped.position).max())
         return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
 
     def _shaped(self, forecast: Forecast) -> Forecast:

@@ -48,6 +48,6 @@ def rehearse(cycle: ControlCycle) -> None:
         description, line.filter.tvist.fork(), q=q, declared=line.dynamics.payload, carried=carried, seed=0,
         plant=FlexibleArm(description, carried) if simulated else Still(description.joints),
     )  # fmt: skip
-    other.line.filter.rehearse(q)
+    other.line.filter.rehearse(q)  # a transition between filters has kernels of its own
     for _ in range(3):
         other.step()

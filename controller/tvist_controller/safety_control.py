@@ -109,7 +109,7 @@ class SafetyControl:
         motion.go("power_on" if release_brakes else "power")
         if cycle.mode.at_rest and not isinstance(cycle.line.plant, Placeable):
             # Without power the arm may have been moved, and its brakes stop it where they do.
-            cycle.reset(cycle.line.shaped.joints.position)
+            cycle.reset(cycle.line.shaped.position)
 
     def cut_power(self, why: str, latched: Latched | None = None) -> None:
         """Stop with category 0: the power is off, and the brakes close at once.
@@ -169,7 +169,7 @@ class SafetyControl:
         simulated = isinstance(cycle.line.plant, Placeable)
         why = f"{error}: the simulation put the arm at rest at its reference" if simulated else str(error)
         motion.abandon(why, "plant_failure")
-        sample = cycle.reset(cycle.line.shaped.joints.position, seed=seed)
+        sample = cycle.reset(cycle.line.shaped.position, seed=seed)
         self._protection.forget()
         if not simulated:
             if motion.power is not None:

@@ -40,7 +40,7 @@ class WayAhead:
 
     def guard_of_stream(self) -> LookAhead:
         """Return the guard of a stream that begins from rest."""
-        self._guard.begin(self._cycle.line.shaped.joints.newest)
+        self._guard.begin(self._cycle.line.shaped.newest)
         return self._guard
 
     def guard_of_guided(self) -> LookAhead:
@@ -50,7 +50,7 @@ class WayAhead:
             RefusalError: There is no clear stop from here, as on a narrow path; nothing has changed.
         """
         cycle, guard, stops = self._cycle, self._guide_guard, self._outlook.stops
-        state = cycle.line.shaped.joints.newest
+        state = cycle.line.shaped.newest
         guard.begin(state)
         if not cycle.mode.at_rest:
             stop = stops.by_joints(state, None, guard.clear)
@@ -103,10 +103,10 @@ class WayAhead:
         if trajectory.foreseeable and (ahead := self._outlook.foresee(tvist)) is not None:
             return self._on(ahead)
         guard = self._guard if cycle.guard is None else cycle.guard
-        stop = self._outlook.stops.by_joints(cycle.line.shaped.joints.newest, None, guard.clear)
+        stop = self._outlook.stops.by_joints(cycle.line.shaped.newest, None, guard.clear)
         if stop is None:
             return guard.met
-        guard.take(cycle.line.shaped.joints.newest, stop)
+        guard.take(cycle.line.shaped.newest, stop)
         return None
 
     def _first(self, ways: Sequence[Way]) -> Meeting | None:
@@ -123,7 +123,7 @@ class WayAhead:
         Raises:
             RefusalError: There would be a collision; nothing has changed.
         """
-        collisions, q = self._collisions, self._cycle.line.shaped.joints.position
+        collisions, q = self._collisions, self._cycle.line.shaped.position
         before = collisions.carried
         escaping = self._cycle.mode.at_rest or collisions.meeting(q) is not None
         collisions.carry(payload)
@@ -152,7 +152,7 @@ class WayAhead:
         cycle = self._cycle
         if cycle.line.filter.tvist.peak > 1.0:
             return False
-        q = cycle.line.shaped.joints.position
+        q = cycle.line.shaped.position
         window = np.abs(cycle.line.filter.window() - q).max(axis=0)
         _, qd, qdd = end.at(0.0)
         return self._guard.is_spacious(q, window + self._guard.turned(qd, qdd, end.acceleration, end.jerk))

@@ -142,7 +142,7 @@ class Subject:
         """Advance time by a number of ticks."""
         for _ in range(count):
             state, events = self.controller.tick()
-            self.references.append(self.controller.cycle.line.shaped.joints.position)
+            self.references.append(self.controller.cycle.line.shaped.position)
             self.actual.append(np.array(state.actual_q))
             self.events += events
 

@@ -102,8 +102,8 @@ class Line(ControlCycle):
     plant = property(lambda self: self.line.plant)
     reference = property(lambda self: self.sample.reference)
     along = property(lambda self: self.line.shaped.along)
-    position = property(lambda self: self.line.shaped.joints.position)
-    newest = property(lambda self: self.line.shaped.joints.newest)
+    position = property(lambda self: self.line.shaped.position)
+    newest = property(lambda self: self.line.shaped.newest)
 
     def plan(self, target, limits: MotionLimits, speed: float = 1.0):
         return quickest_motion(JointLine(self.reference, target), limits, H, speed)

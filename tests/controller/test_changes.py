@@ -179,7 +179,7 @@ def test_paused_a_change_is_made_where_nothing_moves():
     robot.send(c.Resume)
     robot.until_rest()
     assert robot.kinds()[-1] == "motion_done"
-    assert robot.controller.cycle.line.shaped.joints.position == pytest.approx(Q2, abs=STILL)
+    assert robot.controller.cycle.line.shaped.position == pytest.approx(Q2, abs=STILL)
 
 
 def test_a_stop_during_a_change_is_a_stop_and_the_new_filter_is_in_force_after_it():

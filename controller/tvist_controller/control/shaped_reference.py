@@ -40,6 +40,16 @@ class ShapedReference:
         self.along = self.joints if posture_of is None else Differentiator(sample, self._period)
         """State of motion of the samples; without a path it is that of the joints."""
 
+    @property
+    def position(self) -> Floats:
+        """The newest joint positions, shape (n,) [rad]."""
+        return self.joints.position
+
+    @property
+    def newest(self) -> Target:
+        """State of motion of the joints there, see `Differentiator.newest`."""
+        return self.joints.newest
+
     def posture(self, sample: Floats) -> Floats:
         """Return the joint positions that a sample stands for, shape (n,) [rad]."""
         return sample if self.posture_of is None else self.posture_of(sample)
