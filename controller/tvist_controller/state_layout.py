@@ -133,8 +133,8 @@ def write_state(
         qd: Measured velocities, shape (n,) [rad/s].
         moment: Measured torques, shape (n,) [N m].
         accelerometer: Shape (3,) [m/s^2].
-        chain: See `tool_motion`.
-        tool: Likewise.
+        chain: Links of the arm, see `tool_motion`.
+        tool: Tool centre point, see `tool_motion`.
         f_d: Damped frequencies, shape (modes,) [Hz].
         zeta: Damping ratios, shape (modes,) [-].
         motors: Velocities, accelerations and torques of the motors, if there are any, shape (3, n) or (0, n).

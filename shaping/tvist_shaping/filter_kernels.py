@@ -105,21 +105,21 @@ def shape_all(
 
     Args:
         samples: References, shape (T, joints) [rad].
-        joints: See `evaluate` of the estimator, as for the next six.
-        trigonometric: Likewise.
-        centre: Likewise.
-        scale: Likewise.
-        multiples: Likewise.
-        coefficients: Likewise.
-        ranges: Likewise.
-        zeta_max: See `shape`, as for the next seven.
-        longest: Likewise.
-        period: Likewise.
-        train: Likewise.
-        impulses: Likewise.
-        ring: Likewise.
-        head: Likewise.
-        scratch: Likewise.
+        joints: Indices of the joints that the estimator knows, shape (k,).
+        trigonometric: Whether its basis is trigonometric.
+        centre: Its centre [rad], shape (k,).
+        scale: Its scale [rad], shape (k,).
+        multiples: Multiples of the angles in each term, shape (rows, k).
+        coefficients: Coefficients of f_d and ζ, shape (2, terms).
+        ranges: Range of f_d and range of ζ, shape (2, 2).
+        zeta_max: Exclusive upper limit of ζ [-].
+        longest: Longest delay [s].
+        period: Tick [s].
+        train: Amplitudes without damping [-] and times in damped periods [-], shape (2, N).
+        impulses: Result: impulses of the last mode, shape (3, N).
+        ring: `DelayLine.ring`; changed.
+        head: `DelayLine.head`.
+        scratch: `DelayLine.scratch`.
         q_star: Last shaped sample; changed, shape (joints,) [rad].
         modes: Result: the last modes, shape (2, 1).
         out: Result: shaped samples, shape (T, joints) [rad].
