@@ -5,9 +5,9 @@ from typing import TypeVar
 from tvist_controller.control.differentiator import Floats, Target
 from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.control.line_tick import TORQUE, Q
+from tvist_controller.guard import Guard, Obstacle
 from tvist_controller.line_boxes import Boxes
 from tvist_controller.line_mode import LineMode, check_change
-from tvist_controller.look_ahead import LookAhead, Obstacle
 from tvist_controller.sample import Sample
 from tvist_controller.trajectory import Rest, StuckError, Trajectory
 from tvist_plant.description import Payload, RobotDescription
@@ -58,7 +58,7 @@ class ControlCycle:
         """Trajectory generator."""
         self.mode = LineMode.REST
         """What the line does."""
-        self.guard: LookAhead | None = None
+        self.guard: Guard | None = None
         """What checks the references and the stops of a guarded motion; None without one."""
         self.sample = self.reset(q, carried=carried, seed=seed)
         """Signals of the last tick, or of the arm where it was put at rest since."""
@@ -103,11 +103,11 @@ class ControlCycle:
                 return self._stopped(guard, stop)
         return x, x_star, None
 
-    def _stopped(self, guard: LookAhead, stop: Trajectory) -> tuple[Floats, Floats, Obstacle]:
+    def _stopped(self, guard: Guard, stop: Trajectory) -> tuple[Floats, Floats, Obstacle]:
         x = self.begin(stop, LineMode.STOPPING).next()
         return x, x, guard.obstacle
 
-    def begin(self, trajectory: T, mode: LineMode = LineMode.SHAPED, guard: LookAhead | None = None) -> T:
+    def begin(self, trajectory: T, mode: LineMode = LineMode.SHAPED, guard: Guard | None = None) -> T:
         """Follow a trajectory from now on.
 
         Args:

@@ -2,16 +2,15 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from tvist_controller.collision import CollisionModel, Meeting
 from tvist_controller.control.differentiator import Floats, Target
+from tvist_controller.guard import Guard, Obstacle
 from tvist_controller.safety import GENTLEST_STOP, StreamTorqueRoom
 from tvist_controller.stops import StopPlanner
 from tvist_controller.trajectory import JointStop, Way
-from tvist_protocol.replies import Code
 
 MARGIN = 0.8
 """Share of the acceleration that the torque permits at the start of a stop, which the stop uses, since the permitted
@@ -21,16 +20,7 @@ FRESH = 8
 """Number of ticks for which a computed permitted acceleration is reused; the margin covers its changes."""
 
 
-class Obstacle(NamedTuple):
-    """Why a reference was refused."""
-
-    why: str
-    """The reason, for people."""
-    code: Code
-    """The reason, for programs."""
-
-
-class LookAhead:
+class LookAhead(Guard):
     """Checks the stop from the state of motion that a reference would lead to.
 
     As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the
@@ -74,14 +64,7 @@ class LookAhead:
         self._acceleration, self._age = GENTLEST_STOP, FRESH
 
     def __call__(self, state: Target) -> JointStop | None:
-        """Decide whether a reference may be played.
-
-        Args:
-            state: State of motion that it would lead to.
-
-        Returns:
-            None if it may be played; otherwise the stop from the previous state, to be made instead.
-        """
+        """Decide whether a reference that leads to this state may be played; see `Guard`."""
         found = self._permitted(state)
         if found is None:
             return self.fallback()

@@ -5,8 +5,8 @@ from msgspec import Struct
 from tvist_controller.control.differentiator import Floats, Target
 from tvist_controller.control.drive_feed_forward import MotorReference
 from tvist_controller.control.line_tick import TORQUE
+from tvist_controller.guard import Obstacle
 from tvist_controller.line_mode import LineMode
-from tvist_controller.look_ahead import Obstacle
 from tvist_plant.plant import Measurement
 
 

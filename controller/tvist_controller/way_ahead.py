@@ -102,7 +102,7 @@ class WayAhead:
             return self._first([forecast.path.way(cycle.line.shaped.along.position, forecast.end), *coming])
         if trajectory.foreseeable and (ahead := self._outlook.foresee(tvist)) is not None:
             return self._on(ahead)
-        guard = self._guard if cycle.guard is None else cycle.guard
+        guard = self._guide_guard if cycle.guard is self._guide_guard else self._guard
         stop = self._outlook.stops.by_joints(cycle.line.shaped.newest, None, guard.clear)
         if stop is None:
             return guard.met
