@@ -11,7 +11,7 @@ from tvist_controller.collision import CollisionModel
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import body, paper_payload
-from tvist_lab.studies.evaluate import MEASURED, interval, methods, report
+from tvist_lab.studies.evaluate import interval, jobs, report
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import baselines
 from tvist_lab.study.engine import made
@@ -256,8 +256,8 @@ class TestReport:
 class TestMoves:
     def test_the_papers_motion_is_what_the_paper_page_says(self, ur5e, paper, move):
         recipe = Recipe("zv", paper)
-        every = methods(Named(recipe, "zv"), baselines(recipe, ur5e, (5.0, 5.0)))
-        shaped, waiting, longer, *others = measure(Job(Case(ur5e, move), every, MEASURED))
+        (job,) = jobs(ur5e, [move], 0, Named(recipe, "zv"), baselines(recipe, ur5e, (5.0, 5.0)))
+        shaped, waiting, longer, *others = measure(job)
         assert shaped["reduction_percent"] > 80.0
         assert 28.0 <= shaped["delay_ms"] <= 38.0  # half a period at Q3, where the mode is at 15 Hz
         assert waiting["reduction_percent"] == waiting["delay_ms"] == 0.0

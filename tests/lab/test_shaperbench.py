@@ -17,7 +17,7 @@ from tvist_lab.studies.bench_tables import ON_PAGE, best_in_bold, ranked
 from tvist_lab.studies.curves import bends, path_error
 from tvist_lab.studies.leaderboard import leaderboard
 from tvist_lab.studies.pages import page
-from tvist_lab.studies.shaperbench import MEASURED, draw, inspect, jobs
+from tvist_lab.studies.shaperbench import WANTED, draw, inspect, jobs
 from tvist_lab.study.arms import ARMS
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import ROWS, bench, names
@@ -281,7 +281,7 @@ class TestElastic:
         def made(kind, *arms):
             case = Case(ur5e, task.move, arms=tuple(ARMS[place] for place in arms))
             method = kind(Recipe("elastic", calibration), "elastic", "")
-            rows = measure(Job(case, (method,), MEASURED, as_served=False))
+            rows = measure(Job(case, (method,), WANTED, as_served=False))
             return [row | {"cost_us": None} for row in rows]
 
         whole = made(Named, 0, 7)

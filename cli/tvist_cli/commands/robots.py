@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import number, out, print_json, progress, table, typed, words
-from tvist_cli.simulated_arm import check_count, check_seed
+from tvist_cli.studying import check_range, check_seed
 
 if TYPE_CHECKING:
     from tvist_lab.studies.arms.measure import Measured
@@ -44,9 +44,8 @@ def robots(
     from tvist_plant.description import DescriptionError, load
     from tvist_plant.description import robots as shipped
 
-    check_count("random", random, 10_000)
-    if not 0.0 <= vary <= VARIED:
-        raise Failure(f"vary is {vary:g}: must be 0 to {VARIED:g} %", code=2)
+    check_range("random", random, 1, 10_000)
+    check_range("vary", vary, 0.0, VARIED, " %")
     check_seed(seed)
     if vary and not measure:
         raise Failure("vary needs --measure: it changes nothing in a list", code=2)

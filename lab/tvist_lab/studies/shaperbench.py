@@ -13,9 +13,11 @@ from tvist_lab.study.shaping import ShaperFaultError
 from tvist_lab.study.work import FAILED, Job, Row, measure_each
 from tvist_plant.description import RobotDescription
 
+CALIBRATION = "ur5e_modal"
+"""Calibration of the bench's arm, unless another one is named."""
 PAYLOAD_ERRORS = (0.0, 0.1, -0.1)
 """Errors of the declared mass [-]."""
-MEASURED = (
+WANTED = (
     "time_until_still_ms", "residual_m_s2", "in_motion_m_s2", "declared_delay_ms", "reference_acceleration_ratio",
     "reference_velocity_ratio", "cost_us",
 )  # fmt: skip
@@ -57,7 +59,7 @@ def jobs(
                 axes={"move": number, "payload_error": error},
             ),
             (method,),
-            MEASURED,
+            WANTED,
             as_served=False,
         )
         for method in methods

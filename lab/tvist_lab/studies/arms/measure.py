@@ -11,14 +11,12 @@ from tvist_controller.api.line import Setup, body, modal_estimator, paper_payloa
 from tvist_lab.identification.modal import identify_modal
 from tvist_lab.identification.modal_plan import ModalPlan, free_configurations, jog_of
 from tvist_lab.in_process import robot_in_process
-from tvist_lab.studies.evaluate import MEASURED, methods, report
+from tvist_lab.studies.evaluate import feasible, jobs, report
 from tvist_lab.study.arms import stiffer
-from tvist_lab.study.case import Case, arm_seed
 from tvist_lab.study.engine import made
 from tvist_lab.study.method import Named
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe
-from tvist_lab.study.work import Job
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
@@ -80,24 +78,19 @@ def measure(
     known = asyncio.run(_identified(arm, seed)) if calibration is None else calibration
     mass = arm.payload.mass
     drawn = draw_moves(arm, moves, seed, (mass, mass)).moves
-    feasible = [move for move in drawn if Case(arm, move).torque_share <= 1.0]
-    auto = methods(Named(Recipe("auto", known), "auto"), ())
-    jobs = [
-        Job(Case(arm, move, arm_seed(seed, place), axes={"payload_kg": move.mass}), auto, MEASURED)
-        for place, move in enumerate(feasible)
-    ]
+    able = feasible(drawn, arm)
     judged = []
-    for rows in made(jobs):
+    for rows in made(jobs(arm, able, seed, Named(Recipe("auto", known), "auto"))):
         judged.append(rows)
         progress(1)
-    progress(len(drawn) - len(feasible))
+    progress(len(drawn) - len(able))
     summary = report(judged)
     return Measured(
         stiffness=stiffness,
         calibration="identified" if calibration is None else known.name,
         f_d_error_percent=_mode_errors(arm, known, seed),
-        moves=len(feasible),
-        too_weak=len(drawn) - len(feasible),
+        moves=len(able),
+        too_weak=len(drawn) - len(able),
         counted=summary["counted"],
         reduction_percent={key: summary["reduction_percent"][key] for key in ("median", "p5", "min")},
         delay_ms=summary["delay_ms"]["median"],
