@@ -59,8 +59,7 @@ def paths(
         json: Print one JSON object.
     """
     from tvist_lab.studies.path_examples import circle
-    from tvist_lab.studies.path_report import page_of, report
-    from tvist_lab.studies.paths import SHAPERS, PathJob, PathsError, compare
+    from tvist_lab.studies.paths import SHAPERS, PathJob, PathsError, compare, page_of, report
     from tvist_lab.studies.random_paths import KINDS
     from tvist_lab.study.recipes import Recipe
     from tvist_lab.study.shaping import ShaperFaultError
@@ -118,7 +117,8 @@ def _figures(paths: list[dict[str, Any]], description: "RobotDescription", known
 
 
 def _print(result: dict[str, Any]) -> None:
-    from tvist_lab.studies.path_report import COLUMNS, TERMS, circle_in_words, rows, title_of
+    from tvist_lab.studies.path_examples import circle_in_words
+    from tvist_lab.studies.paths import COLUMNS, TERMS, rows, title_of
 
     for kind, group in result["summary"].items():
         if kind != "all":
