@@ -12,8 +12,7 @@ from typing import Literal
 from tvist_controller.api.line import OwnShaper
 from tvist_lab.study.foreign import FromFile
 from tvist_lab.study.method import Constant, Held, Longer, Method, Named, PeriodOfJerk, Waiting
-from tvist_lab.study.ranges import longest_mean_delay, robust
-from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.recipes import Recipe, longest_mean_delay, robust
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
 from tvist_shaping.named import BUILT_IN

@@ -1,5 +1,6 @@
-"""A sweep in short: one entry for each robot, payload, error and shaper, over all moves."""
+"""Rows in short: an entry for each setting and method, over all moves; and that of a sweep."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import polars as pl
@@ -8,6 +9,27 @@ from tvist_lab.study.columns import AXES
 from tvist_lab.study.tables import Shown
 from tvist_lab.study.work import FAILED, MEASURED, TOO_WEAK
 
+Shares = Mapping[str, float]
+"""Names of percentiles, as shares [-]."""
+
+STATUS = pl.col("status")
+COUNTED = {
+    "moves": pl.len(),
+    "measured": (STATUS == MEASURED).sum(),
+    "counted": pl.col("reduction_percent").is_not_null().sum(),
+    "too_weak": (STATUS == TOO_WEAK).sum(),
+    "failed": (STATUS == FAILED).sum(),
+    "never_still": ((STATUS == MEASURED) & pl.col("shaped_still_after_ms").is_null()).sum(),
+}
+"""What is counted of each setting of a sweep."""
+FIGURES: Mapping[str, Shares] = {
+    "reduction_percent": {"median": 0.5, "p5": 0.05},
+    "less_than_waiting_percent": {"median": 0.5},
+    "delay_ms": {"median": 0.5, "max": 1.0},
+    "still_after_unshaped_stop_ms": {"median": 0.5, "p90": 0.9},
+    "peak_acceleration_ratio": {"max": 1.0},
+}
+"""What is summarized of each setting of a sweep."""
 SHOWN = (
     Shown("setting", "setting"), Shown("shaper", "shaper"), Shown("moves", "measured"),
     Shown("delay ms", "delay_ms.median", 0), Shown("less %", "reduction_percent.median", 1),
@@ -18,46 +40,37 @@ SHOWN = (
 """Table of a summary, whose entries have got the name of their setting."""
 
 
+def summarized(
+    rows: pl.DataFrame, keys: Sequence[str], counted: Mapping[str, pl.Expr], figures: Mapping[str, Shares]
+) -> list[dict[str, Any]]:
+    """Return an entry for each combination of keys, in the order of the rows.
+
+    Args:
+        rows: Rows of a study.
+        keys: Columns that together distinguish what is summarized.
+        counted: Numbers of an entry by name.
+        figures: Percentiles of an entry by measure, over the rows that were measured and have it.
+    """
+    asked = {
+        f"{name}.{share}": pl.col(name).filter(STATUS == MEASURED).quantile(value, "linear")
+        for name, shares in figures.items()
+        for share, value in shares.items()
+    }
+    grouped = rows.group_by(keys, maintain_order=True).agg(**counted, **asked)
+    return [
+        {name: row[name] for name in (*keys, *counted)}
+        | {name: {share: row[f"{name}.{share}"] for share in shares} for name, shares in figures.items()}
+        for row in grouped.iter_rows(named=True)
+    ]
+
+
 def summary(rows: pl.DataFrame) -> list[dict[str, Any]]:
-    """Return an entry for each combination of the axes, in the order of the rows.
+    """Return an entry for each combination of a sweep's axes, in the order of the rows.
 
     Percentiles of reductions are over the moves whose unshaped peak is worth a percentage, others over all measured.
     """
-    measured = pl.col("status") == MEASURED
-
-    def at(name: str, share: float) -> pl.Expr:
-        return pl.col(name).filter(measured).quantile(share, "linear")
-
     late = pl.col("shaped_still_after_ms") - pl.col("unshaped_duration_ms")
-    grouped = rows.group_by(AXES, maintain_order=True).agg(
-        moves=pl.len(),
-        measured=measured.sum(),
-        counted=pl.col("reduction_percent").is_not_null().sum(),
-        too_weak=(pl.col("status") == TOO_WEAK).sum(),
-        failed=(pl.col("status") == FAILED).sum(),
-        reduction_median=at("reduction_percent", 0.5),
-        reduction_p5=at("reduction_percent", 0.05),
-        waiting_median=at("less_than_waiting_percent", 0.5),
-        delay_median=at("delay_ms", 0.5),
-        delay_max=at("delay_ms", 1.0),
-        still_median=late.filter(measured).quantile(0.5, "linear"),
-        still_p90=late.filter(measured).quantile(0.9, "linear"),
-        never_still=(measured & pl.col("shaped_still_after_ms").is_null()).sum(),
-        acceleration_max=at("peak_acceleration_ratio", 1.0),
-    )
-    return [_entry(row) for row in grouped.iter_rows(named=True)]
-
-
-def _entry(row: dict[str, Any]) -> dict[str, Any]:
-    return {
-        **{name: row[name] for name in (*AXES, "moves", "measured", "counted", "too_weak", "failed")},
-        "reduction_percent": {"median": row["reduction_median"], "p5": row["reduction_p5"]},
-        "less_than_waiting_percent": {"median": row["waiting_median"]},
-        "delay_ms": {"median": row["delay_median"], "max": row["delay_max"]},
-        "still_after_unshaped_stop_ms": {"median": row["still_median"], "p90": row["still_p90"]},
-        "never_still": row["never_still"],
-        "peak_acceleration_ratio": {"max": row["acceleration_max"]},
-    }
+    return summarized(rows.with_columns(still_after_unshaped_stop_ms=late), AXES, COUNTED, FIGURES)
 
 
 def setting_name(entry: dict[str, Any]) -> str:
