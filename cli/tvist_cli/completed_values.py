@@ -19,6 +19,7 @@ def option_values() -> dict[str, Values]:
     """Return the values of options, by the option's name without dashes."""
     from typing import get_args
 
+    from tvist_lab.study.menus import UNSHAPED, names
     from tvist_plant.description import robots
     from tvist_server.profiles import ProfileName
     from tvist_shaping import BUILT_IN, SHAPERS
@@ -30,6 +31,7 @@ def option_values() -> dict[str, Values]:
         "shaper": shaper,
         "shapers": shaper,
         "sensitivity": Values(tuple(SHAPERS), "py"),
+        "against": Values((UNSHAPED, *names("bench"))),
         "profile": Values(get_args(ProfileName)),
     }
 

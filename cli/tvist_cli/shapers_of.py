@@ -146,7 +146,8 @@ def on_the_bench(
     Raises:
         Failure: There is no shaper of a name.
     """
-    from tvist_lab.study.catalogue import UNSHAPED, bench, names
+    from tvist_lab.study.catalogue import bench
+    from tvist_lab.study.menus import UNSHAPED, names
     from tvist_plant.description import load
 
     every = {UNSHAPED, *names("bench")}

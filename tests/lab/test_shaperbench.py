@@ -20,10 +20,11 @@ from tvist_lab.studies.pages import page
 from tvist_lab.studies.shaperbench import WANTED, draw, inspect, jobs
 from tvist_lab.study.arms import ARMS
 from tvist_lab.study.case import Case
-from tvist_lab.study.catalogue import ROWS, bench, names
+from tvist_lab.study.catalogue import bench
 from tvist_lab.study.causality import check_causal
 from tvist_lab.study.foreign import CandidateError, FromFile, load_shaper
 from tvist_lab.study.line import PAPER, ControlLine, point_to_point
+from tvist_lab.study.menus import ROWS, names
 from tvist_lab.study.method import Named, Stepping, Task
 from tvist_lab.study.moves import Move
 from tvist_lab.study.recipes import Recipe
@@ -313,7 +314,7 @@ class TestOwn:
             assert 0.08 < shaped.delay < 0.15
 
     def test_a_shaper_of_the_library_without_a_row_stands_in_the_menus_of_shapers(self, monkeypatch):
-        monkeypatch.setattr("tvist_lab.study.catalogue.ROWS", tuple(row for row in ROWS if row.name != "zvd"))
+        monkeypatch.setattr("tvist_lab.study.menus.ROWS", tuple(row for row in ROWS if row.name != "zvd"))
         assert [menu for menu in ("bench", "paths", "lesson", "baselines") if "zvd" in names(menu)] == [
             "bench", "paths", "lesson"
         ]  # fmt: skip

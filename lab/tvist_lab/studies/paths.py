@@ -17,9 +17,9 @@ from tvist_lab.studies.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, Refere
 from tvist_lab.studies.random_paths import KINDS, Kind, PathDraw, ToolMove
 from tvist_lab.studies.tool_path import ToolPath
 from tvist_lab.study.case import arm_seed
-from tvist_lab.study.catalogue import names
 from tvist_lab.study.line import ControlLine
 from tvist_lab.study.measures import WORTH, kinematics
+from tvist_lab.study.menus import names
 from tvist_lab.study.tables import Shown, in_markdown
 from tvist_lab.study.work import Row
 from tvist_plant.description import RobotDescription
