@@ -17,11 +17,10 @@ from tvist_lab.studies.bench_tables import ON_PAGE, best_in_bold, ranked
 from tvist_lab.studies.curves import bends, path_error
 from tvist_lab.studies.leaderboard import leaderboard
 from tvist_lab.studies.pages import page
-from tvist_lab.studies.shaperbench import WANTED, draw, inspect, jobs
+from tvist_lab.studies.shaperbench import WANTED, check_causal, draw, inspect, jobs
 from tvist_lab.study.arms import ARMS
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import bench
-from tvist_lab.study.causality import check_causal
 from tvist_lab.study.foreign import CandidateError, FromFile, load_shaper
 from tvist_lab.study.line import PAPER, ControlLine, point_to_point
 from tvist_lab.study.menus import ROWS, names
