@@ -27,11 +27,6 @@ def ur5e():
 
 
 @pytest.fixture(scope="module")
-def modal():
-    return calibrations.load("ur5e_modal")
-
-
-@pytest.fixture(scope="module")
 def job(ur5e, modal):
     return PathJob(ur5e, modal, ("auto",), (0.0, 5.0), seed=5, place=2)
 
