@@ -10,14 +10,13 @@ from typing import Any
 import polars as pl
 
 from tvist_lab.study.case import Case
-from tvist_lab.study.columns import Column, column_of, columns_of, schema_of
+from tvist_lab.study.columns import OF_STATUS, Column, column_of, columns_of, schema_of, summarized
 from tvist_lab.study.engine import Plan
 from tvist_lab.study.foreign import run_file
 from tvist_lab.study.measures import MEASURES, OF_PEAKS
 from tvist_lab.study.method import Method
-from tvist_lab.study.summary import COUNTED, summarized
 from tvist_lab.study.tables import Shown
-from tvist_lab.study.work import Job
+from tvist_lab.study.work import FAILED, MEASURED, Job
 from tvist_lab.words import counted
 
 SHARES = {"median": 0.5, "p5": 0.05, "p95": 0.95}
@@ -116,7 +115,7 @@ class Study:
     def summary(self, rows: pl.DataFrame) -> list[dict[str, Any]]:
         """Return an entry for each setting, arm and method, over all other axes."""
         keys = [*self.by, *(["arm"] if len(self.cases[0].arms) > 1 else []), "shaper"]
-        numbers = {"rows": pl.len(), **{name: COUNTED[name] for name in ("measured", "failed")}}
+        numbers = {"rows": pl.len(), **{name: OF_STATUS[name].sum() for name in (MEASURED, FAILED)}}
         return summarized(rows, keys, numbers, dict.fromkeys(self.measured, SHARES))
 
     def shown(self, entries: Sequence[dict[str, Any]]) -> list[Shown]:

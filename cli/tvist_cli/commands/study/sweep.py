@@ -11,9 +11,9 @@ from tvist_cli.simulated_arm import disturbed
 
 if TYPE_CHECKING:
     from tvist_lab.figures import FigureFiles
-    from tvist_lab.study.axes import Axes, SweptRobot
+    from tvist_lab.studies.sweep.spec import NamedRobot, Spec
+    from tvist_lab.studies.sweep.sweep import Axes, SweptRobot
     from tvist_lab.study.recipes import Recipe
-    from tvist_lab.study.spec import NamedRobot, Spec
     from tvist_plant.description import RobotDescription
 
 NAMED = 5
@@ -51,7 +51,7 @@ def sweep(
         look: How to write the figure.
         json: Print one JSON object.
     """
-    from tvist_lab.study.summary import SHOWN, setting_name, summary
+    from tvist_lab.studies.sweep.sweep import SHOWN, setting_name, summary
     from tvist_lab.study.work import FAILED
 
     folder = kept.folder_of(spec, output, processes, scheduler, look)
@@ -94,9 +94,9 @@ def _axes(path: Path) -> "Axes":
     Raises:
         Failure: The file, or what it names, is invalid; the message names the key.
     """
-    from tvist_lab.study.axes import Axes
+    from tvist_lab.studies.sweep.spec import read_spec
+    from tvist_lab.studies.sweep.sweep import Axes
     from tvist_lab.study.moves import MovesError
-    from tvist_lab.study.spec import read_spec
 
     with told(OSError):
         spec = read_spec(path)
@@ -108,7 +108,7 @@ def _axes(path: Path) -> "Axes":
 
 
 def _robot(path: Path, spec: "Spec", place: int, named: "str | NamedRobot") -> "SweptRobot":
-    from tvist_lab.study.axes import SweptRobot
+    from tvist_lab.studies.sweep.sweep import SweptRobot
     from tvist_plant.description import DescriptionError, load, robots
 
     robot, calibration = (named, None) if isinstance(named, str) else (named.robot, named.calibration)
