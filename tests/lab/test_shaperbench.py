@@ -12,11 +12,9 @@ import pytest
 
 from tvist_lab.metrics import best_tool_acceleration
 from tvist_lab.mujoco_arm import MujocoArm
-from tvist_lab.studies.bench_tables import ON_PAGE, best_in_bold, ranked
-from tvist_lab.studies.curves import bends, path_error
-from tvist_lab.studies.leaderboard import leaderboard
+from tvist_lab.studies.leaderboard import ON_PAGE, best_in_bold, leaderboard, ranked
 from tvist_lab.studies.pages import page
-from tvist_lab.studies.shaperbench import WANTED, check_causal, draw, inspect, jobs
+from tvist_lab.studies.shaperbench import WANTED, bends, check_causal, draw, inspect, jobs, path_error
 from tvist_lab.study.arms import ARMS
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import bench

@@ -25,29 +25,122 @@ class Memory:
         past[-1].append(q_ref.copy())
         return past[0][min(len(past[-1]) + 5, len(past[0]) - 1)]
 """
+
+
+def made_again(told, folder):
+    """Random moves are kept, and can be made again."""
+    again = ["--disturbances", "none", "--shaper", "auto", "--no-baselines", "--json"]
+    made = tvist("evaluate", "--moves", folder / "drawn.json", *again).assert_done().json
+    assert told["moves"] == made["moves"]
+    assert told["baselines"] == {}
+    for one in (told, made):
+        assert (one["plant"], one["disturbances"]) == ("clean", [])
+    assert 0.0 < told["free_of_collision"] <= 1.0
+
+
+def in_three_ways(told, _):
+    """A path has the keys that are promised."""
+    (path,) = told["paths"]
+    assert (path["kind"], path["payload_kg"], told["plant"]) == ("arc", 5.0, "clean")
+    assert list(path["shaped"]) == ["zv", "auto"]
+    for ways in path["shaped"].values():
+        assert list(ways) == ["along", "joints", "joints_unslowed"]
+        assert ways["along"]["off_mm"] < ways["joints"]["off_mm"]
+        for one in ways.values():
+            assert one["peak_m_s2"] < path["unshaped_peak_m_s2"]
+            assert one["delay_ms"] > 0.0
+    assert set(told["summary"]) == {"all", "arc"}
+    assert {"refused", "stopping", "circle", "seed", "calibration"} <= set(told)
+
+
+def at_each_speed(told, folder):
+    """Each shaper has errors at each speed, and the page the same."""
+    assert told["speeds_rad_s"] == [0.5, 1.0]
+    assert [(one["name"], one["shaped"]) for one in told["shapers"]] == [("none", False), ("auto", True)]
+    page = (folder / "page.md").read_text(encoding="utf-8")
+    for one in told["shapers"]:
+        assert {"error_rad", "within", "speed_at_tolerance_rad_s", "lag_ms"} <= set(one["ramp"])
+        assert one["ramp"]["within"] == one["jump"]["within"] == [True, True]
+        assert one["ramp"]["error_rad"][1] > one["ramp"]["error_rad"][0] > 0.0
+        assert all(f"{error:.3f}" in page for error in one["jump"]["error_rad"])
+
+
+def over_two_joints(told, _):
+    """A map is of one arm, with errors of each quantity."""
+    assert (told["robot"], told["payload_kg"], told["shaper"]) == ("ur5e", 1.0, "zvd")
+    for key, maps in told["maps"].items():
+        assert [len(maps[kind]) for kind in ("identified", "true", "error_percent")] == [5, 5, 5]
+        assert told["errors"][key]["median_percent"] < 10.0
+
+
+def as_they_are(told, _):
+    """Every shaper is listed as it is."""
+    assert (told["f_d_hz"], told["zeta"]) == (6.7, 0.34)
+    listed = {entry["name"]: entry for entry in told["shapers"]}
+    assert list(listed) == list(SHAPERS)
+    for name, entry in listed.items():
+        assert entry["zeta_max"] == SHAPERS[name].zeta_max
+        if SHAPERS[name].zeta_max <= 0.34:
+            assert "beyond it take" in entry["not_for_this_mode"]
+            continue
+        impulses = Impulses(np.array(entry["amplitudes"]), np.array(entry["times_s"]))
+        assert entry["duration_ms"] == pytest.approx(1000 * impulses.duration)
+        assert entry["mean_delay_ms"] == pytest.approx(1000 * impulses.mean_delay)
+        for percent in (5, 10):
+            for ratio in entry[f"band_{percent}_percent"] or []:
+                if ratio is not None:
+                    assert residual(6.7 * ratio, 0.34, impulses) == pytest.approx(percent / 100, rel=1e-3)
+
+
+def with_bands(told, _):
+    """There is a curve of each shaper, and its band."""
+    curves = {curve["name"]: curve for curve in told["shapers"]}
+    assert list(curves) == ["zv", "ei"]
+    for curve in curves.values():
+        low, high = curve["error_of_5_percent"]
+        for error, left in zip(told["error_percent"], curve["residual_percent"], strict=True):
+            assert left < 5.01 or not low < error < high
+    assert curves["zv"]["residual_percent"][200] == pytest.approx(0.0, abs=1e-9)
+
+
+def with_each_error(told, _):
+    """Each shaper has its reductions with each error."""
+    (zv,) = told["shapers"]
+    assert (zv["name"], told["moves"], told["calibration"]) == ("zv", 1, "ur5e_modal")
+    assert zv["stiffness"].keys() > zv["payload"].keys() > {"+0 %", "+20 %", "-20 %"}
+
+
 RANDOM = "evaluate --random 2 --seed 5 --payload uniform --clean --shaper auto --no-baselines --save-moves drawn.json"
+MAP = (
+    "study map --points 5 --payload 1 --calibration ur5e_modal --shaper zvd --figures . --format svg --columns 1 "
+    "--output out.json"
+)
 RUNS = {
-    "evaluate": (f"{RANDOM} --figures . --report report.html", {"moves.png", "one_move.png"}),
+    "evaluate": (f"{RANDOM} --figures . --report report.html", {"moves.png", "one_move.png"}, made_again),
     "robustness": (
-        "study robustness --moves 1 --against zv --output out.json --markdown page.md --figures .", {"robustness.png"}
+        "study robustness --moves 1 --against zv --output out.json --markdown page.md --figures .",
+        {"robustness.png"},
+        with_each_error,
     ),
     "paths": (
-        "study paths --random 1 --kind arc --shapers zv auto --seed 3 --payload 5 --clean --markdown page.md", set()
+        "study paths --random 1 --kind arc --shapers zv auto --seed 3 --payload 5 --clean --markdown page.md",
+        set(),
+        in_three_ways,
     ),
-    "tracking": ("study tracking --shapers auto --speeds 1 0.5 --markdown page.md", set()),
-    "map": (
-        "study map --points 5 --payload 1 --shaper zvd --figures . --format svg --columns 1 --output out.json",
-        {"map_f_d.svg", "map_zeta.svg", "map_delay.svg"},
-    ),
+    "tracking": ("study tracking --shapers auto --speeds 1 0.5 --markdown page.md", set(), at_each_speed),
+    "map": (MAP, {"map_f_d.svg", "map_zeta.svg", "map_delay.svg"}, over_two_joints),
     "shapers": (
         "shapers --f-d 6.7 --zeta 0.34 --figures .",
         {"shapers.png", "settling.png", "mean_delay.png", "elastic.png"},
+        as_they_are,
     ),
     "sensitivity": (
-        "shapers --sensitivity zv ei --errors -20 20 --figures . --format pdf --output out.json", {"sensitivity.pdf"}
+        "shapers --sensitivity zv ei --errors -20 20 --figures . --format pdf --output out.json",
+        {"sensitivity.pdf"},
+        with_bands,
     ),
-}  # fmt: skip
-"""Commands with the figures that they write."""
+}
+"""Commands, the figures that they write, and what is asked of their results."""
 SAID = {
     "study paths --random 3 --shapers auto --figures .": (
         ["1 line,", "1 path with blends,", "joint by joint", "in motion", "circle"],
@@ -67,35 +160,20 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.fixture(scope="module")
-def ran(tmp_path_factory):
-    """Run a command once; what it printed, and the folder with what it wrote."""
-    known = {}
-
-    def run(name):
-        if name not in known:
-            folder = tmp_path_factory.mktemp(name)
-            with pytest.MonkeyPatch.context() as patch:
-                patch.chdir(folder)
-                known[name] = tvist(*RUNS[name][0].split(), "--json").assert_done().json, folder
-        return known[name]
-
-    return run
-
-
 @pytest.mark.parametrize("name", RUNS)
-def test_what_is_written_is_what_is_printed_and_the_page_names_the_command(ran, name):
-    words, figures = RUNS[name]
-    told, folder = ran(name)
-    assert {path.name for path in folder.iterdir() if path.suffix in {".png", ".svg", ".pdf"}} == figures
-    assert all((folder / figure).stat().st_size > 5000 for figure in figures)
+def test_a_result_is_right_and_what_is_written_is_what_is_printed(here, name):
+    words, figures, check = RUNS[name]
+    told = tvist(*words.split(), "--json").assert_done().json
+    check(told, here)
+    assert {path.name for path in here.iterdir() if path.suffix in {".png", ".svg", ".pdf"}} == figures
+    assert all((here / figure).stat().st_size > 5000 for figure in figures)
     if "--output" in words:
-        assert json.loads((folder / "out.json").read_text(encoding="utf-8")) == told
+        assert json.loads((here / "out.json").read_text(encoding="utf-8")) == told
     if "--markdown" in words:
         typed = told["command"] if name == "tracking" else f"tvist {words} --json"
-        assert f"```sh\n{typed}\n```" in (folder / "page.md").read_text(encoding="utf-8")
+        assert f"```sh\n{typed}\n```" in (here / "page.md").read_text(encoding="utf-8")
     if "--report" in words:
-        assert (folder / "report.html").read_text(encoding="utf-8").count("<img") == len(figures)
+        assert (here / "report.html").read_text(encoding="utf-8").count("<img") == len(figures)
 
 
 @pytest.mark.parametrize("words", SAID)
@@ -129,16 +207,6 @@ class TestEvaluate:
         assert set(told["delay_ms"]) == {"median", "max"}
         assert set(told["peak_acceleration_ratio"]) == {"median", "p90", "max"}
 
-    def test_random_moves_can_be_kept_and_made_again(self, ran):
-        first, folder = ran("evaluate")
-        again = ["--disturbances", "none", "--shaper", "auto", "--no-baselines", "--json"]
-        made = tvist("evaluate", "--moves", folder / "drawn.json", *again).assert_done().json
-        assert first["moves"] == made["moves"]
-        assert first["baselines"] == {}
-        for one in (first, made):
-            assert (one["plant"], one["disturbances"]) == ("clean", [])
-        assert 0.0 < first["free_of_collision"] <= 1.0
-
     def test_words_are_for_people_with_what_they_should_know(self, here):
         (here / "moves.json").write_text(json.dumps(MOVES[1:]), encoding="utf-8")
         said = tvist("evaluate", "--moves", "moves.json", "--payload", 5).assert_done()
@@ -167,41 +235,6 @@ class TestEvaluate:
         tvist("evaluate", "--moves", "moves.json").assert_failed(2, "move 2", "joint 3", "elbow", "6.28319")
 
 
-def test_a_path_has_the_keys_that_are_promised(ran):
-    told, _ = ran("paths")
-    (path,) = told["paths"]
-    assert (path["kind"], path["payload_kg"], told["plant"]) == ("arc", 5.0, "clean")
-    assert list(path["shaped"]) == ["zv", "auto"]
-    for ways in path["shaped"].values():
-        assert list(ways) == ["along", "joints", "joints_unslowed"]
-        assert ways["along"]["off_mm"] < ways["joints"]["off_mm"]
-        for one in ways.values():
-            assert one["peak_m_s2"] < path["unshaped_peak_m_s2"]
-            assert one["delay_ms"] > 0.0
-    assert set(told["summary"]) == {"all", "arc"}
-    assert {"refused", "stopping", "circle", "seed", "calibration"} <= set(told)
-
-
-def test_tracking_has_errors_of_each_shaper_at_each_speed_and_the_page_the_same(ran):
-    told, folder = ran("tracking")
-    assert told["speeds_rad_s"] == [0.5, 1.0]
-    assert [(one["name"], one["shaped"]) for one in told["shapers"]] == [("none", False), ("auto", True)]
-    page = (folder / "page.md").read_text(encoding="utf-8")
-    for one in told["shapers"]:
-        assert {"error_rad", "within", "speed_at_tolerance_rad_s", "lag_ms"} <= set(one["ramp"])
-        assert one["ramp"]["within"] == one["jump"]["within"] == [True, True]
-        assert one["ramp"]["error_rad"][1] > one["ramp"]["error_rad"][0] > 0.0
-        assert all(f"{error:.3f}" in page for error in one["jump"]["error_rad"])
-
-
-def test_a_map_is_of_one_arm_with_errors_of_each_quantity(ran):
-    told, _ = ran("map")
-    assert (told["robot"], told["payload_kg"], told["shaper"]) == ("ur5e", 1.0, "zvd")
-    for key, maps in told["maps"].items():
-        assert [len(maps[kind]) for kind in ("identified", "true", "error_percent")] == [5, 5, 5]
-        assert told["errors"][key]["median_percent"] < 10.0
-
-
 def test_shaperbench_names_a_cheat_and_does_not_rank_it(here):
     (here / "peeks.py").write_text(PEEKS, encoding="utf-8")
     given = [
@@ -223,33 +256,3 @@ def test_shaperbench_names_a_cheat_and_does_not_rank_it(here):
     assert json.loads((here / "board.json").read_text(encoding="utf-8")) == ended.json
     assert set(rows["zv"]["by_arm"]) == set(ended.json["arms"])
     assert len(ended.json["arms"]) == 10
-
-
-def test_every_shaper_is_listed_as_it_is(ran):
-    told, _ = ran("shapers")
-    assert (told["f_d_hz"], told["zeta"]) == (6.7, 0.34)
-    listed = {entry["name"]: entry for entry in told["shapers"]}
-    assert list(listed) == list(SHAPERS)
-    for name, entry in listed.items():
-        assert entry["zeta_max"] == SHAPERS[name].zeta_max
-        if SHAPERS[name].zeta_max <= 0.34:
-            assert "beyond it take" in entry["not_for_this_mode"]
-            continue
-        impulses = Impulses(np.array(entry["amplitudes"]), np.array(entry["times_s"]))
-        assert entry["duration_ms"] == pytest.approx(1000 * impulses.duration)
-        assert entry["mean_delay_ms"] == pytest.approx(1000 * impulses.mean_delay)
-        for percent in (5, 10):
-            for ratio in entry[f"band_{percent}_percent"] or []:
-                if ratio is not None:
-                    assert residual(6.7 * ratio, 0.34, impulses) == pytest.approx(percent / 100, rel=1e-3)
-
-
-def test_sensitivity_has_a_curve_of_each_shaper_and_its_band(ran):
-    told, _ = ran("sensitivity")
-    curves = {curve["name"]: curve for curve in told["shapers"]}
-    assert list(curves) == ["zv", "ei"]
-    for curve in curves.values():
-        low, high = curve["error_of_5_percent"]
-        for error, left in zip(told["error_percent"], curve["residual_percent"], strict=True):
-            assert left < 5.01 or not low < error < high
-    assert curves["zv"]["residual_percent"][200] == pytest.approx(0.0, abs=1e-9)

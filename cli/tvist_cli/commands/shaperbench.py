@@ -58,7 +58,7 @@ def shaperbench(
         report: File to write a web page with the verdict, the tables and the figures to.
         json: Print one JSON object.
     """
-    from tvist_lab.studies import curves, leaderboard
+    from tvist_lab.studies import leaderboard
     from tvist_lab.studies import shaperbench as bench
     from tvist_lab.study.arms import ARMS
 
@@ -75,8 +75,8 @@ def shaperbench(
     faults = [bench.inspect(one, description, drawn) for one in methods]
     sound = [one for one, fault in zip(methods, faults, strict=True) if fault is None]
     jobs = bench.jobs(description, sound, drawn, seed, quick=quick)
-    bends = curves.bends(description, sound, drawn)
-    work: Any = chain(bench.play(jobs), map(curves.bend, bends))
+    bends = bench.bends(description, sound, drawn)
+    work: Any = chain(bench.play(jobs), map(bench.bend, bends))
     found = gathered(work, len(jobs) + len(bends), "motions")
     rows, bent = chain.from_iterable(found[: len(jobs)]), zip(bends, found[len(jobs) :], strict=True)
     options = {"shaper": shaper, "against": against, "calibration": calibration, "quick": quick}
@@ -115,7 +115,7 @@ def _mine(shaper: str) -> "str | OwnShaper":
 
 
 def _page(result: dict[str, Any]) -> str:
-    from tvist_lab.studies.bench_tables import ON_PAGE, best_in_bold, ranked
+    from tvist_lab.studies.leaderboard import ON_PAGE, best_in_bold, ranked
     from tvist_lab.studies.pages import page
 
     more = {"ranked": ranked(result), "columns": ON_PAGE, "best_in_bold": best_in_bold}
@@ -136,7 +136,7 @@ def _web_page(result: dict[str, Any], drawn: Figures) -> "Page":
 
 
 def _print(result: dict[str, Any]) -> None:
-    from tvist_lab.studies.bench_tables import ON_TERMINAL, ranked
+    from tvist_lab.studies.leaderboard import ON_TERMINAL, ranked
 
     errors = len(result["payload_errors"])
     show(

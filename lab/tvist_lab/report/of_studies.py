@@ -6,8 +6,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from tvist_lab.report.page import Page, PageTable, Section, picture
-from tvist_lab.studies.bench_tables import IN_REPORT, ranked
 from tvist_lab.studies.evaluate import example
+from tvist_lab.studies.leaderboard import IN_REPORT, ranked
 from tvist_lab.study.measures import MEASURES
 from tvist_lab.study.study import Study
 from tvist_lab.study.tables import Shown, cells, titles

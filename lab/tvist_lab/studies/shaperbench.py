@@ -1,7 +1,8 @@
-"""ShaperBench: all methods on ten arms, with the same random moves, and payloads other than declared."""
+"""ShaperBench: all methods on ten arms with the same random moves and wrong payloads, and round corners."""
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from tvist_lab.runners import Runner, TaskError
 from tvist_lab.study.arms import ARMS
 from tvist_lab.study.case import Case
 from tvist_lab.study.engine import made
+from tvist_lab.study.line import round_a_corner
 from tvist_lab.study.method import Method, Stepping, Task
 from tvist_lab.study.moves import Move, draw_moves
 from tvist_lab.study.shaping import ShaperFaultError
@@ -30,6 +32,8 @@ PLACES = (0.15, 0.5, 0.8)
 """Positions after which the references differ, as shares of the motion [-]."""
 ELSEWHERE = 1.0
 """Acceleration with which the other reference deviates [rad/s²]."""
+CORNERS = 5
+"""Number of curved paths."""
 TWICE = "gives another output when the same reference is run again: it keeps something, or draws by chance"
 
 
@@ -136,3 +140,53 @@ def fault_of(row: Row) -> str | None:
     """Return what a method did wrong; None if it did not."""
     before, found, fault = str(row.get("error", "")).partition("the shaper ")
     return fault if found and not before else None
+
+
+@dataclass(frozen=True)
+class Bend:
+    """A curved path for one method."""
+
+    description: RobotDescription
+    method: Method
+    corner: tuple[Move, Move]
+    """Two moves; the second starts where the first ends."""
+
+
+def bends(description: RobotDescription, methods: Sequence[Method], moves: Sequence[Move]) -> list[Bend]:
+    """Pair each method that shapes references with a few moves, each continued to the start of the next one."""
+    paths = [
+        (first, replace(second, start=first.target, target=second.start, mass=first.mass))
+        for first, second in zip(moves[:CORNERS], [*moves[1:], moves[0]], strict=False)
+    ]
+    return [Bend(description, method, path) for method in methods if method.shapes for path in paths]
+
+
+def bend(job: Bend) -> float | None:
+    """Return a method's deviation from a curved path [rad]; None if it cannot be ranked."""
+    first, second = job.corner
+    start, corner, target = (np.array(q) for q in (first.start, first.target, second.target))
+    reference = round_a_corner(start, corner, target)
+    whole = Move(first.start, second.target, first.mass)
+    try:
+        return path_error(reference, job.method.shaped(Task(job.description, whole, reference)).q)
+    except ShaperFaultError:
+        return None
+
+
+def path_error(path: Floats, q: Floats) -> float:
+    """Largest distance of points from a path in joint space, regardless of time [rad].
+
+    Args:
+        path: Vertices of the path, shape (T, n) [rad].
+        q: Points, shape (T', n) [rad].
+    """
+    start, way = path[:-1], np.diff(path, axis=0)
+    moving = np.linalg.norm(way, axis=1) > 0.0
+    start, way = start[moving], way[moving]
+    square = np.sum(way**2, axis=1)
+    largest = 0.0
+    for point in q[::4]:
+        share = np.clip(np.sum((point - start) * way, axis=1) / square, 0.0, 1.0)
+        nearest = np.min(np.sum((start + share[:, None] * way - point) ** 2, axis=1))
+        largest = max(largest, float(nearest))
+    return math.sqrt(largest)
