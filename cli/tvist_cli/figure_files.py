@@ -1,5 +1,6 @@
 """Options about the files of figures, the same on every command that writes some."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -65,7 +66,7 @@ AS_USUAL = FigureOptions()
 """Nothing was asked for."""
 
 
-def write(files: "FigureFiles", figures: "dict[str, Figure]") -> None:
+def write(files: "FigureFiles", figures: "Mapping[str, Figure]") -> None:
     """Write figures and say the path of each.
 
     Args:

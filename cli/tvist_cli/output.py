@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import msgspec
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -18,6 +18,9 @@ from rich.text import Text
 
 from tvist_cli.failure import interrupted
 from tvist_protocol.errors import HARMFUL, harmless
+
+if TYPE_CHECKING:
+    from tvist_lab.report import Page
 
 WIDTH = 120
 """Number of columns when the output is not a terminal."""
@@ -138,3 +141,17 @@ def write_json(path: Path, result: dict[str, Any]) -> None:
         OSError: The file cannot be written.
     """
     path.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
+
+
+def write_report(path: Path, page: "Page") -> None:
+    """Write a web page, all of it or nothing, and say where it is.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    from tvist_lab.report import render
+    from tvist_lab.whole_file import whole_file
+
+    with whole_file(path) as stream:
+        stream.write(render(page).encode())
+    say(f"the report is in {path}")

@@ -1,15 +1,15 @@
 """What shapers leave of the vibration when the frequency is wrong."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import FigureOptions, write
-from tvist_cli.output import number, out, print_json, table, write_json
+from tvist_cli.output import number, out, table
 from tvist_cli.shapers_of import of_impulses
+from tvist_cli.studying import Figures, Places, give
 
 if TYPE_CHECKING:
+    from tvist_lab.recordings import Floats
     from tvist_shaping import Shaper
 
 STANDARD = ("zv", "zvd", "ei")
@@ -21,14 +21,7 @@ POINTS = 401
 
 
 def print_sensitivity(
-    shapers: Sequence[str],
-    zeta: float,
-    errors: tuple[float, float],
-    output: Path | None,
-    figures: Path | None,
-    look: FigureOptions,
-    *,
-    json: bool,
+    shapers: Sequence[str], zeta: float, errors: tuple[float, float], places: Places, *, json: bool
 ) -> None:
     """Compute and print the residual vibration of shapers for a mode whose frequency they assume wrongly.
 
@@ -36,9 +29,7 @@ def print_sensitivity(
         shapers: Names of the shapers, or FILE.py:NAME; if empty, those of the paper.
         zeta: Damping ratio of the mode, both assumed and true.
         errors: Lowest and highest percentage by which the assumed frequency is too high.
-        output: JSON file to write the curves to.
-        figures: Folder to write a figure of the curves to.
-        look: How to write the figures.
+        places: Where to write the curves, and a figure of them.
         json: Whether to print one JSON object.
     """
     import numpy as np
@@ -52,29 +43,33 @@ def print_sensitivity(
         raise Failure(
             f"errors is {low:g} {high:g}: must be two increasing percentages from -90 to 900", code=2
         )
-    chosen = {one.name: one for one in (of_impulses(name) for name in shapers or STANDARD)}
+    chosen = list({one.name: one for one in (of_impulses(name) for name in shapers or STANDARD)}.values())
     span = 0.01 * np.linspace(low, high, POINTS)
     curves: list[dict[str, Any]] = []
-    for shaper in chosen.values():
+    for shaper in chosen:
         with told(ShapingError, code=2):
             check_mode(1.0, zeta, shaper.zeta_max)
             left = residual_over_error(shaper, zeta, span)
             about = _about(shaper, zeta)
         curves.append({**about, "residual_percent": (100.0 * left).tolist()})
     result = {"zeta": zeta, "error_percent": (100.0 * span).tolist(), "shapers": curves}
-    with told(OSError):
-        if output is not None:
-            write_json(output, result)
-        if figures is not None:
-            from tvist_lab.figures import sensitivity_figure
+    places.write(result, draw=lambda: _figures(chosen, zeta, span))
+    give(result, lambda _: _print(chosen, zeta, curves), json=json)
 
-            drawn = sensitivity_figure(list(chosen.values()), zeta, span)
-            write(look.into(figures), {"sensitivity": drawn})
-    if json:
-        print_json(result)
-        return
+
+def _figures(shapers: "list[Shaper]", zeta: float, span: "Floats") -> Figures:
+    from tvist_lab.figures import sensitivity_figure
+
+    return {"sensitivity": sensitivity_figure(shapers, zeta, span)}
+
+
+def _print(shapers: "list[Shaper]", zeta: float, curves: list[dict[str, Any]]) -> None:
+    import numpy as np
+
+    from tvist_lab.frequency_error import residual_over_error
+
     rows = []
-    for shaper, curve in zip(chosen.values(), curves, strict=True):
+    for shaper, curve in zip(shapers, curves, strict=True):
         left = 100.0 * residual_over_error(shaper, zeta, np.array(TABLED))
         rows.append((
             shaper.name, number(curve["delay_periods"], 2), *(number(float(value), 1) for value in left),

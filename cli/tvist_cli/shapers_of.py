@@ -1,14 +1,28 @@
 """Load shapers that a command line names, or gives as FILE.py:NAME, and the calibrations that they need."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from tvist_cli.failure import Failure, told
 
 if TYPE_CHECKING:
     from tvist_controller.own_shapers import OwnShaper
+    from tvist_lab.study.method import Method
     from tvist_plant.description import RobotDescription
     from tvist_protocol.calibration import Calibration
     from tvist_shaping import Shaper
+
+
+@contextmanager
+def designing(code: int = 2) -> Iterator[None]:
+    """Tell why a shaper cannot be made of a calibration for an arm."""
+    from tvist_controller.refusal import RefusalError
+    from tvist_lab.study.recipes import RecipeError
+    from tvist_shaping.errors import ShapingError
+
+    with told(RecipeError, RefusalError, ShapingError, code=code):
+        yield
 
 
 def loaded(shaper: str) -> "tuple[str, tuple[OwnShaper, ...]]":
@@ -95,3 +109,51 @@ def calibration_for(
         calibration = load(default)
         found = modal_source(description, calibration) if several else None
         return calibration if found is None else found.calibration
+
+
+def calibration_of(name: str) -> "Calibration":
+    """Return the calibration of a name or a file.
+
+    Raises:
+        Failure: There is no such calibration.
+    """
+    from tvist_controller.calibrations import load
+    from tvist_protocol.calibration import CalibrationError
+
+    with told(CalibrationError, code=2):
+        return load(name)
+
+
+def modal_calibration(name: str) -> "Calibration":
+    """Return a calibration with a modal model.
+
+    Raises:
+        Failure: There is no such calibration, or it has no modal model.
+    """
+    known = calibration_of(name)
+    if known.modal is None:
+        raise Failure(
+            f"calibration {known.name} has no modal model: make one with tvist identify --model modal", code=2
+        )
+    return known
+
+
+def on_the_bench(
+    known: "Calibration", against: list[str] | None, mine: "str | OwnShaper | None" = None
+) -> "tuple[RobotDescription, list[Method]]":
+    """Return the arm of the bench, waiting, and the methods to compare; see `tvist_lab.study.catalogue.bench`.
+
+    Raises:
+        Failure: There is no shaper of a name.
+    """
+    from tvist_lab.study.catalogue import bench
+    from tvist_lab.study.menus import UNSHAPED, names
+    from tvist_plant.description import load
+
+    every = {UNSHAPED, *names("bench")}
+    for name in against or []:
+        if name not in every:
+            raise Failure(f"against is {name!r}: must be one of {', '.join(sorted(every))}", code=2)
+    description = load("ur5e")
+    with designing():
+        return description, bench(description, known, mine, against)

@@ -1,4 +1,4 @@
-"""Options about the simulated arm: its disturbances, the payloads that it carries, and what is drawn at random."""
+"""Options about the simulated arm: its disturbances, and the payloads that it carries."""
 
 import math
 from typing import TYPE_CHECKING
@@ -10,18 +10,6 @@ if TYPE_CHECKING:
 
 UNIFORM = "uniform"
 """Value of --payload that draws a payload for each motion, up to the arm's rating."""
-
-
-def check_count(name: str, count: int, most: int) -> None:
-    """Refuse a number of motions, the option `name`, that is not from 1 to `most`."""
-    if not 1 <= count <= most:
-        raise Failure(f"{name} is {count}: must be 1 to {most}", code=2)
-
-
-def check_seed(seed: int, bits: int = 62) -> None:
-    """Refuse a seed that is negative or has more bits."""
-    if not 0 <= seed < 2**bits:
-        raise Failure(f"seed is {seed}: must be at least 0 and less than 2^{bits}", code=2)
 
 
 def disturbed(

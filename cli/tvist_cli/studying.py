@@ -1,110 +1,145 @@
-"""Run a study whose rows are kept in a folder: its options, its progress, and what it took."""
+"""What the commands of studies share: they check numbers, work under a bar, and write and print a result."""
 
-import re
-import time
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import FigureOptions
-from tvist_cli.output import progress, say
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.output import print_json, progress, table, write_json, write_report
 
 if TYPE_CHECKING:
-    from tvist_lab.study.engine import Plan, Ran
+    from matplotlib.figure import Figure
 
-ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?([^\s:/\[\]]+|\[[\da-fA-F:.]+\]):\d{1,5}")
-"""Address of a scheduler."""
+    from tvist_lab.report import Page
+    from tvist_lab.study.tables import Entry, Shown
+
+One = TypeVar("One")
+
+Figures = Mapping[str, "Figure"]
+"""Figures by the names of their files, without suffix."""
 
 
-def folder_of(
-    file: Path, output: Path | None, processes: int | None, scheduler: str | None, look: FigureOptions
-) -> Path:
-    """Return the folder of a study's rows, after a check of the options.
+def check_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
+    """Refuse a number, the option `name`, that is not from `low` to `high`; `unit` follows numbers, as " %" does."""
+    if not low <= value <= high:
+        said = f"{value:g}" if isinstance(value, float) else f"{value}"
+        most = f"{high:g}" if isinstance(high, float) else f"{high}"
+        raise Failure(f"{name} is {said}{unit}: must be {low:g} to {most}{unit}", code=2)
+
+
+def check_seed(seed: int, bits: int = 62) -> None:
+    """Refuse a seed that is negative or has more bits."""
+    if not 0 <= seed < 2**bits:
+        raise Failure(f"seed is {seed}: must be at least 0 and less than 2^{bits}", code=2)
+
+
+def command(name: str, **options: object) -> str:
+    """Return the command that gives the same figures.
+
+    Args:
+        name: Its words before the options.
+        options: Options in the order in which they stand; those that are None or False are left out.
+    """
+    words = ["tvist", name]
+    for option, value in options.items():
+        if value is None or value is False:
+            continue
+        values = value if isinstance(value, list | tuple) else [] if value is True else [value]
+        words += [f"--{option}", *(f"{one:g}" if isinstance(one, float) else str(one) for one in values)]
+    return " ".join(words)
+
+
+def gathered(
+    results: Iterable[One],
+    total: int,
+    what: str,
+    *errors: type[Exception],
+    weigh: Callable[[One], int] = lambda _: 1,
+) -> list[One]:
+    """Return results, which a bar counts as they come.
+
+    Args:
+        results: The results.
+        total: Number of steps.
+        what: Name of the steps, in the plural.
+        errors: Errors of the work that are failures to tell.
+        weigh: Number of steps that a result stands for.
 
     Raises:
-        Failure: An option is invalid, or there is no name for the folder.
+        Failure: One of the errors occurred, or Control+C was pressed.
     """
-    if processes is not None and scheduler is not None:
-        raise Failure("give either --processes or --scheduler", code=2)
-    if processes is not None and not 1 <= processes <= 1024:
-        raise Failure(f"processes is {processes}: must be 1 to 1024", code=2)
-    if scheduler is not None and not ADDRESS.fullmatch(scheduler):
-        raise Failure(f"scheduler is {scheduler!r}: must be an address such as tcp://HOST:8786", code=2)
-    if output is None and not file.suffix:
-        raise Failure(f"{file} has no suffix to leave out: give a folder as --output", code=2)
-    folder = file.with_suffix("") if output is None else output
-    look.check(folder)
-    return folder
+    found = []
+    with told(*errors), progress(total, what) as bar:
+        for one in results:
+            found.append(one)
+            bar(weigh(one), None)
+    return found
 
 
-def run(plan: "Plan", folder: Path, processes: int | None, scheduler: str | None) -> "tuple[Ran, float]":
-    """Run what is missing of a study; return its rows, and the time that it took [s].
+@dataclass(frozen=True, kw_only=True)
+class Places:
+    """Where a command writes its result; None where it is not wanted."""
 
-    Raises:
-        Failure: The folder cannot be used, or the runner does not run.
-    """
-    from tvist_lab.runners.cluster import Cluster
-    from tvist_lab.study import engine
+    output: Path | None = None
+    """JSON file."""
+    markdown: Path | None = None
+    """Page of the documentation."""
+    figures: Path | None = None
+    """Folder of the figures."""
+    look: FigureOptions = AS_USUAL
+    """How to write them."""
+    report: Path | None = None
+    """Web page."""
 
-    began = time.monotonic()
-    with told(OSError), ExitStack() as stack:
-        kept = f"they are kept in {folder}, and the same command continues"
+    def check(self, *others: Path | None) -> None:
+        """Refuse what cannot be written, before anything is computed; `others` are further files."""
+        self.look.check(self.figures, self.output, self.markdown, self.report, *others)
 
-        def begin(missing: int) -> Any:
-            bar = stack.enter_context(progress(missing, "moves", kept))
-            return lambda done: bar(done, None)
+    def write(
+        self,
+        result: dict[str, Any],
+        *,
+        page: Callable[[], str] | None = None,
+        draw: Callable[[], Figures] | None = None,
+        web_page: "Callable[[Figures], Page] | None" = None,
+    ) -> None:
+        """Write a result to all places.
 
-        ran = engine.run(plan, folder, Cluster(scheduler, processes), begin)
-    return ran, time.monotonic() - began
+        Args:
+            result: What --json prints.
+            page: Makes the page of the documentation.
+            draw: Draws the figures.
+            web_page: Makes the web page around the figures.
 
-
-def about(ran: "Ran", elapsed: float, folder: Path) -> dict[str, Any]:
-    """Return what every study prints with --json about its rows and its run."""
-    from tvist_lab.study.store import ROWS
-    from tvist_lab.study.work import FAILED, TOO_WEAK
-
-    rows, effort = ran.rows, ran.effort
-    return {
-        "rows_file": str(folder / ROWS),
-        "rows": len(rows),
-        "failed": int((rows["status"] == FAILED).sum()),
-        "too_weak": int((rows["status"] == TOO_WEAK).sum()),
-        "tasks_done_before": ran.resumed,
-        "run": {
-            "tasks": effort.tasks,
-            "workers": effort.workers,
-            "elapsed_s": elapsed,
-            "task_s": effort.task_s,
-            "scheduling_and_transfer_percent": effort.overhead_percent,
-        },
-    }
-
-
-def say_effort(result: dict[str, Any]) -> None:
-    """Say what a run took, if it did anything."""
-    from tvist_lab.words import counted
-
-    run = result["run"]
-    if run["tasks"]:
-        say(
-            f"{counted(run['tasks'], 'move')} took {run['elapsed_s']:.0f} s, {run['workers']} at once; scheduling and "
-            f"transfer took {run['scheduling_and_transfer_percent']:.1f} % of the tasks' own time"
-        )
+        Raises:
+            Failure: A file cannot be written.
+        """
+        with told(OSError):
+            if self.output is not None:
+                write_json(self.output, result)
+            if self.markdown is not None and page is not None:
+                self.markdown.write_text(page(), encoding="utf-8")
+            if draw is None or self.figures is self.report is None:
+                return
+            drawn = draw()
+            if self.figures is not None:
+                write(self.look.into(self.figures), drawn)
+            if self.report is not None and web_page is not None:
+                write_report(self.report, web_page(drawn))
 
 
-def tell_failed(result: dict[str, Any], folder: Path) -> None:
-    """Say how many rows were not measured.
+def give(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, json: bool) -> None:
+    """Print a result as one JSON object, or in words."""
+    if json:
+        print_json(result)
+    else:
+        say_it(result)
 
-    Raises:
-        Failure: Some failed.
-    """
-    if result["too_weak"]:
-        say(
-            f"{result['too_weak']} of {result['rows']} rows were left out: the drives are too weak for their moves"
-        )
-    if result["failed"]:
-        raise Failure(
-            f"{result['failed']} of {result['rows']} rows failed; their column error in {folder} says why, and the "
-            "same command tries them again"
-        )
+
+def show(title: str, entries: "Iterable[Entry]", columns: "Sequence[Shown]") -> None:
+    """Print a table of nested results."""
+    from tvist_lab.study.tables import cells, titles
+
+    table(title, titles(columns), cells(entries, columns))

@@ -12,7 +12,7 @@ with app.setup:
     from tvist_controller.api.line import estimator_of, load_calibration
     from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, note, panels, title
     from tvist_lab.studies.paper.published import pose
-    from tvist_lab.study.catalogue import names
+    from tvist_lab.study.menus import names
     from tvist_lab.workspace import identified, ranges
     from tvist_plant.description import load
     from tvist_shaping import residual, shaper

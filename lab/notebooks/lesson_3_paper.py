@@ -12,8 +12,8 @@ with app.setup:
     from tvist_lab.figures.style import INK, SHAPED, THIRD, UNSHAPED, legend, panels
     from tvist_lab.in_process import free_setup, robot_in_process
     from tvist_lab.metrics import amplitude, best_tool_acceleration, motions
+    from tvist_lab.studies.paper import methods as ways
     from tvist_lab.studies.paper.experiment import judge, run, table_1
-    from tvist_lab.studies.paper.methods import FixedShaper, TimeVarying, Unshaped
     from tvist_lab.studies.paper.published import MOTIONS, published
     from tvist_shaping import residual, zv
 
@@ -52,8 +52,8 @@ async def make(motion, seed):
     async with robot_in_process(free_setup(seed=seed)) as robot, robot.control("lesson") as arm:
         modes = await table_1(robot, arm)
         start = modes[MOTIONS[motion][0]]
-        fixed = FixedShaper("zv", start["f_d_hz"], start["zeta"], name="fixed", label="fixed ZV")
-        methods = {"unshaped": Unshaped(), "fixed ZV": fixed, "TVIST": TimeVarying()}
+        fixed = ways.fixed("zv", start["f_d_hz"], start["zeta"])
+        methods = {"unshaped": ways.UNSHAPED, "fixed ZV": fixed, "TVIST": ways.SHAPED}
         return modes, {
             name: await run(robot, arm, motion, method, seed=1000 * seed) for name, method in methods.items()
         }

@@ -14,7 +14,7 @@ with app.setup:
     from tvist_controller.api.line import OwnShaper, load_calibration
     from tvist_lab.figures.style import INK, SHAPED, THIRD, UNSHAPED, legend, panels
     from tvist_lab.study.case import Case
-    from tvist_lab.study.catalogue import names
+    from tvist_lab.study.menus import names
     from tvist_lab.study.method import Named
     from tvist_lab.study.moves import draw_moves
     from tvist_lab.study.recipes import Recipe

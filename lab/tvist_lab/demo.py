@@ -16,7 +16,7 @@ from tvist_lab.recordings.mcap_file import RecordingFile, read
 from tvist_lab.replay import replay_file
 from tvist_lab.served import served_robot
 from tvist_lab.studies.paper.experiment import Experiment, judge, run, table_1
-from tvist_lab.studies.paper.methods import TimeVarying, Unshaped
+from tvist_lab.studies.paper.methods import SHAPED, UNSHAPED
 from tvist_lab.studies.paper.published import MOTIONS
 from tvist_lab.studies.paper.report import as_dict
 
@@ -99,7 +99,7 @@ async def _run(
         table = await table_1(robot, arm)
         done = Experiment(info=await robot.info(), seed=seed, runs=1, table_1=table)
         for motion in MOTIONS:
-            for method in (Unshaped(), TimeVarying()):
+            for method in (UNSHAPED, SHAPED):
                 live[motion, method.name] = await run(robot, arm, motion, method, seed=1000 * seed)
                 done.labels[method.name] = method.label
                 progress(f"{motion} {method.name}")

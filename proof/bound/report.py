@@ -10,8 +10,8 @@ from proof.bound.least_time import MODES, bound
 from tvist_controller.api.line import body, load_calibration, paper_payload
 from tvist_lab.runners import Processes, in_order
 from tvist_lab.study.case import Case
-from tvist_lab.study.catalogue import names
 from tvist_lab.study.line import PAPER
+from tvist_lab.study.menus import names
 from tvist_lab.study.method import Named
 from tvist_lab.study.moves import Move, draw_moves
 from tvist_lab.study.recipes import Recipe

@@ -5,8 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tvist_controller import calibrations
 from tvist_lab.metrics import motions
 from tvist_lab.recordings import STATE_COLUMNS, Recording
+from tvist_plant.description import load
 
 PERIOD = 0.002
 JOINTS = 6
@@ -15,6 +17,16 @@ JOINTS = 6
 def straight_step(ticks, start, stop, stroke):
     """A joint that goes at constant speed: its first and last moving ticks are exact."""
     return stroke * np.clip((np.arange(ticks) - start) / (stop - start), 0.0, 1.0)
+
+
+@pytest.fixture(scope="session")
+def ur5e():
+    return load("ur5e")
+
+
+@pytest.fixture(scope="session")
+def modal():
+    return calibrations.load("ur5e_modal")
 
 
 @pytest.fixture(scope="session")

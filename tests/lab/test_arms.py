@@ -8,9 +8,8 @@ from tests.conformance.served import finished
 
 from tvist_controller.calibrations import available
 from tvist_controller.calibrations import load as load_calibration
-from tvist_lab.studies.arms.about import about
+from tvist_lab.studies.arms.about import about, robots_page
 from tvist_lab.studies.arms.measure import sag_error
-from tvist_lab.studies.arms.page import robots_page
 from tvist_plant.description import load, robots
 from tvist_plant.fingerprint import fingerprint
 

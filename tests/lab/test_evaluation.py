@@ -8,17 +8,13 @@ import pytest
 
 from tvist_controller import calibrations
 from tvist_controller.collision import CollisionModel
-from tvist_controller.cycle import ControlCycle
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import body, paper_payload
-from tvist_controller.trajectory import JointLine, quickest_motion
-from tvist_lab.studies.evaluate import MEASURED, interval, methods, report
+from tvist_lab.studies.evaluate import interval, jobs, report
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import baselines
-from tvist_lab.study.engine import made
 from tvist_lab.study.line import (
     PAPER,
-    ControlLine,
     lengthened,
     point_to_point,
     round_a_corner,
@@ -27,21 +23,14 @@ from tvist_lab.study.measures import WORTH
 from tvist_lab.study.method import Named, Task
 from tvist_lab.study.moves import Move, MovesError, draw_moves, is_free, read_moves, write_moves
 from tvist_lab.study.recipes import Mistaken, Recipe, RecipeError
-from tvist_lab.study.shaping import Running, shape
-from tvist_lab.study.work import Job, measure
-from tvist_plant.description import load
-from tvist_plant.flexible_arm import FlexibleArm
+from tvist_lab.study.shaping import shape
+from tvist_lab.study.work import measure
 from tvist_plant.plant import PERIOD
 from tvist_shaping.estimators.fixed import Fixed
 
 
 @pytest.fixture(scope="module")
-def ur5e():
-    return load("ur5e")
-
-
-@pytest.fixture(scope="module")
-def paper(ur5e):
+def paper():
     return calibrations.load("ur5e_5kg")
 
 
@@ -155,27 +144,6 @@ class TestDraws:
 
 
 class TestLine:
-    def test_shaping_first_is_to_the_bit_what_the_line_does(self, ur5e, paper, move):
-        start, target = np.array(move.start), np.array(move.target)
-        carried = body(paper_payload(ur5e, 5.0))
-        recipe = Recipe("zv", paper)
-        cycle = ControlCycle(ur5e, recipe.make(ur5e, 5.0), q=start, declared=carried, carried=carried, seed=3)
-        for _ in range(4):
-            cycle.step()
-        cycle.begin(quickest_motion(JointLine(start, target), PAPER, PERIOD))
-        felt = []
-        while not cycle.mode.at_rest:
-            cycle.step()
-            felt.append(cycle.line.plant.truth().specific_force)
-        tvist = recipe.make(ur5e, 5.0)
-        tvist.reset(start)
-        reference = point_to_point(start, target)
-        shaped = shape(Running(tvist), reference, watched=False)
-        assert shaped.ended
-        line = ControlLine(ur5e, start, carried)
-        recording = line.follow(reference, shaped.q).simulate(FlexibleArm(ur5e, carried), 3)
-        np.testing.assert_array_equal(recording["truth_tool_acceleration"][4 : 4 + len(felt)], felt)
-
     def test_a_longer_double_S_takes_the_time_it_is_told(self, move):
         start, target = np.array(move.start), np.array(move.target)
         for ticks in (len(point_to_point(start, target)) + extra for extra in (0, 7, 40, 150)):
@@ -257,8 +225,8 @@ class TestReport:
 class TestMoves:
     def test_the_papers_motion_is_what_the_paper_page_says(self, ur5e, paper, move):
         recipe = Recipe("zv", paper)
-        every = methods(Named(recipe, "zv"), baselines(recipe, ur5e, (5.0, 5.0)))
-        shaped, waiting, longer, *others = measure(Job(Case(ur5e, move), every, MEASURED))
+        (job,) = jobs(ur5e, [move], 0, Named(recipe, "zv"), baselines(recipe, ur5e, (5.0, 5.0)))
+        shaped, waiting, longer, *others = measure(job)
         assert shaped["reduction_percent"] > 80.0
         assert 28.0 <= shaped["delay_ms"] <= 38.0  # half a period at Q3, where the mode is at 15 Hz
         assert waiting["reduction_percent"] == waiting["delay_ms"] == 0.0
@@ -274,11 +242,3 @@ class TestMoves:
         task = Task(ur5e, move, reference, as_served=True, ticks=len(reference) + 20)
         for baseline in baselines(recipe, ur5e, (5.0, 5.0)):
             np.testing.assert_allclose(baseline.shaped(task).q[-1], move.target, atol=1e-9)
-
-    def test_other_processes_give_the_same_figures(self, ur5e, paper):
-        zv = (Named(Recipe("zv", paper), "zv"),)
-        jobs = [
-            Job(Case(ur5e, move, number), zv)
-            for number, move in enumerate(draw_moves(ur5e, 17, 2, (5.0, 5.0)).moves)
-        ]
-        assert list(made(jobs)) == [measure(job) for job in jobs]

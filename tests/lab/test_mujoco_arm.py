@@ -10,7 +10,7 @@ from tvist_client.transports.loopback import LoopbackTransport
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.setup import body
 from tvist_lab.in_process import free_setup
-from tvist_plant.description import Payload, load
+from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PlantError
@@ -27,11 +27,6 @@ def mujoco_arm():
     from tvist_lab.mujoco_arm import MujocoArm
 
     return MujocoArm
-
-
-@pytest.fixture(scope="module")
-def ur5e():
-    return load("ur5e")
 
 
 @pytest.fixture

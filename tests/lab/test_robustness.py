@@ -11,13 +11,7 @@ from tvist_lab.study.arms import stiffer
 from tvist_lab.study.catalogue import bench
 from tvist_lab.study.moves import Move
 from tvist_lab.study.work import measure
-from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm
-
-
-@pytest.fixture(scope="module")
-def ur5e():
-    return load("ur5e")
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from tests.lab.runner_work import OddError, die, die_once, function_of, square, square_or_raise
 
+from tvist_controller.calibrations import load as load_calibration
 from tvist_lab.runners import Failed, Processes, TaskError, in_order
 from tvist_lab.runners.cluster import Cluster
 from tvist_lab.runners.parcels import do, pack, unpack
@@ -16,7 +17,6 @@ from tvist_lab.study.method import Named
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.work import Job, measure
-from tvist_plant.description import load
 
 ROOT = str(Path(__file__).parents[2])
 LOCAL = [Processes(few=2, chunk=3), Cluster(processes=2)]
@@ -40,12 +40,13 @@ class TestOrder:
         with pytest.raises(KeyError, match="task 7"):
             next(results)
 
-    def test_evaluations_do_not_depend_on_what_runs_them(self):
-        ur5e = load("ur5e")
-        moves = draw_moves(ur5e, 2, 1, (0.0, 5.0)).moves
-        none = (Named(Recipe("none", None), "none"),)
-        jobs = [Job(Case(ur5e, move, seed), none) for seed, move in enumerate(moves)]
-        assert list(made(jobs, Backwards())) == [measure(job) for job in jobs]
+    def test_evaluations_do_not_depend_on_what_runs_them(self, ur5e):
+        moves = draw_moves(ur5e, 17, 1, (0.0, 5.0)).moves  # enough for other processes
+        zv = (Named(Recipe("zv", load_calibration("ur5e_5kg")), "zv"),)
+        jobs = [Job(Case(ur5e, move, seed), zv) for seed, move in enumerate(moves)]
+        here = [measure(job) for job in jobs]
+        assert list(made(jobs)) == here
+        assert list(made(jobs[:2], Backwards())) == here[:2]
 
 
 class TestParcels:

@@ -5,8 +5,7 @@ import pytest
 
 from tvist_controller.calibrations import load as load_calibration
 from tvist_lab.study.line import PAPER
-from tvist_lab.study.ranges import longest_mean_delay
-from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.recipes import Recipe, longest_mean_delay
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
 from tvist_shaping.steady import ProductDesign, SteadyFilter

@@ -13,19 +13,18 @@ from polars.testing import assert_frame_equal
 from tvist_controller import calibrations
 from tvist_lab.figures import study_figure
 from tvist_lab.runners import Failed, Processes, TaskError
+from tvist_lab.studies.sweep.spec import Spec, SpecError, read_spec
+from tvist_lab.studies.sweep.sweep import COLUMNS, SCHEMA, Axes, SweptRobot, setting_name, summary
 from tvist_lab.study.arms import scattered
-from tvist_lab.study.axes import Axes, SweptRobot
 from tvist_lab.study.case import Case, arm_seed
-from tvist_lab.study.columns import COLUMNS, SCHEMA, frame
+from tvist_lab.study.columns import frame
 from tvist_lab.study.engine import Done, Effort
 from tvist_lab.study.engine import run as run_plan
 from tvist_lab.study.method import Named
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe
-from tvist_lab.study.spec import Spec, SpecError, read_spec
 from tvist_lab.study.store import Store, StoreError
 from tvist_lab.study.study import StudyError, read_study
-from tvist_lab.study.summary import setting_name, summary
 from tvist_lab.study.work import Job, failed, measure, measure_each
 from tvist_plant.description import load
 

@@ -7,9 +7,20 @@ import pytest
 from proof.search.subject import RigidArm
 
 from tvist_lab.studies.tracking.following import BEFORE, LOOKAHEAD, TrackingError, follow
-from tvist_lab.studies.tracking.report import columns, page_of, report, rows
-from tvist_lab.studies.tracking.study import UNSHAPED, Tracked, TrackingJob, compare, refusal, speed_at, track
+from tvist_lab.studies.tracking.study import (
+    UNSHAPED,
+    TrackingJob,
+    columns,
+    compare,
+    page_of,
+    refusal,
+    report,
+    speed_at,
+    track,
+    within,
+)
 from tvist_lab.studies.tracking.ways import CONSTANT, RAMP, WAYS, jump, level_end, ramp, turn
+from tvist_lab.study.tables import cells, titles
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 
@@ -23,7 +34,8 @@ def ramp_of(shaper, speed=1.0):
 
 
 def tracked(error, speed=1.0, shaper=UNSHAPED, way="ramp"):
-    return Tracked(shaper, way, speed, error, LAG if way == "ramp" else None, 0.0)
+    row = {"shaper": shaper, "way": way, "speed_rad_s": speed, "error_rad": error}
+    return row | {"lag_ms": 1e3 * LAG, "mean_delay_ms": 0.0} if way == "ramp" else row
 
 
 @pytest.fixture(scope="module")
@@ -64,19 +76,19 @@ class TestWays:
 
 class TestLag:
     def test_without_a_shaper_it_is_that_of_servoj(self, unshaped):
-        assert unshaped.lag == pytest.approx(LAG, abs=2e-4)
-        assert unshaped.mean_delay == 0.0
+        assert unshaped["lag_ms"] == pytest.approx(1e3 * LAG, abs=0.2)
+        assert unshaped["mean_delay_ms"] == 0.0
 
     def test_the_error_is_lag_times_speed(self, unshaped):
-        assert unshaped.error == pytest.approx(LAG, rel=0.01)
-        assert ramp_of(UNSHAPED, 2.0).error == pytest.approx(2.0 * LAG, rel=0.01)
+        assert unshaped["error_rad"] == pytest.approx(LAG, rel=0.01)
+        assert ramp_of(UNSHAPED, 2.0)["error_rad"] == pytest.approx(2.0 * LAG, rel=0.01)
 
     @pytest.mark.parametrize("shaper", ["zv", "zvd", "auto"])
     def test_a_shaper_adds_its_mean_delay(self, unshaped, shaper):
         found = ramp_of(shaper)
-        assert found.mean_delay > 0.01
-        assert found.lag - unshaped.lag == pytest.approx(found.mean_delay, abs=2e-4)
-        assert found.error > unshaped.error
+        assert found["mean_delay_ms"] > 10.0
+        assert found["lag_ms"] - unshaped["lag_ms"] == pytest.approx(found["mean_delay_ms"], abs=0.2)
+        assert found["error_rad"] > unshaped["error_rad"]
 
     def test_without_shape_servo_every_shaper_is_bypassed(self):
         wanted = ramp(START, 1.0)
@@ -97,14 +109,14 @@ class TestLag:
 class TestDriversTest:
     def test_from_the_start_posture_its_motion_is_inside_its_tolerance(self):
         found = track(TrackingJob(UNSHAPED, 0.0, "turn", 2.0))
-        assert found.error > 2.0 * LAG
-        assert found.within(0.2)
+        assert found["error_rad"] > 2.0 * LAG
+        assert within(found, 0.2)
 
     def test_the_stretched_arm_falls_further_behind_than_the_lag(self):
         found = track(TrackingJob(UNSHAPED, 0.0, "jump", 2.0))
-        assert found.lag is None
-        assert found.error > 3.0 * LAG * 2.0
-        assert not found.within(0.2)
+        assert "lag_ms" not in found
+        assert found["error_rad"] > 3.0 * LAG * 2.0
+        assert not within(found, 0.2)
 
     def test_a_robot_that_stops_is_reported(self):
         setup = TrackingJob(UNSHAPED, 0.0, "ramp", 1.0).setup()
@@ -118,8 +130,8 @@ class TestDriversTest:
 
 class TestTolerance:
     def test_an_error_equal_to_it_is_within(self):
-        assert tracked(0.2).within(0.2)
-        assert not tracked(0.2 + 1e-12).within(0.2)
+        assert within(tracked(0.2), 0.2)
+        assert not within(tracked(0.2 + 1e-12), 0.2)
 
     def test_the_speed_at_which_it_is_used_up_is_interpolated(self):
         group = [tracked(0.1, 1.0), tracked(0.3, 2.0), tracked(0.5, 3.0)]
@@ -133,7 +145,10 @@ class TestReport:
     def test_results_do_not_depend_on_the_order_of_the_shapers(self):
         names = [UNSHAPED, "zv", "mzv"]
         one, other = (
-            {made.shaper: made for made in compare([TrackingJob(name, 1.0, "ramp", 0.5) for name in order])}
+            {
+                made["shaper"]: made
+                for made in compare([TrackingJob(name, 1.0, "ramp", 0.5) for name in order])
+            }
             for order in (names, names[::-1])
         )
         assert one == other
@@ -156,13 +171,13 @@ class TestReport:
             "speeds_rad_s": [1.0, 2.0], "lookahead_s": 0.03, "gain": 2000.0, "step_s": PERIOD,
             "refused": {"um_zv": "zeta_max is too large"}, "shapers": report(made, 0.2),
         }  # fmt: skip
-        found = {way: rows(result, way) for way in WAYS}
-        assert found["jump"] == [
-            ["not shaped", "0.050", "0.100", "> 2 rad/s"],
-            ["zv", "0.120", "**0.240**", "1.67 rad/s"],
+        assert cells(result["shapers"], columns(result, "jump", "*")) == [
+            ("not shaped", "0.050", "0.100", "> 2 rad/s"),
+            ("zv", "0.120", "*0.240*", "1.67 rad/s"),
         ]
-        assert found["ramp"][1] == ["zv", "0.0", "34.0", "0.120", "**0.240**", "1.67 rad/s"]
-        assert {len(row) for row in found["ramp"]} == {len(columns(result, "ramp"))}
+        ramps = columns(result, "ramp", "**")
+        assert titles(ramps) == ("shaper", "mean delay ms", "lag ms", "1 rad/s", "2 rad/s", "0.2 rad at")
+        assert cells(result["shapers"], ramps)[1] == ("zv", "0.0", "34.0", "0.120", "**0.240**", "1.67 rad/s")
         text = page_of(result)
         assert "tvist study tracking --shapers zv --speeds 1 2" in text
         assert "`um_zv`: zeta_max is too large" in text

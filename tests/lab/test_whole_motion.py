@@ -15,7 +15,6 @@ from tvist_lab.study.line import PAPER, REST, ControlLine, point_to_point
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.shaping import Running, shape
-from tvist_plant.description import load
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, PlantError, played
@@ -25,11 +24,6 @@ RESTING = 4
 """Ticks at rest before the motion."""
 LEFT_OUT = {"auto-target", "planned", "ei2_exact", "ei3_exact"}
 """Filters that are told where a motion ends, and shapers for less damping than that of the arm."""
-
-
-@pytest.fixture(scope="module")
-def ur5e():
-    return load("ur5e")
 
 
 def by_ticks(description, recipe, move, seed):

@@ -13,11 +13,6 @@ from tvist_shaping import SHAPERS
 
 
 @pytest.fixture(scope="module")
-def ur5e():
-    return load("ur5e")
-
-
-@pytest.fixture(scope="module")
 def found(ur5e):
     return workspace_map(ur5e, load_calibration("ur5e_5kg"), SHAPERS["zv"], 5.0, 5)
 

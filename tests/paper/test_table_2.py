@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tvist_lab.metrics import motions
-from tvist_lab.studies.paper.markdown import page_of
 from tvist_lab.studies.paper.published import MOTIONS, published
 from tvist_lab.studies.paper.report import as_dict
+from tvist_lab.studies.paper.tables import page_of
 
 LEAST_REDUCTION = {"Q1-Q2": 83.0, "Q1-Q3": 76.0, "Q3-Q1": 78.0}
 

@@ -23,7 +23,7 @@ from tvist_lab.recordings import Recording
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.served import served
 from tvist_lab.studies.paper.experiment import run
-from tvist_lab.studies.paper.methods import TimeVarying, Unshaped
+from tvist_lab.studies.paper.methods import SHAPED, UNSHAPED
 from tvist_lab.studies.paper.published import MOTIONS
 
 EXAMPLE = Path(__file__).parents[2] / "clients/examples/02_realtime_log.py"
@@ -73,7 +73,7 @@ async def experiment(options, host, log):
         try:
             assert b"logging" in await logger.stdout.readline()
             for motion in MOTIONS:
-                for method in (Unshaped(), TimeVarying()):
+                for method in (UNSHAPED, SHAPED):
                     await run(server.robot, arm, motion, method, seed=7)
                     await arm.reset(q=ELSEWHERE)
                     await server.robot.advance(5)

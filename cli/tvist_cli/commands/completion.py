@@ -41,6 +41,7 @@ def _option_values() -> dict[str, _Values]:
     from typing import get_args
 
     from tvist_controller.own_plants import installed_plants
+    from tvist_lab.study.menus import UNSHAPED, names
     from tvist_plant.description import robots
     from tvist_server.profiles import ProfileName
     from tvist_shaping import BUILT_IN, SHAPERS
@@ -52,6 +53,7 @@ def _option_values() -> dict[str, _Values]:
         "shaper": shaper,
         "shapers": shaper,
         "sensitivity": _Values(tuple(SHAPERS), "py"),
+        "against": _Values((UNSHAPED, *names("bench"))),
         "plant": _Values(tuple(installed_plants()), "py"),
         "profile": _Values(get_args(ProfileName)),
     }

@@ -1,30 +1,29 @@
 """`tvist evaluate`: run any moves unshaped and shaped, and compare."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from tvist_cli.evaluated import print_evaluation
 from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import print_json, progress, typed
-from tvist_cli.report_file import write_report
-from tvist_cli.shapers_of import calibration_for, loaded
-from tvist_cli.simulated_arm import check_count, check_seed, disturbed, masses_of, named
+from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.output import number, out, say, typed
+from tvist_cli.shapers_of import calibration_for, designing, loaded
+from tvist_cli.simulated_arm import disturbed, masses_of, named
+from tvist_cli.studying import Figures, Places, check_range, check_seed, gathered, give, show
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tvist_controller.own_shapers import OwnShaper
-    from tvist_lab.figures import FigureFiles
+    from tvist_lab.report import Page
     from tvist_lab.studies.evaluate import Rows
-    from tvist_lab.study.case import Case
     from tvist_lab.study.method import Method
     from tvist_lab.study.moves import Move
+    from tvist_lab.study.recipes import Recipe
     from tvist_lab.study.work import Job
     from tvist_plant.description import RobotDescription
-    from tvist_protocol.calibration import Calibration
+
+LISTED = 12
+"""Largest number of moves that are printed one by one."""
 
 
 def evaluate(
@@ -91,18 +90,18 @@ def evaluate(
         report: File to write a web page with the verdict, the tables and the figures to.
         json: Print one JSON object.
     """
-    from tvist_lab.studies.evaluate import MEASURED, methods
-    from tvist_lab.studies.evaluate import notes as notes_of
+    from tvist_lab.studies.evaluate import feasible, jobs, notes
     from tvist_lab.studies.evaluate import report as summary
-    from tvist_lab.study.case import arm_seed
+    from tvist_lab.study.case import LIMITS
     from tvist_lab.study.moves import collisions, write_moves
-    from tvist_lab.study.work import Job
+    from tvist_lab.study.recipes import Recipe
     from tvist_plant.description import DescriptionError, load
 
-    look.check(figures, save_moves, report)
-    _check(moves, random, seed, modes, frequency_error, wrists=wrists)
-    _check_conditions(limits, payload_error, stiffness_error)
-    length = _stroke(stroke, moves)
+    places = Places(figures=figures, look=look, report=report)
+    places.check(save_moves)
+    if (moves is None) == (random is None):
+        raise Failure("give either --moves FILE or --random N", code=2)
+    _check(seed, modes, frequency_error, limits, payload_error, stiffness_error)
     if streams and save_moves is not None:
         raise Failure("--save-moves writes moves, but --streams follows streams: leave one out", code=2)
     with told(DescriptionError, code=2):
@@ -110,27 +109,35 @@ def evaluate(
     masses = masses_of(payload, description)
     shaper, own = loaded(shaper)
     known = calibration_for(calibration, shaper, own, modes, description)
-    chosen, share = _moves(moves, random, seed, masses, description, length, wrists=wrists)
+    if moves is not None:
+        chosen, share = _read(moves, seed, masses, description, wrists=wrists, stroke=stroke), None
+    else:
+        chosen, share = _drawn(random or 0, seed, masses, description, wrists=wrists, stroke=stroke)
     plant, kept = disturbed(description, disturbances, clean=clean)
     wanted = len(chosen)
     if not streams:
-        chosen = _feasible(chosen, description, limits)
-    mine, others = _methods(shaper, own, modes, known, plant, frequency_error, masses, baselines=baselines)
+        chosen = feasible(chosen, description, LIMITS[limits])
+        if not chosen:
+            raise Failure("the drives are too weak for all of these moves at these limits", code=2)
+    recipe = Recipe(shaper, known, 0.01 * frequency_error, modes, own)
+    mine, others = _methods(recipe, plant, masses, baselines=baselines)
     if streams:  # the end of a stream is not known
         others = [one for one in others if not one.told_target]
-    conditions = (limits, payload_error, stiffness_error)
-    jobs = [
-        Job(
-            _case(plant, move, arm_seed(seed, place), *conditions, stream=streams),
-            methods(mine, others),
-            MEASURED,
-        )
-        for place, move in enumerate(chosen)
-    ]
-    with told(OSError):
-        if save_moves is not None:
+    todo = jobs(
+        plant,
+        chosen,
+        seed,
+        mine,
+        others,
+        limits=LIMITS[limits],
+        payload_error=0.01 * payload_error,
+        stiffness_error=0.01 * stiffness_error,
+        streams=streams,
+    )
+    if save_moves is not None:
+        with told(OSError):
             write_moves(save_moves, chosen)
-        judged = _judged(jobs, shaper)
+    judged = _judged(todo, shaper)
     met = collisions(description, chosen) if moves is not None and not streams else []
     result = {
         "shaper": shaper,
@@ -145,184 +152,136 @@ def evaluate(
         "free_of_collision": share,
         **summary(judged),
     }
-    result["notes"] = notes_of(result, met, known, chosen, share, wanted)
+    result["notes"] = notes(result, met, known, chosen, share, wanted)
     if baselines and not others:
         result["notes"].append("there are no baselines: they need a calibration of this arm")
-    if figures is not None or report is not None:
-        _show(result, _drawn(jobs, judged), None if figures is None else look.into(figures), report)
-    if json:
-        print_json(result)
-    else:
-        print_evaluation(result)
-
-
-def _judged(jobs: list["Job"], shaper: str) -> "list[Rows]":
-    """The rows of each move.
-
-    Raises:
-        Failure: The shaper's function fails.
-    """
-    from tvist_lab.study.engine import made
-    from tvist_lab.study.shaping import ShaperFaultError
-
-    judged: list[Rows] = []
-    with progress(sum(job.motions for job in jobs), "motions") as bar:
-        try:
-            for rows in made(jobs):
-                judged.append(rows)
-                bar(len(rows), None)
-        except ShaperFaultError as fault:
-            raise Failure(f"shaper {shaper} {fault}") from fault
-    return judged
+    places.write(
+        result, draw=lambda: _figures(result, todo, judged), web_page=lambda drawn: _web_page(result, drawn)
+    )
+    give(result, _print, json=json)
 
 
 def _check(
-    moves: Path | None, random: int | None, seed: int, modes: int, frequency_error: float, *, wrists: bool
+    seed: int, modes: int, frequency_error: float, limits: str, payload_error: float, stiffness_error: float
 ) -> None:
-    if (moves is None) == (random is None):
-        raise Failure("give either --moves FILE or --random N", code=2)
-    if wrists and moves is not None:
-        raise Failure("--wrists needs --random: it does not change the moves of a file", code=2)
-    if random is not None:
-        check_count("random", random, 100_000)
-    check_seed(seed, bits=63)
-    if not 1 <= modes <= 6:
-        raise Failure(f"modes is {modes}: must be 1 to 6", code=2)
-    if not -90.0 <= frequency_error <= 900.0:
-        raise Failure(f"frequency-error is {frequency_error:g} %: must be -90 to 900 %", code=2)
-
-
-def _check_conditions(limits: str, payload_error: float, stiffness_error: float) -> None:
     from tvist_lab.study.case import LIMITS
 
+    check_seed(seed, bits=63)
+    check_range("modes", modes, 1, 6)
+    check_range("frequency-error", frequency_error, -90.0, 900.0, " %")
     if limits not in LIMITS:
         raise Failure(f"limits is {limits!r}: must be {' or '.join(LIMITS)}", code=2)
-    if not -100.0 <= payload_error <= 900.0:
-        raise Failure(f"payload-error is {payload_error:g} %: must be -100 to 900 %", code=2)
-    if not 0.0 <= stiffness_error <= 90.0:
-        raise Failure(f"stiffness-error is {stiffness_error:g} %: must be 0 to 90 %", code=2)
-
-
-def _case(
-    plant: "RobotDescription",
-    move: "Move",
-    seed: int,
-    limits: str,
-    payload_error: float,
-    stiffness_error: float,
-    *,
-    stream: bool,
-) -> "Case":
-    from tvist_lab.study.arms import scattered
-    from tvist_lab.study.case import LIMITS, Case
-
-    arms, axes = (scattered(0.01 * stiffness_error),), {"payload_kg": move.mass}
-    return Case(plant, move, seed, arms, LIMITS[limits], 0.01 * payload_error, stream, axes)
-
-
-def _stroke(stroke: tuple[float, float] | None, moves: Path | None) -> tuple[float, float]:
-    from tvist_lab.study.moves import STROKE
-
-    if stroke is None:
-        return STROKE
-    if moves is not None:
-        raise Failure("--stroke needs --random: it does not change the moves of a file", code=2)
-    low, high = stroke
-    if not 0.001 <= low <= high <= 1.0:
-        raise Failure(f"stroke is {low:g} {high:g}: must be two increasing shares of 0.001 to 1", code=2)
-    return stroke
-
-
-def _feasible(moves: list["Move"], description: "RobotDescription", limits: str) -> list["Move"]:
-    """Return the moves for which the drives are strong enough.
-
-    Raises:
-        Failure: There are none.
-    """
-    from tvist_lab.study.case import LIMITS, Case
-
-    found = [move for move in moves if Case(description, move, limits=LIMITS[limits]).torque_share <= 1.0]
-    if not found:
-        raise Failure("the drives are too weak for all of these moves at these limits", code=2)
-    return found
-
-
-def _moves(
-    path: Path | None,
-    count: int | None,
-    seed: int,
-    masses: tuple[float, float],
-    description: "RobotDescription",
-    stroke: tuple[float, float],
-    *,
-    wrists: bool,
-) -> tuple[list["Move"], float | None]:
-    """The moves, and the share of draws that were free of collision."""
-    import numpy as np
-
-    from tvist_lab.study.moves import MovesError, draw_moves, read_moves
-
-    with told(MovesError, code=2):
-        if path is not None:
-            drawn_masses = np.random.default_rng(seed)
-            return read_moves(path, description, lambda: float(drawn_masses.uniform(*masses))), None
-        assert count is not None
-        drawn = draw_moves(description, count, seed, masses, wrists=wrists, stroke=stroke)
-    return drawn.moves, drawn.share
+    check_range("payload-error", payload_error, -100.0, 900.0, " %")
+    check_range("stiffness-error", stiffness_error, 0.0, 90.0, " %")
 
 
 def _methods(
-    shaper: str,
-    own: "tuple[OwnShaper, ...]",
-    modes: int,
-    known: "Calibration | None",
-    description: "RobotDescription",
-    frequency_error: float,
-    masses: tuple[float, float],
-    *,
-    baselines: bool,
+    recipe: "Recipe", description: "RobotDescription", masses: tuple[float, float], *, baselines: bool
 ) -> "tuple[Method, list[Method]]":
-    """The shaper, tried out, and the baselines."""
-    from tvist_controller.refusal import RefusalError
+    """The shaper, tried out, and the baselines; without a calibration of the arm, none can be designed for it."""
     from tvist_lab.study.catalogue import baselines as every
     from tvist_lab.study.method import Named
-    from tvist_lab.study.recipes import Recipe, RecipeError
-    from tvist_shaping.errors import ShapingError
 
-    recipe = Recipe(shaper, known, 0.01 * frequency_error, modes, own)
-    with told(RecipeError, RefusalError, ShapingError, code=2):
+    with designing():
         recipe.elastic(description, recipe.make(description, masses[1]))
-        # Without a calibration of the arm, no baseline can be designed for it.
-        others = every(recipe, description, masses) if baselines and known is not None else []
-        return Named(recipe, shaper), others
+        others = every(recipe, description, masses) if baselines and recipe.calibration else []
+    return Named(recipe, recipe.shaper), others
 
 
-def _show(
-    result: dict[str, Any],
-    drawn: dict[str, tuple["Figure", str]],
-    files: "FigureFiles | None",
-    report: Path | None,
-) -> None:
-    with told(OSError):
-        if files is not None:
-            write(files, {name: figure for name, (figure, _) in drawn.items()})
-        if report is not None:
-            from tvist_lab.report import evaluation_page
+def _judged(jobs: list["Job"], shaper: str) -> "list[Rows]":
+    """The rows of each move."""
+    from tvist_lab.study.engine import made
+    from tvist_lab.study.shaping import ShaperFaultError
 
-            pictures = {caption: figure for figure, caption in drawn.values()}
-            write_report(report, evaluation_page(result, pictures, typed()))
+    try:
+        return gathered(made(jobs), sum(job.motions for job in jobs), "motions", weigh=len)
+    except ShaperFaultError as fault:
+        raise Failure(f"shaper {shaper} {fault}") from fault
 
 
-def _drawn(jobs: list["Job"], judged: list["Rows"]) -> dict[str, tuple["Figure", str]]:
-    """Figures by the names of their files, each with a caption."""
+def _read(
+    path: Path,
+    seed: int,
+    masses: tuple[float, float],
+    description: "RobotDescription",
+    *,
+    wrists: bool,
+    stroke: tuple[float, float] | None,
+) -> list["Move"]:
+    """The moves of a file, to which options about random moves do not apply."""
+    import numpy as np
+
+    from tvist_lab.study.moves import MovesError, read_moves
+
+    for name, given in (("wrists", wrists), ("stroke", stroke is not None)):
+        if given:
+            raise Failure(f"--{name} needs --random: it does not change the moves of a file", code=2)
+    drawn = np.random.default_rng(seed)
+    with told(MovesError, code=2):
+        return read_moves(path, description, lambda: float(drawn.uniform(*masses)))
+
+
+def _drawn(
+    count: int,
+    seed: int,
+    masses: tuple[float, float],
+    description: "RobotDescription",
+    *,
+    wrists: bool,
+    stroke: tuple[float, float] | None,
+) -> tuple[list["Move"], float]:
+    """Random moves, and the share of draws that were free of collision."""
+    from tvist_lab.study.moves import STROKE, MovesError, draw_moves
+
+    check_range("random", count, 1, 100_000)
+    low, high = stroke or STROKE
+    if not 0.001 <= low <= high <= 1.0:
+        raise Failure(f"stroke is {low:g} {high:g}: must be two increasing shares of 0.001 to 1", code=2)
+    with told(MovesError, code=2):
+        drawn = draw_moves(description, count, seed, masses, wrists=wrists, stroke=(low, high))
+    return drawn.moves, drawn.share
+
+
+def _figures(result: dict[str, Any], jobs: list["Job"], judged: "Sequence[Rows]") -> Figures:
     from tvist_lab.figures import residual_by_move_figure, vibration_figure
     from tvist_lab.studies.evaluate import example
     from tvist_lab.study.work import record
 
-    middle = example(judged)
-    every = residual_by_move_figure([rows[0] for rows in judged])
-    one = vibration_figure(*record(jobs[middle]), middle + 1)
+    middle = example(result["moves"])
     return {
-        "moves": (every, "Vibration after each move, unshaped and shaped."),
-        "one_move": (one, f"Move {middle + 1}, which vibrates like the median of all moves."),
+        "moves": residual_by_move_figure([rows[0] for rows in judged]),
+        "one_move": vibration_figure(*record(jobs[middle]), middle + 1),
     }
+
+
+def _web_page(result: dict[str, Any], drawn: Figures) -> "Page":
+    from tvist_lab.report import evaluation_page
+
+    return evaluation_page(result, drawn, typed())
+
+
+def _print(result: dict[str, Any]) -> None:
+    from tvist_lab.studies.evaluate import MOVES, WAYS
+
+    if len(result["moves"]) <= LISTED:
+        moves = [{"place": place, **move} for place, move in enumerate(result["moves"], 1)]
+        show(f"moves with shaper {result['shaper']}", moves, MOVES)
+    ways = {result["shaper"]: result, **result["baselines"]}
+    entries = [{"name": name, **way} for name, way in ways.items()]
+    show(f"{result['counted']} moves, arm {result['plant']}", entries, WAYS)
+    median, p5 = (result["reduction_percent_interval"][name] for name in ("median", "p5"))
+    if median is not None:
+        out.print(
+            f"95 % intervals (bootstrap): median {median[0]:.1f} to {median[1]:.1f} %, p5 {p5[0]:.1f} to {p5[1]:.1f} %"
+        )
+        peaks = [(name, way["peak_m_s2"]) for name, way in list(ways.items())[:2]]
+        said = (f"{name} {number(peak['median'])} (p95 {number(peak['p95'])})" for name, peak in peaks)
+        out.print(f"peaks in m/s², median: {', '.join(said)}")
+    quiet = ", ".join(
+        f"{name} {number(way['quiet_after_unshaped_stop_ms']['median'], 0)}" for name, way in ways.items()
+    )
+    out.print(f"still at 0.02 m/s² after, in ms, median: {quiet}")
+    out.print("¹ last time |α| exceeds 0.1 m/s², median, from the stop of the unshaped reference")
+    out.print("² less than an unshaped arm that waits equally long still vibrates")
+    for note in result["notes"]:
+        say(note)

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import print_json, progress, typed
+from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.output import progress, typed
 from tvist_cli.serving import compile_if_new
+from tvist_cli.studying import Figures, Places, give
 from tvist_cli.tables import print_paper
 
 if TYPE_CHECKING:
@@ -39,12 +40,14 @@ def paper(
         markdown: File to write a page to, with all tables and the source of each figure.
         json: Print one JSON object.
     """
-    look.check(figures, markdown)
+    places = Places(markdown=markdown, figures=figures, look=look)
+    places.check()
     if runs < 1:
         raise Failure(f"runs is {runs}: must be at least 1", code=2)
     from tvist_lab.in_process import free_setup, robot_in_process
     from tvist_lab.studies.paper.experiment import count, experiment
     from tvist_lab.studies.paper.report import as_dict
+    from tvist_lab.studies.paper.tables import page_of
     from tvist_server.config import ConfigError
 
     with told(ConfigError, code=2):
@@ -61,16 +64,12 @@ def paper(
             bar(1, what)
 
         done = asyncio.run(run())
-    if figures is not None:
-        from tvist_lab.paper_drawing import draw
-
-        write(look.into(figures), draw(done, all_figures=True))
     result = as_dict(done)
-    if markdown is not None:
-        from tvist_lab.studies.paper.markdown import page_of
+    places.write(result, page=lambda: page_of(result, typed()), draw=lambda: _figures(done))
+    give(result, print_paper, json=json)
 
-        markdown.write_text(page_of(result, typed()), encoding="utf-8")
-    if json:
-        print_json(result)
-    else:
-        print_paper(result)
+
+def _figures(done: "Experiment") -> Figures:
+    from tvist_lab.paper_drawing import draw
+
+    return draw(done, all_figures=True)

@@ -1,15 +1,13 @@
 """`tvist robots`: the arms that there are, what is known of them, and how well their vibration is suppressed."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import number, out, print_json, progress, table, typed, words
-from tvist_cli.simulated_arm import check_count, check_seed
+from tvist_cli.output import out, progress, table, typed, words
+from tvist_cli.studying import Places, check_range, check_seed, give, show
 
 if TYPE_CHECKING:
-    from tvist_lab.studies.arms.measure import Measured
     from tvist_plant.description import RobotDescription
 
 VARIED = 50.0
@@ -40,13 +38,12 @@ def robots(
         markdown: File to write a page with the tables to.
         json: Print one JSON object.
     """
-    from tvist_lab.studies.arms.about import about
+    from tvist_lab.studies.arms.about import about, robots_page
     from tvist_plant.description import DescriptionError, load
     from tvist_plant.description import robots as shipped
 
-    check_count("random", random, 10_000)
-    if not 0.0 <= vary <= VARIED:
-        raise Failure(f"vary is {vary:g}: must be 0 to {VARIED:g} %", code=2)
+    check_range("random", random, 1, 10_000)
+    check_range("vary", vary, 0.0, VARIED, " %")
     check_seed(seed)
     if vary and not measure:
         raise Failure("vary needs --measure: it changes nothing in a list", code=2)
@@ -55,15 +52,9 @@ def robots(
     listed = [about(name, description) for name, description in arms.items()]
     for one in listed if measure else ():
         one["measured"] = _measured(one["name"], arms[one["name"]], one, random, vary, seed)
-    if markdown is not None:
-        from tvist_lab.studies.arms.page import robots_page
-
-        with told(OSError):
-            markdown.write_text(robots_page(listed, typed()), encoding="utf-8")
-    if json:
-        print_json({"robots": listed})
-        return
-    _print(listed, in_full=bool(robot))
+    result = {"robots": listed}
+    Places(markdown=markdown).write(result, page=lambda: robots_page(listed, typed()))
+    give(result, lambda _: _print(listed, in_full=bool(robot)), json=json)
 
 
 def _measured(
@@ -77,79 +68,40 @@ def _measured(
     if description.joints < ALONE:
         return []
     calibration = next((one for one in map(load, known["calibrations"]) if one.modal is not None), None)
-    found: list[Measured] = []
     factors = [1.0, *([1.0 - 0.01 * vary, 1.0 + 0.01 * vary] if vary else [])]
     with told(IdentificationError), progress(len(factors) * moves, f"moves of {name}") as bar:
-        for factor in factors:
-            own = calibration if factor == 1.0 else None
-            found.append(
-                measure(
-                    description,
-                    own,
-                    stiffness=factor,
-                    moves=moves,
-                    seed=seed,
-                    progress=lambda n: bar(n, None),
-                )
+        return [
+            measure(
+                description,
+                calibration if factor == 1.0 else None,
+                stiffness=factor,
+                moves=moves,
+                seed=seed,
+                progress=lambda made: bar(made, None),
             )
-    return [asdict(one) for one in found]
+            for factor in factors
+        ]
 
 
 def _print(listed: list[dict[str, Any]], *, in_full: bool) -> None:
-    table(
-        "arms",
-        ("name", "model", "joints", "length m", "payload kg", "springs and drives", "calibrations"),
-        [
-            (
-                one["name"],
-                one["model"],
-                str(len(one["joints"])),
-                number(one["length_m"], 2),
-                f"{one['payload_kg']:g}",
-                next((kind for kind, told in one["origins"].items() if "drives" in told), "not told"),
-                ", ".join(one["calibrations"]) or "–",
-            )
-            for one in listed
-        ],
-    )
+    from tvist_lab.studies.arms.about import LISTED, RESULTS
+
+    show("arms", listed, LISTED)
     for one in listed if in_full else ():
         out.print(one["name"], style="bold", markup=False)
-        words(
-            {
-                f"{key}": f"{kind}: {told}"
-                for kind, keys in one["origins"].items()
-                for key, told in keys.items()
-            }
-        )
+        origins = one["origins"].items()
+        words({key: f"{kind}: {told}" for kind, keys in origins for key, told in keys.items()})
+        columns = ("torque_n_m", "velocity_rad_s", "gear_stiffness_n_m_rad")
         table(
             "joints",
             ("joint", "torque N m", "velocity rad/s", "gear stiffness N m/rad"),
             [
                 (name, f"{torque:g}", f"{velocity:.3g}", f"{stiffness:g}")
                 for name, torque, velocity, stiffness in zip(
-                    one["joints"],
-                    one["torque_n_m"],
-                    one["velocity_rad_s"],
-                    one["gear_stiffness_n_m_rad"],
-                    strict=True,
+                    one["joints"], *(one[key] for key in columns), strict=True
                 )
             ],
         )
-    rows = [(one["name"], found) for one in listed for found in one.get("measured", ())]
-    if rows:
-        table(
-            "measured",
-            (
-                "name", "springs", "calibration", "f_d off % 1, 2, 3", "moves", "less % median", "p5", "delay ms",
-                "sag off %",
-            ),
-            [
-                (
-                    name, f"× {found['stiffness']:g}", found["calibration"],
-                    ", ".join(number(value, 1) for value in found["f_d_error_percent"]), str(found["counted"]),
-                    *(number(found["reduction_percent"][key], 1) for key in ("median", "p5")),
-                    number(found["delay_ms"], 0), number(found["sag_error_percent"], 2),
-                )
-                for name, found in rows
-            ],
-        )  # fmt: skip
+    measured = [{"name": one["name"], **found} for one in listed for found in one.get("measured", ())]
+    if measured:
+        show("measured", measured, RESULTS)

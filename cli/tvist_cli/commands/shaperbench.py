@@ -1,29 +1,24 @@
 """`tvist shaperbench`: rank shapers, your own included, on ten simulated arms."""
 
 from datetime import UTC, datetime
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import out, print_json, progress, say, table, typed, write_json
-from tvist_cli.report_file import write_report
-from tvist_cli.shapers_of import load_given
-from tvist_cli.simulated_arm import check_count, check_seed
+from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.output import out, say, typed
+from tvist_cli.shapers_of import load_given, modal_calibration, on_the_bench
+from tvist_cli.studying import Figures, Places, check_range, check_seed, command, gathered, give, show
 
 if TYPE_CHECKING:
     from tvist_controller.own_shapers import OwnShaper
-    from tvist_lab.study.method import Method
-    from tvist_lab.study.work import Row
-    from tvist_protocol.calibration import Calibration
+    from tvist_lab.report import Page
 
-MOVES = 100
-QUICK = 3
-"""Number of moves with --quick."""
-CALIBRATION = "ur5e_modal"
-"""Calibration of the bench's arm, unless another one is named."""
+MOVES, QUICK = 100, 3
+"""Number of moves, and that with --quick."""
 
 
 def shaperbench(
@@ -63,74 +58,49 @@ def shaperbench(
         report: File to write a web page with the verdict, the tables and the figures to.
         json: Print one JSON object.
     """
-    from tvist_lab.studies import curves, leaderboard
+    from tvist_lab.studies import leaderboard
     from tvist_lab.studies import shaperbench as bench
     from tvist_lab.study.arms import ARMS
-    from tvist_plant.description import load
 
-    look.check(figures, output, markdown, report)
+    places = Places(output=output, markdown=markdown, figures=figures, look=look, report=report)
+    places.check()
     count = moves if moves is not None else QUICK if quick else MOVES
-    check_count("moves", count, 10_000)
+    check_range("moves", count, 1, 10_000)
     check_seed(seed)
-    description = load("ur5e")
-    known = modal_calibration(calibration)
+    known = modal_calibration(calibration or bench.CALIBRATION)
     against = None if against is None else [name.lower() for name in against]
     mine = None if shaper is None else _mine(shaper)
-    methods = methods_of(mine, against, known)
+    description, methods = on_the_bench(known, against, mine)
     drawn = bench.draw(description, count, seed)
     faults = [bench.inspect(one, description, drawn) for one in methods]
     sound = [one for one, fault in zip(methods, faults, strict=True) if fault is None]
-    jobs, bends = (
-        bench.jobs(description, sound, drawn, seed, quick=quick),
-        curves.bends(description, sound, drawn),
-    )
-    done: list[Row] = []
-    bent = []
-    with progress(len(jobs) + len(bends), "motions") as bar:
-        for rows in bench.play(jobs):
-            done += rows
-            bar(1, None)
-        for path in bends:
-            bent.append((path, curves.bend(path)))
-            bar(1, None)
+    jobs = bench.jobs(description, sound, drawn, seed, quick=quick)
+    bends = bench.bends(description, sound, drawn)
+    work: Any = chain(bench.play(jobs), map(bench.bend, bends))
+    found = gathered(work, len(jobs) + len(bends), "motions")
+    rows, bent = chain.from_iterable(found[: len(jobs)]), zip(bends, found[len(jobs) :], strict=True)
+    options = {"shaper": shaper, "against": against, "calibration": calibration, "quick": quick}
     result = {
         "date": datetime.now(UTC).date().isoformat(),
-        "command": _command(shaper, against, count, seed, calibration, quick=quick),
+        "command": command("shaperbench", **options, moves=count, seed=seed),
         "moves": count,
         "seed": seed,
         "payload_errors": list(bench.PAYLOAD_ERRORS),
         "arms": {arm.name: arm.label for arm in ARMS},
         "calibration": known.name,
-        **leaderboard.leaderboard(methods, faults, done, bent),
+        **leaderboard.leaderboard(methods, faults, list(rows), list(bent)),
     }
-    _write(result, output, markdown)
-    _show(result, figures, look, report)
-    if json:
-        print_json(result)
-    else:
-        _print(result)
+    places.write(
+        result,
+        page=lambda: _page(result),
+        draw=lambda: _figures(result),
+        web_page=lambda drawn: _web_page(result, drawn),
+    )
+    give(result, _print, json=json)
     place = getattr(mine, "place", shaper)
     unranked = next((row for row in result["shapers"] if row["label"] == place and not row["ranked"]), None)
     if unranked is not None:
         raise Failure(f"shaper {shaper} is not ranked: it {unranked['fault']}")
-
-
-def modal_calibration(name: str | None) -> "Calibration":
-    """Return a calibration with a modal model, by default that of the UR5e.
-
-    Raises:
-        Failure: There is no such calibration, or it has no modal model.
-    """
-    from tvist_controller.calibrations import load
-    from tvist_protocol.calibration import CalibrationError
-
-    with told(CalibrationError, code=2):
-        known = load(CALIBRATION if name is None else name)
-    if known.modal is None:
-        raise Failure(
-            f"calibration {known.name} has no modal model: make one with tvist identify --model modal", code=2
-        )
-    return known
 
 
 def _mine(shaper: str) -> "str | OwnShaper":
@@ -144,86 +114,36 @@ def _mine(shaper: str) -> "str | OwnShaper":
     return shaper
 
 
-def methods_of(
-    mine: "str | OwnShaper | None", against: list[str] | None, known: "Calibration"
-) -> "list[Method]":
-    """Return waiting and the methods to compare; see `tvist_lab.study.catalogue.bench`.
+def _page(result: dict[str, Any]) -> str:
+    from tvist_lab.studies.leaderboard import ON_PAGE, best_in_bold, ranked
+    from tvist_lab.studies.pages import page
 
-    Raises:
-        Failure: There is no shaper of a name.
-    """
-    from tvist_lab.study.catalogue import UNSHAPED, bench, names
-    from tvist_lab.study.recipes import RecipeError
-    from tvist_plant.description import load
-
-    every = {UNSHAPED, *names("bench")}
-    for name in against or []:
-        if name not in every:
-            raise Failure(f"against is {name!r}: must be one of {', '.join(sorted(every))}", code=2)
-    with told(RecipeError, code=2):
-        return bench(load("ur5e"), known, mine, against)
+    more = {"ranked": ranked(result), "columns": ON_PAGE, "best_in_bold": best_in_bold}
+    return page("shaperbench", result, typed(), **more)
 
 
-def _command(
-    shaper: str | None,
-    against: list[str] | None,
-    count: int,
-    seed: int,
-    calibration: str | None,
-    *,
-    quick: bool,
-) -> str:
-    words = ["tvist shaperbench"]
-    words += [] if shaper is None else [f"--shaper {shaper}"]
-    words += [] if against is None else ["--against", *against]
-    words += [] if calibration is None else [f"--calibration {calibration}"]
-    words += ["--quick"] if quick else []
-    return " ".join([*words, f"--moves {count} --seed {seed}"])
-
-
-def _write(
-    result: dict[str, Any],
-    output: Path | None,
-    markdown: Path | None,
-) -> None:
-    with told(OSError):
-        if output is not None:
-            write_json(output, result)
-        if markdown is not None:
-            from tvist_lab.studies.bench_tables import ON_PAGE, best_in_bold, ranked
-            from tvist_lab.studies.pages import page
-
-            more = {"ranked": ranked(result), "columns": ON_PAGE, "best_in_bold": best_in_bold}
-            markdown.write_text(page("shaperbench", result, typed(), **more), encoding="utf-8")
-
-
-def _show(result: dict[str, Any], figures: Path | None, look: FigureOptions, report: Path | None) -> None:
-    if figures is None and report is None:
-        return
+def _figures(result: dict[str, Any]) -> Figures:
     from tvist_lab.figures import pareto_figure, settling_figure
+
+    shapers = result["shapers"]
+    return {"pareto": pareto_figure(shapers), "settling_measured": settling_figure(shapers)}
+
+
+def _web_page(result: dict[str, Any], drawn: Figures) -> "Page":
     from tvist_lab.report import shaperbench_page
 
-    pareto, settling = pareto_figure(result["shapers"]), settling_figure(result["shapers"])
-    if figures is not None:
-        write(look.into(figures), {"pareto": pareto, "settling_measured": settling})
-    if report is not None:
-        captions = {
-            "Settling time against residual vibration.": pareto,
-            "Settling time against delay.": settling,
-        }
-        write_report(report, shaperbench_page(result, captions))
+    return shaperbench_page(result, drawn)
 
 
 def _print(result: dict[str, Any]) -> None:
-    from tvist_lab.studies.bench_tables import ON_TERMINAL, ranked
-    from tvist_lab.study.tables import cells, titles
+    from tvist_lab.studies.leaderboard import ON_TERMINAL, ranked
 
     errors = len(result["payload_errors"])
-    table(
+    show(
         f"{result['moves']} moves on {len(result['arms'])} arms with {errors} payload errors; "
         "* keeps the limits, and no other shaper that keeps them is better in both still and ring",
-        titles(ON_TERMINAL),
-        cells(ranked(result), ON_TERMINAL),
+        ranked(result),
+        ON_TERMINAL,
     )
     out.print(
         "still: last time |α| exceeds 0.1 m/s², from the stop of the unshaped reference, median and p90;\n"

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import out, print_json, table
+from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.output import out, table
 from tvist_cli.sensitivity import print_sensitivity
 from tvist_cli.shapers_of import load_given
+from tvist_cli.studying import Figures, Places, give
 
 if TYPE_CHECKING:
     from tvist_shaping import Impulses
@@ -53,7 +54,8 @@ def shapers(
         look: How to write the figures.
         json: Print one JSON object.
     """
-    look.check(figures, output)
+    places = Places(output=output, figures=figures, look=look)
+    places.check()
     if sensitivity is None and (output is not None or errors != ERRORS):
         raise Failure("--errors and --output are for --sensitivity: give it, or leave them out", code=2)
     if sensitivity is not None:
@@ -61,66 +63,69 @@ def shapers(
             raise Failure("--sensitivity is relative to any frequency: leave --f-d out", code=2)
         if shaper:
             raise Failure("--sensitivity names its shapers itself: leave --shaper out", code=2)
-        print_sensitivity(sensitivity, zeta, errors, output, figures, look, json=json)
+        print_sensitivity(sensitivity, zeta, errors, places, json=json)
         return
-    from tvist_shaping import BUILT_IN, SHAPERS, Registry, Shaper, ShapingError
+    from tvist_shaping import BUILT_IN, SHAPERS, Registry, ShapingError
     from tvist_shaping.named import OF_SEVERAL_MODES
 
     with told(ShapingError, code=2):
         SHAPERS["none"].function(f_d, zeta)
-    with told(ShapingError, code=2):
         own = Registry(load_given(place).shaper for place in shaper or []).own
     listed: list[AnyShaper] = [*SHAPERS.values(), *own.values()]
+    others = [
+        {
+            "name": name,
+            "description": description,
+            "modes": BUILT_IN.modes_of(name),
+            "feed_forward": BUILT_IN.feed_forward_of(name),
+        }
+        for name, description in OF_SEVERAL_MODES.items()
+    ]
     found = [_about(one, f_d, zeta) for one in listed]
-    if figures is not None:
-        from tvist_lab.figures import (
-            catalogue_figure,
-            elastic_figure,
-            mean_delay_figure,
-            settling_against_delay_figure,
-        )
+    result = {"f_d_hz": f_d, "zeta": zeta, "shapers": found, "for_calibrated_arms": others}
+    places.write(result, draw=lambda: _figures(listed, f_d, zeta))
+    give(result, _print, json=json)
 
-        with told(OSError):
-            of_impulses = [one for one in listed if isinstance(one, Shaper)]
-            write(
-                look.into(figures),
-                {
-                    "shapers": catalogue_figure(of_impulses, zeta),
-                    "mean_delay": mean_delay_figure(),
-                    "elastic": elastic_figure(),
-                    "settling": settling_against_delay_figure(of_impulses, f_d, zeta),
-                },
-            )
-    if json:
-        others = [
-            {
-                "name": name,
-                "description": description,
-                "modes": BUILT_IN.modes_of(name),
-                "feed_forward": BUILT_IN.feed_forward_of(name),
-            }
-            for name, description in OF_SEVERAL_MODES.items()
-        ]
-        print_json({"f_d_hz": f_d, "zeta": zeta, "shapers": found, "for_calibrated_arms": others})
-        return
-    table(
-        f"input shapers for a mode of {f_d:g} Hz, ζ = {zeta:g}",
-        ("shaper", "impulses", "ms", "mean ms", "5 % band", "10 % band", "ζ below", "peak"),
-        [_row(about) for about in found],
+
+def _figures(listed: "list[AnyShaper]", f_d: float, zeta: float) -> Figures:
+    from tvist_lab.figures import (
+        catalogue_figure,
+        elastic_figure,
+        mean_delay_figure,
+        settling_against_delay_figure,
     )
-    width = max(len(one.name) for one in listed)
-    for one in listed:
-        out.print(f"{one.name:{width}}  {one.description}", markup=False)
+    from tvist_shaping import Shaper
+
+    of_impulses = [one for one in listed if isinstance(one, Shaper)]
+    return {
+        "shapers": catalogue_figure(of_impulses, zeta),
+        "mean_delay": mean_delay_figure(),
+        "elastic": elastic_figure(),
+        "settling": settling_against_delay_figure(of_impulses, f_d, zeta),
+    }
+
+
+def _print(result: dict[str, Any]) -> None:
+    table(
+        f"input shapers for a mode of {result['f_d_hz']:g} Hz, ζ = {result['zeta']:g}",
+        ("shaper", "impulses", "ms", "mean ms", "5 % band", "10 % band", "ζ below", "peak"),
+        [_row(about) for about in result["shapers"]],
+    )
+    _list(result["shapers"])
     out.print("\nfor arms with a modal calibration, whose modes and springs they know:", markup=False)
-    width = max(map(len, OF_SEVERAL_MODES))
-    for name, description in OF_SEVERAL_MODES.items():
-        out.print(f"{name:{width}}  {description}", markup=False)
+    _list(result["for_calibrated_arms"])
     out.print(
         "\nms: how much later a motion ends; mean ms: delay during motion at constant velocity;\n"
         "band: ratios of true to assumed frequency for which at most that much vibration remains;\n"
         "ζ below: largest damping ratio it supports; peak: largest factor on the reference's acceleration",
         markup=False,
     )
+
+
+def _list(entries: list[dict[str, Any]]) -> None:
+    width = max(len(one["name"]) for one in entries)
+    for one in entries:
+        out.print(f"{one['name']:{width}}  {one['description']}", markup=False)
 
 
 def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:

@@ -62,7 +62,7 @@ def path_shaping_figure(paths: Sequence[dict[str, Any]]) -> Figure:
     """Draw boxes of the vibration after the stop and during the motion, and of the distance from the path.
 
     Args:
-        paths: The paths of a report, see `tvist_lab.studies.path_report.report`.
+        paths: The paths of a report, see `tvist_lab.studies.paths.report`.
     """
     figure, panes = panels(3, 8.4)
     counted = [one for one in paths if one["unshaped_peak_m_s2"] >= WORTH]

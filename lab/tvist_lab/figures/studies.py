@@ -72,7 +72,7 @@ def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> 
     """Draw the median of the reduction with a line down to its 5th percentile, and the median of the delay.
 
     Args:
-        entries: Entries of `tvist_lab.study.summary.summary`.
+        entries: Entries of `tvist_lab.studies.sweep.sweep.summary`.
         settings: Name of the setting of each entry.
     """
     names = list(dict.fromkeys(settings))

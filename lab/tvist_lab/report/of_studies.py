@@ -6,7 +6,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from tvist_lab.report.page import Page, PageTable, Section, picture
-from tvist_lab.studies.bench_tables import IN_REPORT, ranked
+from tvist_lab.studies.evaluate import example
+from tvist_lab.studies.leaderboard import IN_REPORT, ranked
 from tvist_lab.study.measures import MEASURES
 from tvist_lab.study.study import Study
 from tvist_lab.study.tables import Shown, cells, titles
@@ -34,12 +35,17 @@ def evaluation_page(result: Mapping[str, Any], figures: Mapping[str, Figure], co
 
     Args:
         result: What `tvist evaluate --json` prints.
-        figures: Caption to figure.
+        figures: `moves` and `one_move`.
         command: The command that makes the report, for its provenance.
     """
     ways = {result["shaper"]: result, **result["baselines"]}
     rows = cells([{"name": name, **way} for name, way in ways.items()], WAYS)
-    sections = [Section("Shapers", tables=[PageTable(titles(WAYS), rows)]), _drawn(figures)]
+    drawn = example(result["moves"]) + 1
+    captions = {
+        "moves": "Vibration after each move, unshaped and shaped.",
+        "one_move": f"Move {drawn}, which vibrates like the median of all moves.",
+    }
+    sections = [Section("Shapers", tables=[PageTable(titles(WAYS), rows)]), _drawn(figures, captions)]
     sections.append(Section("Moves", tables=[_moves(result["moves"])]))
     if result["notes"]:
         sections.append(Section("Notes", points=result["notes"]))
@@ -98,12 +104,16 @@ def shaperbench_page(result: Mapping[str, Any], figures: Mapping[str, Figure]) -
 
     Args:
         result: What `tvist shaperbench --json` prints.
-        figures: Caption to figure.
+        figures: `pareto` and `settling_measured`.
     """
     entries = ranked(result)
     caption = "* keeps the limits, and no other shaper that keeps them is better in both still and vibration"
     shown = PageTable(titles(IN_REPORT), cells(entries, IN_REPORT), caption)
-    sections = [Section("Shapers", tables=[shown]), _drawn(figures)]
+    captions = {
+        "pareto": "Settling time against residual vibration.",
+        "settling_measured": "Settling time against delay.",
+    }
+    sections = [Section("Shapers", tables=[shown]), _drawn(figures, captions)]
     if others := [f"{row['name']}: it {row['fault']}" for row in result["shapers"] if not row["ranked"]]:
         sections.append(Section("Not ranked", points=others))
     sections.append(Section("Arms", facts=result["arms"]))
@@ -138,13 +148,13 @@ def _verdict_on_ranking(ranked: Sequence[Mapping[str, Any]], arms: int) -> list[
     return [lead, f"{quiet['name']} leaves the least vibration: {quiet['residual_m_s2']['median']:.3f} m/s²."]
 
 
-def study_page(study: Study, result: Mapping[str, Any], figure: Figure, command: str) -> Page:
+def study_page(study: Study, result: Mapping[str, Any], figures: Mapping[str, Figure], command: str) -> Page:
     """Build the report of a study of one's own.
 
     Args:
         study: The study.
         result: What `tvist study FILE --json` prints.
-        figure: Its figure.
+        figures: `study`.
         command: The command that makes the report, for its provenance.
     """
     columns = study.shown(result["summary"])
@@ -154,12 +164,14 @@ def study_page(study: Study, result: Mapping[str, Any], figure: Figure, command:
     }
     sections = [
         Section("Results", tables=[PageTable(titles(columns), cells(result["summary"], columns))]),
-        _drawn({"Medians, and bands from the 5th to the 95th percentile.": figure}),
+        _drawn(figures, {"study": "Medians, and bands from the 5th to the 95th percentile."}),
         Section("What the words mean", facts=words),
         Section("Provenance", facts={"Command": command, "Rows": str(result["rows"])}),
     ]
     return Page(study.title, [study.notes or f"{counted(result['rows'], 'row')} were measured."], sections)
 
 
-def _drawn(figures: Mapping[str, Figure]) -> Section:
-    return Section("Figures", pictures=[picture(figure, caption) for caption, figure in figures.items()])
+def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> Section:
+    return Section(
+        "Figures", pictures=[picture(figures[name], caption) for name, caption in captions.items()]
+    )

@@ -5,15 +5,20 @@ from typing import Any
 
 import numpy as np
 
+from tvist_controller.api.line import MotionLimits
 from tvist_lab.recordings import Floats
+from tvist_lab.study.arms import scattered
+from tvist_lab.study.case import Case, arm_seed
+from tvist_lab.study.line import PAPER
 from tvist_lab.study.measures import OF_PEAKS, WORTH
 from tvist_lab.study.method import Method, Waiting
 from tvist_lab.study.moves import Move
 from tvist_lab.study.tables import Shown
-from tvist_lab.study.work import Row
+from tvist_lab.study.work import Job, Row
+from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
 
-MEASURED = (*OF_PEAKS, "still_after_unshaped_stop_ms", "quiet_after_unshaped_stop_ms")
+WANTED = (*OF_PEAKS, "still_after_unshaped_stop_ms", "quiet_after_unshaped_stop_ms")
 """Measures of each motion."""
 RESAMPLED = 2000
 """Number of bootstrap samples for an interval."""
@@ -38,24 +43,62 @@ Rows = Sequence[Row]
 """Rows of one move: by the shaper, waiting, and by each baseline."""
 
 
-def methods(shaper: Method, others: Sequence[Method]) -> tuple[Method, ...]:
-    """Return what makes each move: the shaper, which baselines of the same duration are compared with, and others."""
-    return (shaper, Waiting(), *others)
+def feasible(
+    moves: Sequence[Move], description: RobotDescription, limits: MotionLimits = PAPER
+) -> list[Move]:
+    """Return the moves for which the drives are strong enough."""
+    return [move for move in moves if Case(description, move, limits=limits).torque_share <= 1.0]
 
 
-def counts(rows: Rows) -> bool:
-    """Return whether a move has enough vibration for a percentage."""
-    return rows[0]["reduction_percent"] is not None
+def jobs(
+    description: RobotDescription,
+    moves: Sequence[Move],
+    seed: int,
+    shaper: Method,
+    others: Sequence[Method] = (),
+    *,
+    limits: MotionLimits = PAPER,
+    payload_error: float = 0.0,
+    stiffness_error: float = 0.0,
+    streams: bool = False,
+) -> list[Job]:
+    """Return a job for each move: by the shaper, which others of the same duration are compared with, and by these.
+
+    Args:
+        description: The arm, and the controller's model of it.
+        moves: The moves.
+        seed: Seed of gear errors and deviations.
+        shaper: The shaper.
+        others: What is compared with it, besides waiting.
+        limits: Limits of the moves.
+        payload_error: Error of the declared mass, relative to the carried one [-].
+        stiffness_error: Share by which each gear, link and velocity loop is off [-].
+        streams: Whether to follow streams from the start of each move instead.
+    """
+    every, arms = (shaper, Waiting(), *others), (scattered(stiffness_error),)
+    return [
+        Job(
+            Case(
+                description, move, arm_seed(seed, place), arms, limits, payload_error, streams,
+                {"payload_kg": move.mass},
+            ),
+            every,
+            WANTED,
+        )
+        for place, move in enumerate(moves)
+    ]  # fmt: skip
 
 
 def report(judged: Sequence[Rows]) -> dict[str, Any]:
     """Return the part of `tvist evaluate --json` about the moves."""
     others = range(2, len(judged[0])) if judged else range(0)
     names = {place: judged[0][place]["shaper"] for place in (1, *others)} if others else {}
+    moves = [_move(rows) for rows in judged]
+    left_out = [place for place, move in enumerate(moves, 1) if move["reduction_percent"] is None]
     return {
-        "moves": [_move(rows) for rows in judged],
-        "counted": sum(map(counts, judged)),
-        "left_out": [number for number, rows in enumerate(judged, 1) if not counts(rows)],
+        "moves": moves,
+        "counted": len(moves) - len(left_out),
+        "left_out": left_out,
         **_summary([rows[0] for rows in judged]),
         "baselines": {name: _summary([rows[place] for rows in judged]) for place, name in names.items()},
     }
@@ -130,10 +173,11 @@ def percentiles(values: Sequence[float] | Floats, **shares: float) -> dict[str, 
     }
 
 
-def example(judged: Sequence[Rows]) -> int:
+def example(moves: Rows) -> int:
     """Place of the move that is drawn: the middle one by unshaped vibration, of those that count if any do."""
-    counted = [place for place, rows in enumerate(judged) if counts(rows)] or list(range(len(judged)))
-    return sorted(counted, key=lambda place: float(judged[place][0]["unshaped_peak_m_s2"]))[len(counted) // 2]
+    counted = [place for place, move in enumerate(moves) if move["reduction_percent"] is not None]
+    counted = counted or list(range(len(moves)))
+    return sorted(counted, key=lambda place: float(moves[place]["unshaped_peak_m_s2"]))[len(counted) // 2]
 
 
 def notes(

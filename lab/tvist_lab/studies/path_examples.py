@@ -76,6 +76,18 @@ def circle(description: RobotDescription, calibration: Calibration) -> dict[str,
     }
 
 
+def circle_in_words(circle: dict[str, Any]) -> str:
+    """Say how far the circle is left in both ways."""
+    constant, largest = circle["at_constant_speed_mm"], circle["largest_distance_mm"]
+    return (
+        f"On a circle with a radius of {circle['radius_mm']:g} mm at {circle['speed_m_s']:g} m/s, "
+        f"`{circle['shaper']}` for {circle['f_d_hz']:g} Hz and ζ = {circle['zeta']:g}, joint by joint, leaves the path "
+        f"by {constant['joints']:.2f} mm at constant speed and by {largest['joints']:.2f} mm at most. Averaging the "
+        f"circle itself would lose {circle['predicted_mm']:.2f} mm of its radius. Along the path it is left by "
+        f"{1e6 * largest['along']:.0f} nm."
+    )
+
+
 def corner(description: RobotDescription, calibration: Calibration) -> Corner:
     """Return a corner of two lines in a horizontal plane, in both ways."""
     position, rotation = _begin(description)

@@ -24,8 +24,10 @@ exceeds the carried one.
 """
 PERCENTILES = {"median": 50.0, "p5": 5.0}
 """Percentiles over moves."""
-MEASURED = ("unshaped_peak_m_s2", "shaped_peak_m_s2", "waited_peak_m_s2", "delay_ms")
+WANTED = ("unshaped_peak_m_s2", "shaped_peak_m_s2", "waited_peak_m_s2", "delay_ms")
 """Measures of each motion."""
+FIRST = (Shown("shaper", "name"), Shown("delay ms", "delay_ms", 0))
+"""First columns of all tables."""
 
 
 def jobs(
@@ -43,7 +45,7 @@ def jobs(
                 axes={"kind": kind, "error": error},
             ),
             tuple(methods),
-            MEASURED,
+            WANTED,
             as_served=False,
         )
         for kind, errors in ERRORS.items()
@@ -103,14 +105,23 @@ def tables() -> dict[str, list[Shown]]:
     """Columns of the tables of a page, by their titles."""
     return {
         f"{kind}: {share}": [
-            Shown("shaper", "name"), Shown("delay ms", "delay_ms", 0),
-            *(Shown(error, f"{kind}.{error}.reduction_percent.{share}", 1) for error in errors_of(kind)),
+            *FIRST, *(Shown(error, f"{kind}.{error}.reduction_percent.{share}", 1) for error in _errors(kind)),
         ]
         for kind in ERRORS
         for share in PERCENTILES
     }  # fmt: skip
 
 
-def errors_of(kind: str) -> list[str]:
-    """Return the errors of a kind in words, the smallest first."""
+def on_terminal(kind: str) -> list[Shown]:
+    """Columns of the table of a kind of error, each with median and 5th percentile."""
+
+    def both(error: str) -> Shown:
+        one, other = (Shown("", f"{kind}.{error}.reduction_percent.{share}", 1) for share in PERCENTILES)
+        return Shown(error, lambda entry: f"{one.text(entry)} / {other.text(entry)}")
+
+    return [*FIRST, *map(both, _errors(kind))]
+
+
+def _errors(kind: str) -> list[str]:
+    """Errors of a kind in words, the smallest first."""
     return [f"{100.0 * error:+.0f} %" for error in sorted(ERRORS[kind])]

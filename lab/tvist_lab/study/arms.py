@@ -24,6 +24,10 @@ description is wrong about all of them; random signs.
 """
 
 
+def _same(description: RobotDescription, seed: int) -> RobotDescription:  # noqa: ARG001  nothing is drawn
+    return description
+
+
 @dataclass(frozen=True)
 class ArmVariant:
     """One of the arms. The controller uses the unchanged description for all of them."""
@@ -32,38 +36,35 @@ class ArmVariant:
     """Name in JSON."""
     label: str
     """What distinguishes it, for people."""
-    make: Callable[[RobotDescription, Payload, int], Placeable]
-    """Creates a plant that provides the truth from description, carried payload and seed."""
+    truly: Callable[[RobotDescription, int], RobotDescription] = _same
+    """Returns what it is like from the controller's description and a seed."""
+    imperfections: Imperfections | None = None
+    """What no description says; None for none."""
+    in_mujoco: bool = False
+    """Whether MuJoCo simulates it, without gear error."""
+
+    def make(self, description: RobotDescription, carried: Payload, seed: int) -> Placeable:
+        """Create a plant that provides the truth, from the controller's description, carried payload and seed."""
+        arm = self.truly(description, seed)
+        if self.in_mujoco:
+            return MujocoArm(arm, carried)
+        if self.imperfections is None:
+            return FlexibleArm(arm, carried)
+        return FlexibleArm(arm, carried, imperfections=self.imperfections, substeps=SUBSTEPS)
 
 
-def _imperfect(description: RobotDescription, carried: Payload, imperfections: Imperfections) -> FlexibleArm:
-    return FlexibleArm(description, carried, imperfections=imperfections, substeps=SUBSTEPS)
+def _sharper(share: float, description: RobotDescription, seed: int) -> RobotDescription:  # noqa: ARG001  not drawn
+    """Return an arm whose friction changes sign within a share of the speed."""
+    drives = description.drives
+    return replace(description, drives=replace(drives, friction_width=share * drives.friction_width))
 
 
-def _calibrated(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
-    return FlexibleArm(description, carried)
+def _off(share: float, number: int, description: RobotDescription, seed: int) -> RobotDescription:
+    return softer_and_stiffer(description, share, [seed, number])
 
 
-def _coulomb(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
-    drives = replace(description.drives, friction_width=0.2 * description.drives.friction_width)
-    return _imperfect(replace(description, drives=drives), carried, Imperfections())
-
-
-def _stribeck(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
-    drives = replace(description.drives, friction_width=0.3 * description.drives.friction_width)
-    return _imperfect(replace(description, drives=drives), carried, Imperfections(breakaway=1.5))
-
-
-def _hysteretic(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
-    return _imperfect(description, carried, Imperfections(hysteresis=0.3))
-
-
-def _piecewise(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
-    return _imperfect(description, carried, Imperfections(soft=0.75))
-
-
-def _scattered(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:
-    return FlexibleArm(softer_and_stiffer(description, SCATTER, [seed, 15]), carried)
+def _sprung(factor: float, description: RobotDescription, seed: int) -> RobotDescription:  # noqa: ARG001  not drawn
+    return stiffer(description, factor)
 
 
 def _unlike(description: RobotDescription, seed: int) -> RobotDescription:
@@ -84,49 +85,48 @@ def _unlike(description: RobotDescription, seed: int) -> RobotDescription:
     return softer_and_stiffer(replace(description, links=other, drives=drives), SCATTER, [seed, 15])
 
 
-def _blind(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:
-    return _imperfect(_unlike(description, seed), carried, Imperfections(base=YieldingBase()))
-
-
-def _blind_mujoco(description: RobotDescription, carried: Payload, seed: int) -> MujocoArm:
-    return MujocoArm(_unlike(description, seed), carried)
-
-
-def _on_base(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
-    return _imperfect(description, carried, Imperfections(base=YieldingBase()))
-
-
-def _mujoco(description: RobotDescription, carried: Payload, seed: int) -> MujocoArm:  # noqa: ARG001
-    return MujocoArm(description, carried)
-
-
 ARMS = (
-    ArmVariant("calibrated", "as described", _calibrated),
-    ArmVariant("coulomb", "friction that changes sign within a fifth of the speed", _coulomb),
-    ArmVariant("stribeck", "friction 50 % higher at breakaway", _stribeck),
+    ArmVariant("calibrated", "as described"),
+    ArmVariant(
+        "coulomb",
+        "friction that changes sign within a fifth of the speed",
+        partial(_sharper, 0.2),
+        Imperfections(),
+    ),
+    ArmVariant(
+        "stribeck", "friction 50 % higher at breakaway", partial(_sharper, 0.3), Imperfections(breakaway=1.5)
+    ),
     ArmVariant(
         "hysteresis",
         "gears with hysteresis: 30 % stiffer when turning back, 2 % of the torque lost",
-        _hysteretic,
+        imperfections=Imperfections(hysteresis=0.3),
     ),
-    ArmVariant("piecewise", "gears 25 % softer below a tenth of the torque", _piecewise),
+    ArmVariant(
+        "piecewise", "gears 25 % softer below a tenth of the torque", imperfections=Imperfections(soft=0.75)
+    ),
     ArmVariant(
         "scattered",
         "stiffness and gains of every joint and link changed by 15 %, up or down at random",
-        _scattered,
+        partial(_off, SCATTER, 15),
     ),
-    ArmVariant("base", "a flexible base, 150 kN m/rad about two axes", _on_base),
-    ArmVariant("mujoco", "simulated in MuJoCo, without gear error", _mujoco),
+    ArmVariant(
+        "base",
+        "a flexible base, 150 kN m/rad about two axes",
+        imperfections=Imperfections(base=YieldingBase()),
+    ),
+    ArmVariant("mujoco", "simulated in MuJoCo, without gear error", in_mujoco=True),
     ArmVariant(
         "blind",
         "unlike the description in every mass (7 %), centre of mass (10 mm per axis), stiffness and gain (15 %), with "
         "sharper friction, and bending in its base as well",
-        _blind,
+        _unlike,
+        Imperfections(base=YieldingBase()),
     ),
     ArmVariant(
         "blind_mujoco",
         "unlike the description in every mass, centre of mass, stiffness and gain, with sharper friction, in MuJoCo",
-        _blind_mujoco,
+        _unlike,
+        in_mujoco=True,
     ),
 )
 """The arms of ShaperBench."""
@@ -138,35 +138,18 @@ def scattered(share: float) -> ArmVariant:
     """Return an arm with each gear, link and velocity loop stiffer or softer by a share, at random."""
     if share == 0.0:
         return AS_DESCRIBED
+    percent = f"{100.0 * share:g}"
     return ArmVariant(
-        f"scattered_{100.0 * share:g}_percent",
-        f"stiffness and gains off by {100.0 * share:g} %",
-        partial(_off, share),
+        f"scattered_{percent}_percent", f"stiffness and gains off by {percent} %", partial(_off, share, 29)
     )
-
-
-def _off(share: float, description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:
-    return FlexibleArm(softer_and_stiffer(description, share, [seed, 29]), carried)
 
 
 def with_springs(factor: float) -> ArmVariant:
     """Return an arm all of whose springs are stiffer by a factor."""
     if factor == 1.0:
         return AS_DESCRIBED
-    return ArmVariant(
-        f"springs_{100.0 * (factor - 1.0):+g}_percent",
-        f"springs {100.0 * (factor - 1.0):+g} %",
-        partial(_sprung, factor),
-    )
-
-
-def _sprung(
-    factor: float,
-    description: RobotDescription,
-    carried: Payload,
-    seed: int,  # noqa: ARG001  this arm is not drawn
-) -> FlexibleArm:
-    return FlexibleArm(stiffer(description, factor), carried)
+    percent = f"{100.0 * (factor - 1.0):+g}"
+    return ArmVariant(f"springs_{percent}_percent", f"springs {percent} %", partial(_sprung, factor))
 
 
 def stiffer(description: RobotDescription, factor: float) -> RobotDescription:

@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -11,11 +9,10 @@ import numpy as np
 from tvist_controller.api.line import InverseDynamics, MotionLimits, body, central_differences, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.study.arms import AS_DESCRIBED, ArmVariant
-from tvist_lab.study.line import PAPER, ControlLine, point_to_point
-from tvist_lab.study.moves import Move
-from tvist_lab.study.streams import stopped_stream
-from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.plant import PERIOD, Placeable
+from tvist_lab.study.line import PAPER, point_to_point
+from tvist_lab.study.moves import Move, stopped_stream
+from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD
 
 LIMITS = {"gentle": PAPER, "industrial": MotionLimits(velocity=3.0, acceleration=8.0, jerk=2000.0)}
 """Limits of moves by name: the paper's, and those of quick handling."""
@@ -65,32 +62,8 @@ class Case:
         """Return the reference of the move, shape (T, n) [rad]."""
         return point_to_point(np.array(self.move.start), np.array(self.move.target), self.limits)
 
-
-class World:
-    """What makes the motions of a case: its reference, the control line, and the arms, each of which starts anew.
-
-    Args:
-        case: The case.
-    """
-
-    def __init__(self, case: Case) -> None:
-        self._case = case
-        start = np.array(case.move.start)
-        self.reference = (
-            stopped_stream(case.description, start, case.seed, case.limits)
-            if case.stream
-            else case.point_to_point()
-        )
-        """The unshaped reference, shape (T, n) [rad]."""
-        self.line = ControlLine(case.description, start, self._body(case.declared.mass))
-
-    @cached_property
-    def arms(self) -> Mapping[str, Placeable]:
-        """The arms by their names."""
-        carried, case = self._body(self._case.move.mass), self._case
-        return MappingProxyType(
-            {arm.name: arm.make(case.description, carried, case.seed) for arm in case.arms}
-        )
-
-    def _body(self, mass: float) -> Payload:
-        return body(paper_payload(self._case.description, mass))
+    def reference(self) -> Floats:
+        """Return what is to be followed: the move or the stream, shape (T, n) [rad]."""
+        if not self.stream:
+            return self.point_to_point()
+        return stopped_stream(self.description, np.array(self.move.start), self.seed, self.limits)

@@ -1,4 +1,4 @@
-"""The columns of a study's rows: names, types, units and meanings."""
+"""The columns of a study's rows: names, types, units and meanings; and rows in short."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,8 +6,8 @@ from typing import Any
 
 import polars as pl
 
-from tvist_lab.study.measures import MEASURES, OF_PEAKS
-from tvist_lab.study.work import Row
+from tvist_lab.study.measures import MEASURES
+from tvist_lab.study.work import FAILED, MEASURED, TOO_WEAK, Row
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,10 @@ _KINDS: Mapping[type, Any] = {bool: pl.Boolean, int: pl.Int64, float: pl.Float64
 
 Schema = Mapping[str, Any]
 """Types of the columns by name, in their order."""
+Shares = Mapping[str, float]
+"""Percentiles by name, as shares [-]."""
+OF_STATUS = {status: pl.col("status") == status for status in (MEASURED, TOO_WEAK, FAILED)}
+"""Whether a row has a status."""
 
 
 def columns_of(axes: Sequence[Column], measures: Iterable[str]) -> tuple[Column, ...]:
@@ -68,29 +72,25 @@ def frame(rows: Sequence[Row], schema: Schema) -> pl.DataFrame:
     return pl.DataFrame([{name: row.get(name) for name in schema} for row in rows], schema=dict(schema))
 
 
-COLUMNS = columns_of(
-    (
-        Column("robot", pl.String, "", "robot, as the spec names it"),
-        Column("payload", pl.String, "", "payload, as the spec says it: a mass in kg, or uniform"),
-        Column("payload_error_percent", pl.Float64, "%", "excess of the declared mass over the carried one"),
-        Column(
-            "stiffness_error_percent", pl.Float64, "%",
-            "deviation of springs and velocity loops, up or down at random",
-        ),
-        Column("frequency_error_percent", pl.Float64, "%", "excess of the controller's frequencies"),
-        Column("move", pl.Int64, "", "number of the random move of this robot, from 1 on"),
-        Column("shaper", pl.String, "", "shaper, as the spec names it"),
-        Column("seed", pl.Int64, "", "seed of gear errors and deviations, equal for equal `move`"),
-        Column("payload_kg", pl.Float64, "kg", "carried mass"),
-        Column("start", pl.List(pl.Float64), "rad", "joint angles at the start"),
-        Column("target", pl.List(pl.Float64), "rad", "joint angles at the end"),
-    ),
-    OF_PEAKS,
-)  # fmt: skip
-"""All columns of a sweep, in their order."""
-SCHEMA = schema_of(COLUMNS)
-"""Types of these columns."""
-AXES = (
-    "robot", "payload", "payload_error_percent", "stiffness_error_percent", "frequency_error_percent", "shaper",
-)  # fmt: skip
-"""Columns that together distinguish what is summarized."""
+def summarized(
+    rows: pl.DataFrame, keys: Sequence[str], counted: Mapping[str, pl.Expr], figures: Mapping[str, Shares]
+) -> list[dict[str, Any]]:
+    """Return an entry for each combination of keys, in the order of the rows.
+
+    Args:
+        rows: Rows of a study.
+        keys: Columns that together distinguish what is summarized.
+        counted: Numbers of an entry by name.
+        figures: Percentiles of an entry by measure, over the rows that were measured and have it.
+    """
+    asked = {
+        f"{name}.{share}": pl.col(name).filter(OF_STATUS[MEASURED]).quantile(value, "linear")
+        for name, shares in figures.items()
+        for share, value in shares.items()
+    }
+    grouped = rows.group_by(keys, maintain_order=True).agg(**counted, **asked)
+    return [
+        {name: row[name] for name in (*keys, *counted)}
+        | {name: {share: row[f"{name}.{share}"] for share in shares} for name, shares in figures.items()}
+        for row in grouped.iter_rows(named=True)
+    ]

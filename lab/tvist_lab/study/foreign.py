@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -158,43 +159,57 @@ def load_shaper(path: Path) -> Callable[[], Any]:
     """
     file = path.resolve()
     if file not in _loaded:
-        _loaded[file] = _load(file, path)
+        _loaded[file] = _load(path)
     return _loaded[file]
 
 
-def _load(file: Path, said: Path) -> Callable[[], Any]:
-    if not file.is_file():
-        raise CandidateError(f"shaper {said}: there is no such file")
-    name = f"tvist_shaper_{file.stem}"
-    spec = importlib.util.spec_from_file_location(name, file)
+def run_file(path: Path, kind: str, wrong: type[ValueError]) -> ModuleType:
+    """Run a Python file of the user's, and return its module.
+
+    Args:
+        path: The file.
+        kind: What it should contain: a shaper or a study.
+        wrong: The error if it cannot be run; its message names the file.
+    """
+    name = f"tvist_{kind}_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path.resolve())
     if spec is None or spec.loader is None:
-        raise CandidateError(f"shaper {said}: must be a Python file, *.py")
+        raise wrong(f"{kind} {path}: must be a Python file, *.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
-        raise CandidateError(f"shaper {said}: running it raises {named(error)}") from error
+    except (Exception, SystemExit) as error:
+        raise wrong(f"{kind} {path}: running it raises {named(error)}") from error
+    return module
+
+
+def _load(path: Path) -> Callable[[], Any]:
+    if not path.is_file():
+        raise CandidateError(f"shaper {path}: there is no such file")
+    module = run_file(path, "shaper", CandidateError)
     classes = [
         value
         for value in vars(module).values()
-        if inspect.isclass(value) and value.__module__ == name and callable(getattr(value, "step", None))
+        if inspect.isclass(value)
+        and value.__module__ == module.__name__
+        and callable(getattr(value, "step", None))
     ]
     if len(classes) > 1:
         found = ", ".join(value.__name__ for value in classes)
         raise CandidateError(
-            f"shaper {said}: contains several classes with a method step, {found}: keep only one"
+            f"shaper {path}: contains several classes with a method step, {found}: keep only one"
         )
     if classes:
         try:
             classes[0]()
         except Exception as error:
             raise CandidateError(
-                f"shaper {said}: {classes[0].__name__}() raises {named(error)}; it is made without arguments"
+                f"shaper {path}: {classes[0].__name__}() raises {named(error)}; it is made without arguments"
             ) from error
         return classes[0]
     if inspect.isfunction(getattr(module, "step", None)):
         return lambda: module
     raise CandidateError(
-        f"shaper {said}: contains neither a class with a method step(q_ref, info) nor a function step"
+        f"shaper {path}: contains neither a class with a method step(q_ref, info) nor a function step"
     )

@@ -137,109 +137,89 @@ def _since_stop(motion: Motion) -> float | None:
     return None if at is None else 1e3 * (at - motion.rows.duration(motion.recording))
 
 
-MEASURES: Mapping[str, Measure] = MappingProxyType(
-    {
-        one.name: one
-        for one in (
-            Measure(
-                "unshaped_peak_m_s2", "m/s²",
-                "largest acceleration of the unshaped tool later than 10 ms after its stop",
-                lambda motion: motion.unshaped.peak,
-            ),
-            Measure(
-                "shaped_peak_m_s2", "m/s²", "the same of the shaped tool, after its own stop",
-                lambda motion: motion.peak,
-            ),
-            Measure(
-                "reduction_percent", "%",
-                "reduction of the peak; null if the unshaped peak is below 0.2 m/s²",
-                lambda motion: _less(motion.peak, motion.unshaped.peak) if motion.counts else None,
-            ),
-            Measure(
-                "less_than_waiting_percent", "%", "the same, compared with waiting until the shaped stop",
-                lambda motion: _less(motion.peak, motion.waited) if motion.counts else None,
-            ),
-            Measure(
-                "delay_ms", "ms", "how much later the shaped reference ends",
-                lambda motion: round(1e3 * (motion.duration - motion.unshaped.duration), 6),
-            ),
-            Measure(
-                "unshaped_duration_ms", "ms", "duration of the unshaped reference",
-                lambda motion: _ms(motion.unshaped.duration),
-            ),
-            Measure(
-                "unshaped_still_after_ms", "ms",
-                "time until the unshaped tool stays below 0.1 m/s²; null if it does not",
-                lambda motion: _ms(motion.unshaped.still()),
-            ),
-            Measure(
-                "shaped_still_after_ms", "ms",
-                "the same of the shaped tool, from the start of the unshaped reference",
-                lambda motion: _ms(motion.still()),
-            ),
-            Measure(
-                "peak_acceleration_ratio", "–", "largest shaped q̈ relative to the limit",
-                lambda motion: (
-                    peak_acceleration(motion.recording, motion.rows) / motion.case.limits.acceleration
-                ),
-            ),
-            Measure(
-                "peak_velocity_ratio", "–", "largest shaped q̇ relative to the limit",
-                lambda motion: peak_velocity(motion.recording, motion.rows) / motion.case.limits.velocity,
-            ),
-            Measure(
-                "waited_peak_m_s2", "m/s²",
-                "largest acceleration of the unshaped tool later than 10 ms after the shaped stop",
-                lambda motion: motion.waited,
-            ),
-            Measure(
-                "still_after_unshaped_stop_ms", "ms",
-                "time from the stop of the unshaped reference until the tool stays below 0.1 m/s²; null if it does not",
-                lambda motion: _late(motion.still(), motion),
-            ),
-            Measure(
-                "quiet_after_unshaped_stop_ms", "ms", "the same below 0.02 m/s²",
-                lambda motion: _late(motion.still(QUIET), motion),
-            ),
-            Measure(
-                "time_until_still_ms", "ms",
-                "the same below 0.1 m/s², from the last sample of the reference before it enters the line",
-                _since_stop,
-            ),
-            Measure(
-                "residual_m_s2", "m/s²",
-                "largest envelope of the tool's acceleration within 3 to 60 Hz after the declared end",
-                Motion.residual,
-            ),
-            Measure(
-                "in_motion_m_s2", "m/s²", "rms of the tool's acceleration relative to that of a rigid arm",
-                Motion.in_motion,
-            ),
-            Measure(
-                "declared_delay_ms", "ms", "delay of what the drives get, by the shaper's word",
-                lambda motion: (
-                    1e3
-                    * (
-                        motion.shaped.delay
-                        + (0.0 if motion.shaped.elastic is None else motion.shaped.elastic.delay)
-                    )
-                ),
-            ),
-            Measure(
-                "reference_acceleration_ratio", "–", "largest q̈ of the shaped samples relative to the limit",
-                lambda motion: _largest(motion.shaped.q, 2) / motion.case.limits.acceleration,
-            ),
-            Measure(
-                "reference_velocity_ratio", "–", "largest q̇ of the shaped samples relative to the limit",
-                lambda motion: _largest(motion.shaped.q, 1) / motion.case.limits.velocity,
-            ),
-            Measure(
-                "cost_us", "µs", "processor time of the shaper per tick",
-                lambda motion: None if motion.shaped.cost is None else 1e6 * motion.shaped.cost,
-            ),
-        )
-    }
+_ALL = (
+    Measure(
+        "unshaped_peak_m_s2", "m/s²", "largest acceleration of the unshaped tool later than 10 ms after its stop",
+        lambda motion: motion.unshaped.peak,
+    ),
+    Measure(
+        "shaped_peak_m_s2", "m/s²", "the same of the shaped tool, after its own stop", lambda motion: motion.peak
+    ),
+    Measure(
+        "reduction_percent", "%", "reduction of the peak; null if the unshaped peak is below 0.2 m/s²",
+        lambda motion: _less(motion.peak, motion.unshaped.peak) if motion.counts else None,
+    ),
+    Measure(
+        "less_than_waiting_percent", "%", "the same, compared with waiting until the shaped stop",
+        lambda motion: _less(motion.peak, motion.waited) if motion.counts else None,
+    ),
+    Measure(
+        "delay_ms", "ms", "how much later the shaped reference ends",
+        lambda motion: _ms(motion.duration - motion.unshaped.duration),
+    ),
+    Measure(
+        "unshaped_duration_ms", "ms", "duration of the unshaped reference",
+        lambda motion: _ms(motion.unshaped.duration),
+    ),
+    Measure(
+        "unshaped_still_after_ms", "ms", "time until the unshaped tool stays below 0.1 m/s²; null if it does not",
+        lambda motion: _ms(motion.unshaped.still()),
+    ),
+    Measure(
+        "shaped_still_after_ms", "ms", "the same of the shaped tool, from the start of the unshaped reference",
+        lambda motion: _ms(motion.still()),
+    ),
+    Measure(
+        "peak_acceleration_ratio", "–", "largest shaped q̈ relative to the limit",
+        lambda motion: peak_acceleration(motion.recording, motion.rows) / motion.case.limits.acceleration,
+    ),
+    Measure(
+        "peak_velocity_ratio", "–", "largest shaped q̇ relative to the limit",
+        lambda motion: peak_velocity(motion.recording, motion.rows) / motion.case.limits.velocity,
+    ),
+    Measure(
+        "waited_peak_m_s2", "m/s²", "largest acceleration of the unshaped tool later than 10 ms after the shaped stop",
+        lambda motion: motion.waited,
+    ),
+    Measure(
+        "still_after_unshaped_stop_ms", "ms",
+        "time from the stop of the unshaped reference until the tool stays below 0.1 m/s²; null if it does not",
+        lambda motion: _late(motion.still(), motion),
+    ),
+    Measure(
+        "quiet_after_unshaped_stop_ms", "ms", "the same below 0.02 m/s²",
+        lambda motion: _late(motion.still(QUIET), motion),
+    ),
+    Measure(
+        "time_until_still_ms", "ms",
+        "the same below 0.1 m/s², from the last sample of the reference before it enters the line",
+        _since_stop,
+    ),
+    Measure(
+        "residual_m_s2", "m/s²",
+        "largest envelope of the tool's acceleration within 3 to 60 Hz after the declared end", Motion.residual,
+    ),
+    Measure(
+        "in_motion_m_s2", "m/s²", "rms of the tool's acceleration relative to that of a rigid arm", Motion.in_motion
+    ),
+    Measure(
+        "declared_delay_ms", "ms", "delay of what the drives get, by the shaper's word",
+        lambda motion: 1e3 * (motion.shaped.delay + (motion.shaped.elastic.delay if motion.shaped.elastic else 0.0)),
+    ),
+    Measure(
+        "reference_acceleration_ratio", "–", "largest q̈ of the shaped samples relative to the limit",
+        lambda motion: _largest(motion.shaped.q, 2) / motion.case.limits.acceleration,
+    ),
+    Measure(
+        "reference_velocity_ratio", "–", "largest q̇ of the shaped samples relative to the limit",
+        lambda motion: _largest(motion.shaped.q, 1) / motion.case.limits.velocity,
+    ),
+    Measure(
+        "cost_us", "µs", "processor time of the shaper per tick",
+        lambda motion: None if motion.shaped.cost is None else 1e6 * motion.shaped.cost,
+    ),
 )  # fmt: skip
+MEASURES: Mapping[str, Measure] = MappingProxyType({one.name: one for one in _ALL})
 """All measures by name."""
 
 OF_PEAKS = (

@@ -9,9 +9,7 @@ from tvist_controller.api.line import ElasticFeedForward, MotionLimits
 from tvist_lab.recordings import Floats
 from tvist_lab.study.line import PAPER, lengthened, point_to_point
 from tvist_lab.study.moves import Move
-from tvist_lab.study.own_moves import own_move
-from tvist_lab.study.ranges import robust
-from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.recipes import Recipe, own_move, robust
 from tvist_lab.study.shaping import Running, RunningShaper, Shaped, shape
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD

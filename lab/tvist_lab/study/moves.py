@@ -1,4 +1,4 @@
-"""Moves to evaluate, read from a file or drawn at random."""
+"""Moves and streams to evaluate, read from a file or drawn at random."""
 
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -8,12 +8,15 @@ from typing import Annotated
 
 import msgspec
 import numpy as np
+import ruckig
 from msgspec import Meta, Struct
 
-from tvist_controller.api.line import CollisionModel, JointLine, body, paper_payload
+from tvist_controller.api.line import CollisionModel, JointLine, MotionLimits, body, paper_payload
 from tvist_lab.recordings import Floats
+from tvist_lab.study.line import PAPER
 from tvist_lab.workspace import WORKSPACE, Region, ranges, workspace
 from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD
 from tvist_plant.user_file import read_bytes
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
@@ -25,6 +28,10 @@ STROKE = (0.3, 1.0)
 """Length of a random move, as a share of the way to an independent configuration [-]."""
 TRIES = 1000
 """Number of draws for one random move before giving up."""
+RETARGETED = (0.2, 0.8)
+"""Shortest and longest time after which a stream turns to another target [s]."""
+TURNS = 4
+"""Number of targets of a stream."""
 WITH_WRISTS = Region(low=(*WORKSPACE.low, -np.pi, -np.pi), high=(*WORKSPACE.high, np.pi, np.pi))
 """The workspace with any angles of the wrist's two outer joints."""
 
@@ -150,6 +157,50 @@ def draw_moves(
         if draws >= TRIES * (len(moves) + 1):
             raise MovesError(f"random: {draws} draws gave {len(moves)} moves without a collision")
     return Drawn(moves, draws)
+
+
+def stopped_stream(
+    description: RobotDescription, start: Floats, seed: int, limits: MotionLimits = PAPER
+) -> Floats:
+    """Draw a stream that uses its limits fully, and is brought to rest within them before it reaches its last target.
+
+    Args:
+        description: The robot, whose workspace the targets are drawn from.
+        start: Joint angles at which it begins at rest, shape (n,) [rad].
+        seed: Seed of targets and times.
+        limits: Limits of every joint.
+
+    Returns:
+        One sample a tick, until the arm rests, shape (T, n) [rad].
+    """
+    joints, random = len(start), np.random.default_rng([seed, 71])
+    region = workspace(ranges(description))
+    used = min(len(region.low), joints)
+    generator = ruckig.Ruckig(joints, PERIOD)
+    state, following = ruckig.InputParameter(joints), ruckig.OutputParameter(joints)
+    state.max_velocity = [limits.velocity] * joints
+    state.max_acceleration = [limits.acceleration] * joints
+    state.max_jerk = [limits.jerk] * joints
+    state.current_position = np.asarray(start, dtype=float).tolist()
+    out: list[Floats] = []
+
+    def step() -> bool:
+        result = generator.update(state, following)
+        following.pass_to_input(state)
+        out.append(np.array(state.current_position))
+        return bool(result == ruckig.Result.Finished)
+
+    for _ in range(TURNS):
+        target = np.zeros(joints)
+        target[:used] = random.uniform(np.array(region.low)[:used], np.array(region.high)[:used])
+        state.target_position = target.tolist()
+        for _ in range(round(random.uniform(*RETARGETED) / PERIOD)):
+            step()
+    state.control_interface = ruckig.ControlInterface.Velocity
+    state.target_velocity = state.target_acceleration = [0.0] * joints
+    while not step():
+        pass
+    return np.array(out)
 
 
 def is_free(collision: CollisionModel, move: Move) -> bool:

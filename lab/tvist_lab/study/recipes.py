@@ -1,24 +1,55 @@
-"""Filters for a move, as the server creates them, and optionally with a deliberately wrong frequency."""
+"""What the server makes of a calibration, optionally with a wrong frequency: filters, moves, shapers for all poses."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+from msgspec.structs import replace
+
 from tvist_controller.api.line import (
+    ElasticArm,
     ElasticFeedForward,
+    JointLine,
     ModeSource,
+    MotionLimits,
     OwnShaper,
     choose_filter,
     elastic_feed_forward,
+    keeping_motion,
     paper_payload,
+    quiet_motion,
     wanted_modes,
 )
 from tvist_lab.recordings import Floats
+from tvist_lab.robust import robust_over
+from tvist_lab.study.line import samples_of
+from tvist_lab.study.moves import Move
+from tvist_lab.workspace import ranges, workspace
 from tvist_plant.description import RobotDescription
-from tvist_protocol.calibration import Calibration
+from tvist_plant.plant import PERIOD
+from tvist_protocol.calibration import Calibration, ModalParameter
 from tvist_shaping.base import Filter
+from tvist_shaping.catalogue import shaper
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.fixed import Fixed
-from tvist_shaping.named import Registry
+from tvist_shaping.named import PLANNED, Registry
+from tvist_shaping.taps import mean_delay
+
+CONFIGURATIONS = 150
+"""Number of configurations in which the range of the lowest mode is determined."""
+SEARCHED = 2000
+"""Number of configurations searched for the longest mean delay. A delay above it would exceed the motion's limits."""
+
+Range = tuple[float, float]
+_POWERS = {
+    "gear_stiffness": 2,
+    "bending_stiffness": 2,
+    "velocity_gain": 1,
+    "position_gain": 1,
+    "damping_time": -1,
+}
+"""Powers of frequency by which the parameters of an arm change if all its frequencies change alike."""
 
 
 class RecipeError(ValueError):
@@ -147,3 +178,88 @@ class Recipe:
             )
         right = source.estimator(modes, paper_payload(description, mass))
         return Mistaken(right, self.frequency_error) if self.frequency_error else right
+
+
+def own_move(
+    recipe: Recipe, description: RobotDescription, move: Move, limits: MotionLimits
+) -> tuple[Filter, Floats]:
+    """Return the filter before a move, and the move's reference within limits, shape (T, n) [rad].
+
+    Raises:
+        RecipeError: The motion has to be planned with a modal calibration, and there is none.
+    """
+    start, target = np.array(move.start), np.array(move.target)
+    tvist = recipe.make(description, move.mass)
+    tvist.reset(start)
+    quiet = tvist.name == PLANNED
+    tvist.aim(target, quiet=quiet)
+    if not quiet:
+        return tvist, samples_of(keeping_motion(JointLine(start, target), limits, tvist))
+    arm = believed(recipe, description, move.mass)
+    return tvist, samples_of(quiet_motion(JointLine(start, target), limits, arm, PERIOD))
+
+
+def believed(recipe: Recipe, description: RobotDescription, mass: float) -> ElasticArm:
+    """Return the controller's model of the flexible arm, with the recipe's error of the frequencies.
+
+    Raises:
+        RecipeError: There is no modal calibration.
+    """
+    known = recipe.calibration
+    if known is None or known.modal is None:
+        raise RecipeError(
+            f"shaper {recipe.shaper} needs a modal calibration: make one with tvist identify --model modal"
+        )
+    return ElasticArm(description, _mistaken(known, recipe.frequency_error), paper_payload(description, mass))
+
+
+def _mistaken(known: Calibration, error: float) -> Calibration:
+    """Return a calibration whose arm has frequencies that are too high by a share, and the same damping ratios."""
+    if known.modal is None or error == 0.0:
+        return known
+
+    def scaled(parameter: ModalParameter) -> ModalParameter:
+        factor = (1.0 + error) ** _POWERS.get(parameter.quantity, 0)
+        return replace(parameter, value=parameter.value * factor)
+
+    return replace(known, modal=replace(known.modal, parameters=tuple(map(scaled, known.modal.parameters))))
+
+
+def robust(name: str, recipe: Recipe, description: RobotDescription, masses: Range) -> Range:
+    """Design frequency [Hz] and damping ratio [-] of a fixed shaper for the lowest mode's range over the workspace."""
+    f_d, zeta = workspace_range(recipe, description, masses)
+    return robust_over(name, f_d, (zeta[0], min(zeta[1], 0.999 * shaper(name).zeta_max)))
+
+
+def workspace_range(recipe: Recipe, description: RobotDescription, masses: Range) -> tuple[Range, Range]:
+    """Smallest and largest damped frequency [Hz] and damping ratio [-] of the lowest mode, as estimated."""
+    found = [
+        (f_d[0], zeta[0]) for f_d, zeta in _over_workspace(recipe, description, masses, 1, CONFIGURATIONS)
+    ]
+    low, high = np.min(found, axis=0), np.max(found, axis=0)
+    return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
+
+
+def longest_mean_delay(recipe: Recipe, description: RobotDescription, masses: Range, modes: int) -> float:
+    """Return the longest mean delay of the product of the modes' ZV shapers, over workspace and payloads [s].
+
+    Args:
+        recipe: Source of the estimates.
+        description: The robot.
+        masses: Smallest and largest payload [kg].
+        modes: Number of modes.
+    """
+    return max(
+        mean_delay(f_d, zeta) for f_d, zeta in _over_workspace(recipe, description, masses, modes, SEARCHED)
+    )
+
+
+def _over_workspace(
+    recipe: Recipe, description: RobotDescription, masses: Range, modes: int, count: int
+) -> Iterator[tuple[Floats, Floats]]:
+    """Damped frequencies [Hz] and damping ratios [-] of the lowest modes, with the smallest and the largest payload."""
+    region = workspace(ranges(description))
+    for mass in sorted(set(masses)):
+        estimator = recipe.estimator(description, mass, modes)
+        for q in region.spread(count, description.joints, seed=0):
+            yield estimator.estimate(q)

@@ -1,7 +1,5 @@
 """A study of one's own: cases by methods, and what its tables, its page and its figure show."""
 
-import importlib.util
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
@@ -12,13 +10,14 @@ from typing import Any
 import polars as pl
 
 from tvist_lab.study.case import Case
-from tvist_lab.study.columns import Column, column_of, columns_of, schema_of
+from tvist_lab.study.columns import OF_STATUS, Column, column_of, columns_of, schema_of, summarized
 from tvist_lab.study.engine import Plan
+from tvist_lab.study.foreign import run_file
 from tvist_lab.study.measures import MEASURES, OF_PEAKS
 from tvist_lab.study.method import Method
 from tvist_lab.study.tables import Shown
 from tvist_lab.study.work import FAILED, MEASURED, Job
-from tvist_lab.words import counted, named
+from tvist_lab.words import counted
 
 SHARES = {"median": 0.5, "p5": 0.05, "p95": 0.95}
 """Percentiles of each measure that are summarized."""
@@ -115,21 +114,9 @@ class Study:
 
     def summary(self, rows: pl.DataFrame) -> list[dict[str, Any]]:
         """Return an entry for each setting, arm and method, over all other axes."""
-        measured = pl.col("status") == MEASURED
         keys = [*self.by, *(["arm"] if len(self.cases[0].arms) > 1 else []), "shaper"]
-        shares = {
-            f"{name}.{share}": pl.col(name).filter(measured).quantile(value, "linear")
-            for name in self.measured
-            for share, value in SHARES.items()
-        }
-        grouped = rows.group_by(keys, maintain_order=True).agg(
-            rows=pl.len(), measured=measured.sum(), failed=(pl.col("status") == FAILED).sum(), **shares
-        )
-        return [
-            {name: row[name] for name in (*keys, "rows", "measured", "failed")}
-            | {name: {share: row[f"{name}.{share}"] for share in SHARES} for name in self.measured}
-            for row in grouped.iter_rows(named=True)
-        ]
+        numbers = {"rows": pl.len(), **{name: OF_STATUS[name].sum() for name in (MEASURED, FAILED)}}
+        return summarized(rows, keys, numbers, dict.fromkeys(self.measured, SHARES))
 
     def shown(self, entries: Sequence[dict[str, Any]]) -> list[Shown]:
         """Return the columns of its table."""
@@ -161,16 +148,7 @@ def read_study(path: Path) -> Study:
         OSError: The file cannot be read.
     """
     content = path.read_bytes()
-    name = f"tvist_study_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path.resolve())
-    if spec is None or spec.loader is None:
-        raise StudyError(f"study {path}: must be a Python file, *.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
-        raise StudyError(f"study {path}: running it raises {named(error)}") from error
+    module = run_file(path, "study", StudyError)
     found = getattr(module, "STUDY", None)
     if not isinstance(found, Study):
         raise StudyError(f"study {path}: contains no STUDY = Study(...)")

@@ -5,14 +5,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
+import numpy as np
+
+from tvist_controller.api.line import body, paper_payload
 from tvist_lab.recordings import Recording
 from tvist_lab.runners import TaskError
-from tvist_lab.study.case import Case, World
+from tvist_lab.study.case import Case
+from tvist_lab.study.line import ControlLine
 from tvist_lab.study.measures import OF_PEAKS, Motion, measured
 from tvist_lab.study.method import Method, Task, Waiting
 from tvist_lab.study.shaping import Shaped, ShaperFaultError
 from tvist_lab.words import named
-from tvist_plant.plant import PERIOD
+from tvist_plant.description import Payload
+from tvist_plant.plant import PERIOD, Placeable
 
 MEASURED, TOO_WEAK, FAILED = "measured", "too weak", "failed"
 """What became of a row."""
@@ -50,21 +55,22 @@ class Bench:
     """
 
     def __init__(self, job: Job) -> None:
-        self.job, self._world = job, World(job.case)
+        self.job, case = job, job.case
+        self.task = Task(
+            case.description, case.declared, case.reference(), case.limits, job.as_served, case.stream
+        )
+        """What the first method gets."""
+        self._line = ControlLine(case.description, np.array(case.move.start), self._body(case.declared.mass))
         self._plain: dict[str, Motion] = {}
 
     @cached_property
-    def task(self) -> Task:
-        """What the first method gets."""
-        case = self.job.case
-        return Task(
-            case.description,
-            case.declared,
-            self._world.reference,
-            case.limits,
-            self.job.as_served,
-            case.stream,
-        )
+    def _arms(self) -> dict[str, Placeable]:
+        """The arms by their names, each of which starts anew with each motion."""
+        case, carried = self.job.case, self._body(self.job.case.move.mass)
+        return {arm.name: arm.make(case.description, carried, case.seed) for arm in case.arms}
+
+    def _body(self, mass: float) -> Payload:
+        return body(paper_payload(self.job.case.description, mass))
 
     def make(self, method: Method, ticks: int | None = None) -> Iterator[tuple[str, Motion]]:
         """Yield the motion of each arm, with the arm's name.
@@ -88,15 +94,14 @@ class Bench:
     def unshaped(self, arm: str) -> Motion:
         """Return the unshaped motion of an arm, which is simulated once."""
         if arm not in self._plain:
-            shaped = Shaped(self._world.reference)
+            shaped = Shaped(self.task.reference)
             recording = self._following(shaped)(arm)
             self._plain[arm] = Motion(self.job.case, shaped, recording, partial(self.unshaped, arm))
         return self._plain[arm]
 
     def _following(self, shaped: Shaped) -> Callable[[str], Recording]:
-        world = self._world
-        following = world.line.follow(world.reference, shaped.q, shaped.delay, shaped.elastic)
-        return lambda arm: following.simulate(world.arms[arm], self.job.case.seed)
+        following = self._line.follow(self.task.reference, shaped.q, shaped.delay, shaped.elastic)
+        return lambda arm: following.simulate(self._arms[arm], self.job.case.seed)
 
 
 def measure(job: Job) -> tuple[Row, ...]:

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import out, print_json, typed
-from tvist_cli.report_file import write_report
+from tvist_cli.output import out, print_json, typed, write_report
 
 
 def report(

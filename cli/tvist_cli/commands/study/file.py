@@ -3,16 +3,14 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tvist_cli import studying
+from tvist_cli import kept
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
-from tvist_cli.output import print_json, say, table, typed
-from tvist_cli.report_file import write_report
+from tvist_cli.output import typed
 from tvist_cli.study_names import STUDY
+from tvist_cli.studying import Places
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from tvist_lab.study.study import Study
 
 
@@ -53,53 +51,38 @@ def file(
         sweep(file, output=output, processes=processes, scheduler=scheduler, look=look, json=json)
         return
     from tvist_lab.figures import study_figure
+    from tvist_lab.report import study_page
     from tvist_lab.study.study import StudyError, read_study
 
-    folder = studying.folder_of(file, output, processes, scheduler, look)
-    look.check(folder, markdown, report)
+    places = Places(markdown=markdown, report=report)
+    folder = kept.folder_of(file, output, processes, scheduler, look)
+    places.check()
     with told(StudyError, OSError):
         study = read_study(file)
-    ran, elapsed = studying.run(study.plan(), folder, processes, scheduler)
+    rows, about = kept.run(study.plan(), folder, processes, scheduler)
     result = {
         "study": str(file),
         "title": study.title,
         "notes": study.notes,
-        **studying.about(ran, elapsed, folder),
-        "summary": study.summary(ran.rows),
+        **about,
+        "summary": study.summary(rows),
     }
     figure = study_figure(result["summary"], study.by, study.show)
     with told(OSError):
         result["figure"] = str(look.into(folder).write(figure, "study"))
-        _write(study, result, figure, markdown, report)
-    if json:
-        print_json(result)
-    else:
-        _print(study, result)
-    studying.tell_failed(result, folder)
+    places.write(
+        result,
+        page=lambda: _page(study, result),
+        draw=lambda: {"study": figure},
+        web_page=lambda drawn: study_page(study, result, drawn, typed()),
+    )
+    entries = result["summary"]
+    kept.tell(result, entries, study.shown(entries), json=json, title=f"{study.title}: ")
 
 
-def _write(
-    study: "Study", result: dict[str, Any], figure: "Figure", markdown: Path | None, report: Path | None
-) -> None:
+def _page(study: "Study", result: dict[str, Any]) -> str:
     from tvist_lab.studies.pages import page
     from tvist_lab.study.measures import MEASURES
 
-    columns = study.shown(result["summary"])
-    if markdown is not None:
-        measures = [MEASURES[name] for name in study.show]
-        text = page("study", result, typed(), columns=columns, measures=measures, left=len(study.by) + 1)
-        markdown.write_text(text, encoding="utf-8")
-    if report is not None:
-        from tvist_lab.report import study_page
-
-        write_report(report, study_page(study, result, figure, typed()))
-
-
-def _print(study: "Study", result: dict[str, Any]) -> None:
-    from tvist_lab.study.tables import cells, titles
-
-    columns = study.shown(result["summary"])
-    done = f"{result['rows']} rows in {result['rows_file']}; {result['tasks_done_before']} moves were done before"
-    table(f"{study.title}: {done}", titles(columns), cells(result["summary"], columns))
-    studying.say_effort(result)
-    say(f"{result['figure']} shows the table")
+    columns, measures = study.shown(result["summary"]), [MEASURES[name] for name in study.show]
+    return page("study", result, typed(), columns=columns, measures=measures, left=len(study.by) + 1)

@@ -4,13 +4,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import number, out, print_json, table, write_json
-from tvist_cli.shapers_of import of_impulses
+from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.output import number, out, table
+from tvist_cli.shapers_of import calibration_of, of_impulses
 from tvist_cli.simulated_arm import masses_of
+from tvist_cli.studying import Figures, Places, check_range, give
 
 if TYPE_CHECKING:
-    from tvist_protocol.calibration import Calibration
+    from tvist_lab.studies.workspace_map import WorkspaceMap
 
 
 def map(  # noqa: A001  the command's name
@@ -43,18 +44,21 @@ def map(  # noqa: A001  the command's name
         look: How to write the figures.
         json: Print one JSON object.
     """
+    from tvist_controller.calibrations import default_for
     from tvist_lab.studies.workspace_map import QUANTITIES, MapError, workspace_map
     from tvist_plant.description import DescriptionError, load
     from tvist_shaping import ShapingError
 
-    look.check(figures, output)
-    if not 3 <= points <= 501:
-        raise Failure(f"points is {points}: must be 3 to 501", code=2)
+    places = Places(output=output, figures=figures, look=look)
+    places.check()
+    check_range("points", points, 3, 501)
     with told(DescriptionError, code=2):
         description = load(robot)
     mass = masses_of(None if payload is None else str(payload), description)[0]
-    known = _calibration(calibration, description.robot.model)
-    chosen = of_impulses(shaper)
+    model = description.robot.model
+    if (name := calibration or default_for(model)) is None:
+        raise Failure(f"the package has no calibration of a {model}: give --calibration FILE", code=2)
+    known, chosen = calibration_of(name), of_impulses(shaper)
     with told(MapError, ShapingError, code=2):
         found = workspace_map(description, known, chosen, mass, points)
     words = f"{description.robot.name}, {mass:g} kg, calibration {known.name}, shaper {chosen.name}"
@@ -65,52 +69,34 @@ def map(  # noqa: A001  the command's name
         "shaper": chosen.name,
         **found.as_dict(),
     }
-    if result["left_out"] == points**2:
-        raise Failure(f"robot {robot} touches itself or the floor in each of the {points**2} configurations")
-    with told(OSError):
-        if output is not None:
-            write_json(output, result)
-        if figures is not None:
-            from tvist_lab.figures import workspace_map_figure
-
-            files = look.into(figures)
-            write(
-                files,
-                {
-                    f"map_{name}": workspace_map_figure(found, key, words, files.columns)
-                    for key, name in QUANTITIES.items()
-                },
-            )
-    if json:
-        print_json(result)
-        return
     free = points**2 - result["left_out"]
-    table(
-        f"{words}: {free} of {points**2} configurations of {found.names[0]} and {found.names[1]}",
-        ("map", "identified from", "to", "true from", "to", "error % median", "p95", "max"),
-        [_row(key, result) for key in QUANTITIES],
-    )
-    out.print("error: size of the deviation of what is identified from what is true, in percent")
+    if not free:
+        raise Failure(f"robot {robot} touches itself or the floor in each of the {points**2} configurations")
+    places.write(result, draw=lambda: _figures(found, words, look.columns or 2))
+    title = f"{words}: {free} of {points**2} configurations of {found.names[0]} and {found.names[1]}"
+
+    def say_it(result: dict[str, Any]) -> None:
+        columns = ("map", "identified from", "to", "true from", "to", "error % median", "p95", "max")
+        table(title, columns, [_row(key, result) for key in QUANTITIES])
+        out.print("error: size of the deviation of what is identified from what is true, in percent")
+
+    give(result, say_it, json=json)
 
 
-def _calibration(name: str | None, model: str) -> "Calibration":
-    from tvist_controller.calibrations import default_for, load
-    from tvist_protocol.calibration import CalibrationError
+def _figures(found: "WorkspaceMap", words: str, columns: int) -> Figures:
+    from tvist_lab.figures import workspace_map_figure
+    from tvist_lab.studies.workspace_map import QUANTITIES
 
-    if name is None:
-        name = default_for(model)
-    if name is None:
-        raise Failure(f"the package has no calibration of a {model}: give --calibration FILE", code=2)
-    with told(CalibrationError, code=2):
-        return load(name)
+    return {
+        f"map_{name}": workspace_map_figure(found, key, words, columns) for key, name in QUANTITIES.items()
+    }
 
 
 def _row(key: str, result: dict[str, Any]) -> tuple[str, ...]:
     maps, errors = result["maps"][key], result["errors"][key]
-    digits = 3 if key == "zeta" else 1
     ends = []
     for kind in ("identified", "true"):
         values = [value for row in maps[kind] for value in row if value is not None]
-        ends += [number(min(values), digits), number(max(values), digits)]
+        ends += [number(end(values), 3 if key == "zeta" else 1) for end in (min, max)]
     sizes = (number(errors[name], 1) for name in ("median_percent", "p95_percent", "max_percent"))
     return (key.replace("_hz", " Hz").replace("_ms", " ms"), *ends, *sizes)

@@ -5,14 +5,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import out, print_json, progress, say, table, typed, words
-from tvist_cli.simulated_arm import UNIFORM, check_count, check_seed, disturbed, masses_of, named
+from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.output import out, say, typed, words
+from tvist_cli.shapers_of import calibration_of, designing
+from tvist_cli.simulated_arm import UNIFORM, disturbed, masses_of, named
+from tvist_cli.studying import Figures, Places, check_range, check_seed, command, gathered, give, show
 
 if TYPE_CHECKING:
-    from tvist_lab.figures import FigureFiles
-    from tvist_lab.studies.paths import JudgedPath, PathJob
     from tvist_plant.description import RobotDescription
     from tvist_protocol.calibration import Calibration
 
@@ -60,24 +59,39 @@ def paths(
         json: Print one JSON object.
     """
     from tvist_lab.studies.path_examples import circle
-    from tvist_lab.studies.path_report import page_of, report
-    from tvist_lab.studies.paths import SHAPERS, PathJob
+    from tvist_lab.studies.paths import SHAPERS, PathJob, PathsError, compare, page_of, report
     from tvist_lab.studies.random_paths import KINDS
+    from tvist_lab.study.recipes import Recipe
+    from tvist_lab.study.shaping import ShaperFaultError
     from tvist_plant.description import load
 
-    look.check(figures, markdown)
-    check_count("random", random, 100_000)
+    places = Places(markdown=markdown, figures=figures, look=look)
+    places.check()
+    check_range("random", random, 1, 100_000)
     check_seed(seed, bits=63)
-    description, known = load(ROBOT), _calibration(calibration)
+    description, known = load(ROBOT), calibration_of(calibration)
     masses = masses_of(payload, description)
     chosen = tuple(dict.fromkeys(name.lower() for name in shapers)) if shapers else SHAPERS
     plant, kept = disturbed(description, disturbances, clean=clean)
-    _try_out(chosen, known, plant)
+    for name in chosen:
+        recipe = Recipe(name, known)
+        with designing():
+            recipe.elastic(plant, recipe.make(plant, 0.0))
     kinds = KINDS if kind is None else (kind,)
     jobs = [PathJob(plant, known, chosen, masses, seed, place, kinds) for place in range(random)]
-    judged = _judged(jobs)
+    judged = gathered(compare(jobs), len(jobs), "paths", PathsError, ShaperFaultError)
+    options = {
+        "random": random,
+        "seed": seed,
+        "kind": kind,
+        "shapers": shapers,
+        "payload": None if payload == UNIFORM else payload,
+        "calibration": None if calibration == CALIBRATION else calibration,
+        "disturbances": disturbances,
+        "clean": clean,
+    }
     result = {
-        "command": _command(random, kind, shapers, payload, calibration, seed, disturbances, clean=clean),
+        "command": command("study paths", **options),
         "calibration": known.name,
         "payload_kg": list(masses),
         "plant": named(kept),
@@ -86,95 +100,29 @@ def paths(
         "circle": circle(plant, known),
         **report(judged),
     }
-    with told(OSError):
-        if markdown is not None:
-            markdown.write_text(page_of(result, typed()), encoding="utf-8")
-        if figures is not None:
-            _draw(result["paths"], plant, known, look.into(figures))
-    if json:
-        print_json(result)
-    else:
-        _print(result)
-
-
-def _calibration(name: str) -> "Calibration":
-    from tvist_controller.calibrations import load
-    from tvist_protocol.calibration import CalibrationError
-
-    with told(CalibrationError, code=2):
-        return load(name)
-
-
-def _try_out(shapers: tuple[str, ...], known: "Calibration", description: "RobotDescription") -> None:
-    """Refuse shapers that do not exist, and a calibration of another arm."""
-    from tvist_controller.refusal import RefusalError
-    from tvist_lab.study.recipes import Recipe, RecipeError
-    from tvist_shaping.errors import ShapingError
-
-    for name in shapers:
-        with told(RecipeError, RefusalError, ShapingError, code=2):
-            Recipe(name, known).make(description, 0.0)
-
-
-def _judged(jobs: "list[PathJob]") -> "list[JudgedPath]":
-    from tvist_lab.studies.paths import PathsError, compare
-    from tvist_lab.study.shaping import ShaperFaultError
-
-    judged: list[JudgedPath] = []
-    with progress(len(jobs), "paths") as bar, told(PathsError, ShaperFaultError):
-        for one in compare(jobs):
-            judged.append(one)
-            bar(1, None)
-    return judged
-
-
-def _command(
-    random: int,
-    kind: str | None,
-    shapers: list[str] | None,
-    payload: str,
-    calibration: str,
-    seed: int,
-    disturbances: str | None,
-    *,
-    clean: bool,
-) -> str:
-    """The command that gives the same figures."""
-    return " ".join(
-        ["tvist", "study", "paths", "--random", str(random), "--seed", str(seed)]
-        + ([] if kind is None else ["--kind", kind])
-        + ([] if shapers is None else ["--shapers", *shapers])
-        + ([] if payload == UNIFORM else ["--payload", payload])
-        + ([] if calibration == CALIBRATION else ["--calibration", calibration])
-        + ([] if disturbances is None else ["--disturbances", disturbances])
-        + (["--clean"] if clean else [])
+    places.write(
+        result, page=lambda: page_of(result, typed()), draw=lambda: _figures(result["paths"], plant, known)
     )
+    give(result, _print, json=json)
 
 
-def _draw(
-    paths: list[dict[str, Any]], description: "RobotDescription", known: "Calibration", files: "FigureFiles"
-) -> None:
+def _figures(paths: list[dict[str, Any]], description: "RobotDescription", known: "Calibration") -> Figures:
     from tvist_lab.figures import corner_figure, path_shaping_figure
     from tvist_lab.studies.path_examples import corner
 
-    figures = {
+    return {
         "path_shaping": path_shaping_figure(paths),
         "path_corner": corner_figure(corner(description, known)),
     }
-    write(files, figures)
 
 
 def _print(result: dict[str, Any]) -> None:
-    from tvist_lab.studies.path_report import COLUMNS, TERMS, circle_in_words, rows, title_of
-    from tvist_lab.study.tables import cells, titles
+    from tvist_lab.studies.path_examples import circle_in_words
+    from tvist_lab.studies.paths import COLUMNS, TERMS, rows, title_of
 
     for kind, group in result["summary"].items():
         if kind != "all":
-            table(
-                f"{title_of(kind, group)}; arm {result['plant']}",
-                titles(COLUMNS),
-                cells(rows(group), COLUMNS),
-            )
+            show(f"{title_of(kind, group)}; arm {result['plant']}", rows(group), COLUMNS)
     words(TERMS)
     out.print(circle_in_words(result["circle"]), soft_wrap=True)
     say(

@@ -1,18 +1,15 @@
 """`tvist study robustness`: how much each shaper reduces vibration if stiffness or payload are wrong."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from tvist_cli.commands.shaperbench import methods_of, modal_calibration
-from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import number, print_json, progress, table, typed, write_json
-from tvist_cli.simulated_arm import check_count, check_seed
-
-if TYPE_CHECKING:
-    from tvist_lab.study.work import Row
+from tvist_cli.failure import Failure
+from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.output import typed
+from tvist_cli.shapers_of import modal_calibration, on_the_bench
+from tvist_cli.studying import Figures, Places, check_range, check_seed, command, gathered, give, show
 
 
 def robustness(
@@ -44,75 +41,48 @@ def robustness(
         markdown: File to write a page with the tables to.
         json: Print one JSON object.
     """
-    from tvist_lab.studies import robustness as robust
-    from tvist_lab.studies.shaperbench import draw
+    from tvist_lab.studies.pages import page
+    from tvist_lab.studies.robustness import jobs, report, tables
+    from tvist_lab.studies.shaperbench import CALIBRATION, draw
     from tvist_lab.study.engine import made
     from tvist_lab.study.shaping import ShaperFaultError
-    from tvist_plant.description import load
 
-    look.check(figures, output, markdown)
-    check_count("moves", moves, 10_000)
+    places = Places(output=output, markdown=markdown, figures=figures, look=look)
+    places.check()
+    check_range("moves", moves, 1, 10_000)
     check_seed(seed)
-    description = load("ur5e")
-    known = modal_calibration(calibration)
-    names = None if against is None else [name.lower() for name in against]
-    methods = methods_of(None, names, known)[1:]  # all but waiting, with which they are compared
+    known = modal_calibration(calibration or CALIBRATION)
+    against = None if against is None else [name.lower() for name in against]
+    description, (_, *methods) = on_the_bench(known, against)  # all but waiting, with which they are compared
     if not methods:
         raise Failure("against names no shaper besides waiting", code=2)
-    jobs = robust.jobs(description, methods, draw(description, moves, seed), seed)
-    done: list[Row] = []
-    with told(ShaperFaultError), progress(len(jobs), "moves") as bar:
-        for rows in made(jobs):
-            done += rows
-            bar(1, None)
-    options = [] if names is None else ["--against", *names]
-    options += [] if calibration is None else ["--calibration", calibration]
+    todo = jobs(description, methods, draw(description, moves, seed), seed)
+    done = gathered(made(todo), len(todo), "moves", ShaperFaultError)
+    options = {"against": against, "calibration": calibration, "moves": moves, "seed": seed}
     result: dict[str, Any] = {
-        "command": " ".join(
-            ["tvist", "study", "robustness", *options, "--moves", str(moves), "--seed", str(seed)]
-        ),
+        "command": command("study robustness", **options),
         "moves": moves,
         "seed": seed,
         "calibration": known.name,
-        "shapers": robust.report(methods, done),
+        "shapers": report(methods, [row for rows in done for row in rows]),
     }
-    _write(result, output, markdown, figures, look)
-    if json:
-        print_json(result)
-        return
-    for kind in robust.ERRORS:
-        told_wrong = robust.errors_of(kind)
-        table(
-            f"reduction in %, median / p5 over {moves} moves, with wrong {kind}",
-            ("shaper", "delay ms", *told_wrong),
-            [_row(row, kind, told_wrong) for row in result["shapers"]],
-        )
+    places.write(
+        result,
+        page=lambda: page("robustness", result, typed(), tables=tables()),
+        draw=lambda: _figures(result),
+    )
+    give(result, _print, json=json)
 
 
-def _row(row: dict[str, Any], kind: str, names: list[str]) -> tuple[str, ...]:
-    found = [row[kind][name]["reduction_percent"] for name in names]
-    return (
-        row["name"], number(row["delay_ms"], 0),
-        *(f"{number(one['median'], 1)} / {number(one['p5'], 1)}" for one in found),
-    )  # fmt: skip
+def _figures(result: dict[str, Any]) -> Figures:
+    from tvist_lab.figures import robustness_figure
+
+    return {"robustness": robustness_figure(result["shapers"])}
 
 
-def _write(
-    result: dict[str, Any],
-    output: Path | None,
-    markdown: Path | None,
-    figures: Path | None,
-    look: FigureOptions,
-) -> None:
-    with told(OSError):
-        if output is not None:
-            write_json(output, result)
-        if markdown is not None:
-            from tvist_lab.studies.pages import page
-            from tvist_lab.studies.robustness import tables
+def _print(result: dict[str, Any]) -> None:
+    from tvist_lab.studies.robustness import ERRORS, on_terminal
 
-            markdown.write_text(page("robustness", result, typed(), tables=tables()), encoding="utf-8")
-        if figures is not None:
-            from tvist_lab.figures import robustness_figure
-
-            write(look.into(figures), {"robustness": robustness_figure(result["shapers"])})
+    for kind in ERRORS:
+        title = f"reduction in %, median / p5 over {result['moves']} moves, with wrong {kind}"
+        show(title, result["shapers"], on_terminal(kind))

@@ -1,20 +1,20 @@
 """`tvist study tracking`: measure how closely the arm follows positions sent to servoj, with every shaper."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure, told
-from tvist_cli.output import print_json, progress, say, table
-
-if TYPE_CHECKING:
-    from tvist_lab.studies.tracking.study import Tracked, TrackingJob
+from tvist_cli.failure import Failure
+from tvist_cli.output import say
+from tvist_cli.studying import Places, check_range, command, gathered, give, show
 
 FASTEST = 3.1
 """Highest speed [rad/s], a little below the UR5e's."""
 RATING = 5.0
 """Heaviest payload, which is the UR5e's rating [kg]."""
+TOLERANCE = 0.2
+"""Path tolerance of every joint in the driver's configuration [rad]."""
 
 
 def tracking(
@@ -22,7 +22,7 @@ def tracking(
     shapers: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     speeds: Annotated[list[float] | None, Parameter(consume_multiple=True)] = None,
     payload: float = 0.0,
-    tolerance: float = 0.2,
+    tolerance: float = TOLERANCE,
     markdown: Path | None = None,
     json: bool = False,
 ) -> None:
@@ -42,17 +42,28 @@ def tracking(
         markdown: File to write a page with the tables to.
         json: Print one JSON object.
     """
-    from tvist_lab.studies.tracking.following import GAIN, LOOKAHEAD
-    from tvist_lab.studies.tracking.report import TITLES, columns, page_of, report, rows
-    from tvist_lab.studies.tracking.study import SPEEDS, UNSHAPED, TrackingJob
+    from tvist_lab.studies.tracking.following import GAIN, LOOKAHEAD, TrackingError
+    from tvist_lab.studies.tracking.study import SPEEDS, UNSHAPED, TrackingJob, compare, page_of, report
     from tvist_lab.studies.tracking.ways import WAYS
     from tvist_plant.plant import PERIOD
 
     at = tuple(sorted(set(speeds or SPEEDS)))
-    _check(at, payload, tolerance)
+    for speed in at:
+        if not 0.0 < speed <= FASTEST:
+            raise Failure(f"speeds has {speed:g}: must be above 0 and at most {FASTEST:g} rad/s", code=2)
+    check_range("payload", payload, 0.0, RATING, " kg")
+    if tolerance <= 0.0:
+        raise Failure(f"tolerance is {tolerance:g}: must be more than 0 rad", code=2)
     chosen, refused = _usable(shapers, payload)
+    options = {
+        "shapers": shapers,
+        "speeds": speeds,
+        "payload": payload or None,
+        "tolerance": None if tolerance == TOLERANCE else tolerance,
+        "markdown": markdown,
+    }
     result: dict[str, Any] = {
-        "command": _command(shapers, speeds, payload, tolerance, markdown),
+        "command": command("study tracking", **options),
         "payload_kg": payload,
         "tolerance_rad": tolerance,
         "speeds_rad_s": list(at),
@@ -67,28 +78,18 @@ def tracking(
         for way in WAYS
         for speed in at
     ]
-    result["shapers"] = report(_tracked(jobs), tolerance)
-    if markdown is not None:
-        with told(OSError):
-            markdown.write_text(page_of(result), encoding="utf-8")
-    if json:
-        print_json(result)
-        return
-    for way in WAYS:
-        drawn = [[cell.replace("**", "*") for cell in row] for row in rows(result, way)]
-        table(f"largest error in rad; {TITLES[way]}", columns(result, way), drawn)
-    for name, why in refused.items():
+    result["shapers"] = report(gathered(compare(jobs), len(jobs), "motions", TrackingError), tolerance)
+    Places(markdown=markdown).write(result, page=lambda: page_of(result))
+    give(result, _print, json=json)
+
+
+def _print(result: dict[str, Any]) -> None:
+    from tvist_lab.studies.tracking.study import TITLES, columns
+
+    for way, title in TITLES.items():
+        show(f"largest error in rad; {title}", result["shapers"], columns(result, way, "*"))
+    for name, why in result["refused"].items():
         say(f"{name} was left out: {why}")
-
-
-def _check(speeds: tuple[float, ...], payload: float, tolerance: float) -> None:
-    for speed in speeds:
-        if not 0.0 < speed <= FASTEST:
-            raise Failure(f"speeds has {speed:g}: must be above 0 and at most {FASTEST:g} rad/s", code=2)
-    if not 0.0 <= payload <= RATING:
-        raise Failure(f"payload is {payload:g}: must be 0 to {RATING:g} kg", code=2)
-    if tolerance <= 0.0:
-        raise Failure(f"tolerance is {tolerance:g}: must be more than 0 rad", code=2)
 
 
 def _usable(shapers: list[str] | None, payload: float) -> tuple[list[str], dict[str, str]]:
@@ -107,33 +108,3 @@ def _usable(shapers: list[str] | None, payload: float) -> tuple[list[str], dict[
     if shapers and refused:
         raise Failure(next(iter(refused.values())), code=2)
     return [name for name in found if name not in refused], refused
-
-
-def _tracked(jobs: "list[TrackingJob]") -> "list[Tracked]":
-    from tvist_lab.studies.tracking.following import TrackingError
-    from tvist_lab.studies.tracking.study import compare
-
-    tracked: list[Tracked] = []
-    with progress(len(jobs), "motions") as bar, told(TrackingError):
-        for one in compare(jobs):
-            tracked.append(one)
-            bar(1, None)
-    return tracked
-
-
-def _command(
-    shapers: list[str] | None,
-    speeds: list[float] | None,
-    payload: float,
-    tolerance: float,
-    markdown: Path | None,
-) -> str:
-    """The command that gives the same figures."""
-    return " ".join(
-        ["tvist", "study", "tracking"]
-        + ([] if shapers is None else ["--shapers", *shapers])
-        + ([] if speeds is None else ["--speeds", *(f"{speed:g}" for speed in speeds)])
-        + ([] if payload == 0.0 else ["--payload", f"{payload:g}"])
-        + ([] if tolerance == 0.2 else ["--tolerance", f"{tolerance:g}"])
-        + ([] if markdown is None else ["--markdown", str(markdown)])
-    )

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -11,14 +11,12 @@ from tvist_controller.api.line import Setup, body, modal_estimator, paper_payloa
 from tvist_lab.identification.modal import identify_modal
 from tvist_lab.identification.modal_plan import ModalPlan, free_configurations, jog_of
 from tvist_lab.in_process import robot_in_process
-from tvist_lab.studies.evaluate import MEASURED, methods, report
+from tvist_lab.studies.evaluate import feasible, jobs, report
 from tvist_lab.study.arms import stiffer
-from tvist_lab.study.case import Case, arm_seed
 from tvist_lab.study.engine import made
 from tvist_lab.study.method import Named
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe
-from tvist_lab.study.work import Job
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
@@ -31,30 +29,8 @@ MODES = 3
 """Number of modes that are compared."""
 ALONE = 4
 """Least number of joints of an arm that auto can shape: it suppresses four modes."""
-
-
-@dataclass(frozen=True)
-class Measured:
-    """An arm with one calibration."""
-
-    stiffness: float
-    """Stiffness of gears and links relative to the robot file's [-]."""
-    calibration: str
-    """Name of the calibration; "identified" if it was made for this measurement."""
-    f_d_error_percent: list[float]
-    """Median error of each mode's damped frequency [%]."""
-    moves: int
-    """Number of moves that were made."""
-    too_weak: int
-    """Number of drawn moves that were left out since the drives are too weak."""
-    counted: int
-    """Number of moves with enough vibration for a percentage."""
-    reduction_percent: dict[str, float | None]
-    """Reduction of the peak by `auto`, over moves [%]."""
-    delay_ms: float
-    """Median delay [ms]."""
-    sag_error_percent: float
-    """Largest difference of a gear's twist at rest from g/K, relative to the largest twist in that pose [%]."""
+TWIST = 1e-7
+"""Twist below which gravity loads no gear [rad]."""
 
 
 def measure(
@@ -65,7 +41,7 @@ def measure(
     moves: int,
     seed: int,
     progress: Callable[[int], None] = lambda _: None,
-) -> Measured:
+) -> dict[str, Any]:
     """Measure an arm whose springs are stiffer by a factor.
 
     Args:
@@ -75,34 +51,36 @@ def measure(
         moves: Number of random moves with the rated payload.
         seed: Seed of moves, identification and gear errors.
         progress: Called with the number of moves that were made.
+
+    Returns:
+        Factor of the `stiffness`; name of the `calibration`, "identified" if it was made for this measurement;
+        `f_d_error_percent`, the median error of each mode's damped frequency; numbers of `moves`, of those left out
+        since the drives are `too_weak`, and of those `counted` since they vibrate enough for a percentage;
+        `reduction_percent` of the peak by `auto`, over moves; `delay_ms`, its median; and `sag_error_percent`, see
+        `sag_error`.
     """
     arm = description if stiffness == 1.0 else stiffer(description, stiffness)
     known = asyncio.run(_identified(arm, seed)) if calibration is None else calibration
     mass = arm.payload.mass
     drawn = draw_moves(arm, moves, seed, (mass, mass)).moves
-    feasible = [move for move in drawn if Case(arm, move).torque_share <= 1.0]
-    auto = methods(Named(Recipe("auto", known), "auto"), ())
-    jobs = [
-        Job(Case(arm, move, arm_seed(seed, place), axes={"payload_kg": move.mass}), auto, MEASURED)
-        for place, move in enumerate(feasible)
-    ]
+    able = feasible(drawn, arm)
     judged = []
-    for rows in made(jobs):
+    for rows in made(jobs(arm, able, seed, Named(Recipe("auto", known), "auto"))):
         judged.append(rows)
         progress(1)
-    progress(len(drawn) - len(feasible))
+    progress(len(drawn) - len(able))
     summary = report(judged)
-    return Measured(
-        stiffness=stiffness,
-        calibration="identified" if calibration is None else known.name,
-        f_d_error_percent=_mode_errors(arm, known, seed),
-        moves=len(feasible),
-        too_weak=len(drawn) - len(feasible),
-        counted=summary["counted"],
-        reduction_percent={key: summary["reduction_percent"][key] for key in ("median", "p5", "min")},
-        delay_ms=summary["delay_ms"]["median"],
-        sag_error_percent=sag_error(arm, seed),
-    )
+    return {
+        "stiffness": stiffness,
+        "calibration": "identified" if calibration is None else known.name,
+        "f_d_error_percent": _mode_errors(arm, known, seed),
+        "moves": len(able),
+        "too_weak": len(drawn) - len(able),
+        "counted": summary["counted"],
+        "reduction_percent": {key: summary["reduction_percent"][key] for key in ("median", "p5", "min")},
+        "delay_ms": summary["delay_ms"]["median"],
+        "sag_error_percent": sag_error(arm, seed),
+    }
 
 
 async def _identified(arm: RobotDescription, seed: int) -> Calibration:
@@ -155,7 +133,3 @@ def sag_error(arm: RobotDescription, seed: int) -> float:
             twist = plant.truth().gear_deflection
             worst = max(worst, float(np.abs(twist - expected).max()) / largest)
     return 100.0 * worst
-
-
-TWIST = 1e-7
-"""Twist below which gravity loads no gear [rad]."""

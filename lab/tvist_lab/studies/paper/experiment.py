@@ -19,14 +19,7 @@ from tvist_lab.metrics import (
 )
 from tvist_lab.recordings import Recording
 from tvist_lab.robust import robust_over
-from tvist_lab.studies.paper.methods import (
-    EqualDuration,
-    FixedShaper,
-    FrozenAtEnd,
-    Method,
-    TimeVarying,
-    Unshaped,
-)
+from tvist_lab.studies.paper.methods import FROZEN_AT_END, SHAPED, UNSHAPED, Method, equal_duration, fixed
 from tvist_lab.studies.paper.published import MOTIONS, pose
 from tvist_protocol.info import Info
 
@@ -120,13 +113,13 @@ async def run(robot: Robot, arm: Arm, motion: str, method: Method, seed: int) ->
     period = 1.0 / (await robot.info()).rate_hz
     await arm.reset(q=start, seed=seed)
     await robot.advance(1)
-    jerk = await method.prepare(robot, arm, end)
+    await method.prepare(robot, arm, end)
     reset = await arm.reset(q=start, seed=seed) or 0
     await robot.advance(1)
     await robot.until(reset + 1)  # an answer may overtake earlier states
     with collect(robot) as collected:
         await robot.advance(round(BEFORE / period))
-        await arm.move_j(end, jerk=jerk)
+        await arm.move_j(end, jerk=method.jerk)
         await robot.advance(round(AFTER / period))
     return collected.recording()
 
@@ -146,8 +139,7 @@ async def experiment(
     """
     done = Experiment(info=await robot.info(), seed=seed, runs=runs, table_1=await table_1(robot, arm))
     for motion in MOTIONS:
-        methods: list[Method] = [Unshaped(), TimeVarying()]
-        for method in methods:
+        for method in (UNSHAPED, SHAPED):
             await _repeat(robot, arm, done, motion, method, runs, progress)
         if baselines:
             for method in fixed_baselines(done.info, done.delay(motion)):
@@ -158,13 +150,10 @@ async def experiment(
 def fixed_baselines(info: Info, delay: float) -> Sequence[Method]:
     """Return the baselines that the paper's method has to be compared with."""
     if info.calibration is None:
-        return [EqualDuration(delay)]
+        return [equal_duration(delay)]
     f_d, zeta = info.calibration.f_d_range, info.calibration.zeta_range
-    robust = [
-        FixedShaper(name, *robust_over(name, f_d, zeta), name=f"fixed_{name}", label=f"fixed {name.upper()}")
-        for name in ("mzv", "ei2", "ei3")
-    ]
-    return [EqualDuration(delay), FrozenAtEnd(), *robust]
+    robust = [fixed(name, *robust_over(name, f_d, zeta)) for name in ("mzv", "ei2", "ei3")]
+    return [equal_duration(delay), FROZEN_AT_END, *robust]
 
 
 def count(runs: int, *, baselines: bool) -> int:

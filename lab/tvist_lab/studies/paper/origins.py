@@ -16,6 +16,33 @@ MEANINGS = {
     NOT_MATCHED: "the figure differs, and the table shows by how much",
 }
 
+OF_MOTION = (
+    (
+        "delay", "shaped", "delay_ms", "{:.1f} ms", PREDICTED, "half a damped period at the end, in whole ticks",
+    ),
+    (
+        "RV unshaped", "unshaped", "residual_vibration_m_s2", "{:.2f} m/s²", TUNED,
+        "share of the gears' wind-up that is fed forward",
+    ),
+    (
+        "RV reduced by", "impact_percent", "residual_vibration", "{:.1f} %", TUNED,
+        "width and share of fed-forward friction; the shaper itself was not changed",
+    ),
+    (
+        "cycle time", "impact_percent", "cycle", "{:+.1f} %", NOT_MATCHED,
+        "the direction is tuned with friction; the paper's tails of 0.5 to 1 s do not occur here",
+    ),
+    (
+        "stabilisation", "impact_percent", "stabilisation", "{:+.1f} %", NOT_MATCHED,
+        "a threshold of 0.03 mm on a creeping tail; the direction is right",
+    ),
+    (
+        "overshoot", "impact_percent", "overshoot", "{:+.1f} %", NOT_MATCHED,
+        "the same threshold; the direction is right",
+    ),
+)  # fmt: skip
+"""Figures of each motion: name, place in Table 2, form, origin and reason."""
+
 
 def origins(result: dict[str, Any]) -> list[tuple[str, str, str, str, str]]:
     """Return rows of the figure, the paper's value, ours, the origin of ours, and the reason.
@@ -38,43 +65,11 @@ def origins(result: dict[str, Any]) -> list[tuple[str, str, str, str, str]]:
         "only the lower end matches; bent poses of this arm are stiffer than the paper's stiffest",
     ))  # fmt: skip
     for motion, ours in result["table_2"].items():
-        rows += _of_motion(motion, theirs["table_2"][motion], ours)
+        for name, kind, column, form, origin, remark in OF_MOTION:
+            values = (one[kind][column] for one in (theirs["table_2"][motion], ours))
+            paper, here = ("–" if value is None else form.format(value) for value in values)
+            rows.append((f"{motion}, {name}", paper, here, origin, remark))
     rows.append((
         "figure 4, EI over 6 to 15 Hz", "36 %", "35.82 %", PREDICTED, "follows from the shaper's formula",
     ))  # fmt: skip
     return rows
-
-
-def _of_motion(
-    motion: str, paper: dict[str, Any], ours: dict[str, Any]
-) -> list[tuple[str, str, str, str, str]]:
-    def pair(kind: str, column: str, form: str) -> tuple[str, str]:
-        values = (paper[kind][column], ours[kind][column])
-        return tuple("–" if value is None else form.format(value) for value in values)  # type: ignore[return-value]
-
-    return [
-        (
-            f"{motion}, delay", *pair("shaped", "delay_ms", "{:.1f} ms"), PREDICTED,
-            "half a damped period at the end, in whole ticks",
-        ),
-        (
-            f"{motion}, RV unshaped", *pair("unshaped", "residual_vibration_m_s2", "{:.2f} m/s²"), TUNED,
-            "share of the gears' wind-up that is fed forward",
-        ),
-        (
-            f"{motion}, RV reduced by", *pair("impact_percent", "residual_vibration", "{:.1f} %"), TUNED,
-            "width and share of fed-forward friction; the shaper itself was not changed",
-        ),
-        (
-            f"{motion}, cycle time", *pair("impact_percent", "cycle", "{:+.1f} %"), NOT_MATCHED,
-            "the direction is tuned with friction; the paper's tails of 0.5 to 1 s do not occur here",
-        ),
-        (
-            f"{motion}, stabilisation", *pair("impact_percent", "stabilisation", "{:+.1f} %"), NOT_MATCHED,
-            "a threshold of 0.03 mm on a creeping tail; the direction is right",
-        ),
-        (
-            f"{motion}, overshoot", *pair("impact_percent", "overshoot", "{:+.1f} %"), NOT_MATCHED,
-            "the same threshold; the direction is right",
-        ),
-    ]  # fmt: skip

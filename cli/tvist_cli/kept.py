@@ -1,0 +1,137 @@
+"""Run a study whose rows are kept in a folder: its options, its progress, and what it took."""
+
+import re
+import time
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.figure_files import FigureOptions
+from tvist_cli.output import print_json, progress, say
+from tvist_cli.studying import check_range, show
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from tvist_lab.study.engine import Plan
+    from tvist_lab.study.tables import Entry, Shown
+
+ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?([^\s:/\[\]]+|\[[\da-fA-F:.]+\]):\d{1,5}")
+"""Address of a scheduler."""
+
+
+def folder_of(
+    file: Path, output: Path | None, processes: int | None, scheduler: str | None, look: FigureOptions
+) -> Path:
+    """Return the folder of a study's rows, after a check of the options.
+
+    Raises:
+        Failure: An option is invalid, or there is no name for the folder.
+    """
+    if processes is not None and scheduler is not None:
+        raise Failure("give either --processes or --scheduler", code=2)
+    if processes is not None:
+        check_range("processes", processes, 1, 1024)
+    if scheduler is not None and not ADDRESS.fullmatch(scheduler):
+        raise Failure(f"scheduler is {scheduler!r}: must be an address such as tcp://HOST:8786", code=2)
+    if output is None and not file.suffix:
+        raise Failure(f"{file} has no suffix to leave out: give a folder as --output", code=2)
+    folder = file.with_suffix("") if output is None else output
+    look.check(folder)
+    return folder
+
+
+def run(
+    plan: "Plan", folder: Path, processes: int | None, scheduler: str | None
+) -> "tuple[pl.DataFrame, dict[str, Any]]":
+    """Run what is missing of a study.
+
+    Returns:
+        All rows; and what every study prints with --json about its rows and its run.
+
+    Raises:
+        Failure: The folder cannot be used, or the runner does not run.
+    """
+    from tvist_lab.runners.cluster import Cluster
+    from tvist_lab.study import engine
+    from tvist_lab.study.store import ROWS
+    from tvist_lab.study.work import FAILED, TOO_WEAK
+
+    began = time.monotonic()
+    with told(OSError), ExitStack() as stack:
+        kept = f"they are kept in {folder}, and the same command continues"
+
+        def begin(missing: int) -> Any:
+            bar = stack.enter_context(progress(missing, "moves", kept))
+            return lambda done: bar(done, None)
+
+        ran = engine.run(plan, folder, Cluster(scheduler, processes), begin)
+    rows, effort = ran.rows, ran.effort
+    return rows, {
+        "rows_file": str(folder / ROWS),
+        "rows": len(rows),
+        "failed": int((rows["status"] == FAILED).sum()),
+        "too_weak": int((rows["status"] == TOO_WEAK).sum()),
+        "tasks_done_before": ran.resumed,
+        "run": {
+            "tasks": effort.tasks,
+            "workers": effort.workers,
+            "elapsed_s": time.monotonic() - began,
+            "task_s": effort.task_s,
+            "scheduling_and_transfer_percent": effort.overhead_percent,
+        },
+    }
+
+
+def tell(
+    result: dict[str, Any],
+    entries: "Iterable[Entry]",
+    columns: "Sequence[Shown]",
+    *,
+    json: bool,
+    title: str = "",
+    terms: str = "",
+    whys: Iterable[str] = (),
+) -> None:
+    """Print a study that was run: one JSON object, or its table and what it took; and what was not measured.
+
+    Args:
+        result: What --json prints.
+        entries: Entries of the table.
+        columns: Its columns.
+        json: Print one JSON object.
+        title: What stands before the number of rows.
+        terms: What its columns mean.
+        whys: What failed, and why.
+
+    Raises:
+        Failure: Some rows failed.
+    """
+    from tvist_lab.words import counted
+
+    rows, run = result["rows"], result["run"]
+    if json:
+        print_json(result)
+    else:
+        done = f"{rows} rows in {result['rows_file']}; {result['tasks_done_before']} moves were done before"
+        show(title + done, entries, columns)
+        if terms:
+            say(terms)
+        if run["tasks"]:
+            say(
+                f"{counted(run['tasks'], 'move')} took {run['elapsed_s']:.0f} s, {run['workers']} at once; scheduling "
+                f"and transfer took {run['scheduling_and_transfer_percent']:.1f} % of the tasks' own time"
+            )
+        if result["figure"] is not None:
+            say(f"{result['figure']} shows the table")
+    for why in whys:
+        say(why)
+    if result["too_weak"]:
+        say(f"{result['too_weak']} of {rows} rows were left out: the drives are too weak for their moves")
+    if result["failed"]:
+        raise Failure(
+            f"{result['failed']} of {rows} rows failed; their column error in {Path(result['rows_file']).parent} says "
+            "why, and the same command tries them again"
+        )

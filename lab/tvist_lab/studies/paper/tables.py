@@ -1,0 +1,84 @@
+"""Table 2 beside the paper's and a table of all methods: their rows, and the page of the documentation with both."""
+
+from typing import Any
+
+from tvist_lab.markdown_table import markdown_table
+from tvist_lab.studies.pages import page
+from tvist_lab.studies.paper.origins import MEANINGS, origins
+from tvist_lab.studies.paper.published import published
+from tvist_lab.study.tables import Shown, cells
+
+FIGURES = ("delay ms", "stabilisation ms", "cycle ms", "overshoot m", "RV m/s²")
+"""Headings of the figures of Table 2."""
+IMPACTS = ("stabilisation", "cycle", "overshoot", "residual_vibration")
+"""What shaping changes, in the order of these figures."""
+METHODS = (
+    Shown("method", "label"), Shown("delay ms", "delay_ms", 0), Shown("RV m/s²", "residual_vibration_m_s2", 3),
+    Shown("peak m/s²", "peak_m_s2", 3), Shown("less peak %", "peak_reduction_percent", 1),
+    Shown("still after ms", "still_after_ms", 0), Shown("peak q̈ / limit", "peak_acceleration_ratio", 3),
+)  # fmt: skip
+"""Columns of a table of methods."""
+
+
+def table_2(table: dict[str, Any], digits: int) -> list[tuple[str, ...]]:
+    """Return the rows of Table 2: the motion, what is shown and whose it is, and the figures.
+
+    Args:
+        table: Table 2 of `report.as_dict`.
+        digits: Decimals of the residual vibration.
+    """
+    forms = {
+        "delay_ms": ".1f", "stabilisation_ms": ".1f", "cycle_ms": ".1f", "overshoot_m": ".1e",
+        "residual_vibration_m_s2": f".{digits}f",
+    }  # fmt: skip
+    rows: list[tuple[str, ...]] = []
+    for motion, ours in table.items():
+        both = (("paper", published()["table_2"][motion]), ("here", ours))
+        for kind in ("unshaped", "shaped"):
+            for who, source in both:
+                figures = (_form(source[kind][key], form) for key, form in forms.items())
+                rows.append((motion, f"{kind}, {who}", *figures))
+        for who, source in both:
+            percents = (_form(source["impact_percent"][key], "+.1f", " %") for key in IMPACTS)
+            rows.append((motion, f"impact, {who}", "", *percents))
+    return rows
+
+
+def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, ...]]:
+    """Return the rows of a table of methods.
+
+    Args:
+        result: Result of `report.as_dict`.
+        motion: The motion.
+        first: How the method that is still first is written, such as "**{}**".
+    """
+    rows = result["baselines"][motion]
+    known = [row["still_after_ms"] for row in rows.values() if row["still_after_ms"] is not None]
+    soonest = min(known, default=None)
+
+    def label(name: str) -> str:
+        said = "waiting, unshaped" if name == "unshaped" else str(result["methods"][name])
+        return first.format(said) if rows[name]["still_after_ms"] == soonest else said
+
+    return cells([{"label": label(name), **row} for name, row in rows.items()], METHODS)
+
+
+def page_of(result: dict[str, Any], command: str) -> str:
+    """Return Tables 1 and 2 beside the paper's, the baselines, and the origin of each figure."""
+    headings = [column.title for column in METHODS]
+    return page(
+        "paper",
+        result,
+        command,
+        second=markdown_table(("motion", "", *FIGURES), table_2(result["table_2"], 2)),
+        methods_of={
+            motion: markdown_table(headings, methods(result, motion, "**{}**"))
+            for motion in result["baselines"]
+        },
+        meanings=MEANINGS,
+        origins=markdown_table(("figure", "paper", "here", "origin", "remark"), origins(result)),
+    )
+
+
+def _form(value: float | None, form: str, unit: str = "") -> str:
+    return "–" if value is None else f"{value:{form}}{unit}"

@@ -1,0 +1,93 @@
+"""All methods of the studies by name, one row each, and the menus that show it; what makes them is in `catalogue`.
+
+A shaper of the shaping library needs no row: without one, it stands in all menus of shapers.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from tvist_shaping.named import BUILT_IN
+
+Menu = Literal["bench", "baselines", "paths", "bound", "lesson"]
+"""Where a method is made unless others are named: ShaperBench and robustness; `evaluate`, beside the shaper; `paths`;
+the bound; and where the notebooks offer it.
+"""
+Kind = Literal[
+    "filter", "for target", "for payload", "for workspace", "held", "longer", "as long as", "jerk of a period"
+]
+UNSHAPED = "none"
+"""Name of waiting on the bench, where it goes through the same line as the others."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A method."""
+
+    name: str
+    """Name in JSON and on the command line."""
+    label: str
+    """Name for people."""
+    menus: tuple[Menu, ...] = ()
+    """Menus that show it."""
+    kind: Kind = "filter"
+    of: str = ""
+    """The shaper that it is made of, or the method that it is as long as; empty if it is of its name."""
+    modes: int = 1
+    """Number of modes; more than one needs a modal calibration."""
+
+
+SHOWN: tuple[Menu, ...] = ("bench", "paths", "lesson")
+"""Menus of a shaper without a row."""
+ROWS = (
+    Row("equal_duration_double_s", "longer double S", ("baselines",), "longer"),
+    Row("double_s_of_one_period", "double S whose jerk lasts a period", ("baselines",), "jerk of a period"),
+    Row("double_s_as_zv", "double S as long as zv", ("bench",), "as long as", "zv"),
+    Row("double_s_as_auto", "double S as long as auto", ("bench",), "as long as", "auto"),
+    Row("zv_frozen_at_end", "ZV for the end pose", ("baselines", "bench"), "for target", "zv"),
+    Row(
+        "zv_3_modes_frozen_at_end", "ZV of three modes for the end pose", ("baselines", "bench"), "for target", "zv",
+        3,
+    ),
+    Row("mzv_for_payload", "fixed MZV for the declared payload", ("baselines", "bench"), "for payload", "mzv"),
+    Row("ei_for_payload", "fixed EI for the declared payload", ("baselines", "bench"), "for payload", "ei"),
+    Row("ei3_for_payload", "fixed EI3 for the declared payload", ("baselines", "bench"), "for payload", "ei3"),
+    Row("fixed_mzv", "fixed MZV", ("baselines", "bench"), "for workspace", "mzv"),
+    Row("fixed_ei2", "fixed EI2", ("baselines", "bench"), "for workspace", "ei2"),
+    Row("fixed_ei3", "fixed EI3", ("baselines", "bench"), "for workspace", "ei3"),
+    Row("zv", "TVIST-ZV, lowest mode", ("bench", "paths", "bound", "lesson")),
+    Row("zv_3_modes", "TVIST-ZV, three modes", ("bench",), of="zv", modes=3),
+    Row("mzv", "TVIST-MZV, lowest mode", ("paths", "lesson")),
+    Row("zvd", "TVIST-ZVD, lowest mode", ("bench", "paths", "lesson")),
+    Row("ei", "TVIST-EI, lowest mode", ("bench", "paths", "lesson")),
+    Row("ei2", "TVIST-EI2, lowest mode", ("lesson",)),
+    Row("ei3", "TVIST-EI3, lowest mode", ("lesson",)),
+    Row("auto", "constant mean delay, auto", ("bench", "paths", "bound")),
+    Row("auto-target", "constant mean delay, given the end of each move", ("bench", "paths", "bound")),
+    Row("short", "constant mean delay, short", ("bench", "paths")),
+    Row("planned", "planned to leave no vibration", ("bound",)),
+    Row("elastic", "smoothing, elastic feed-forward", ("bench",)),
+    Row("elastic-position", "smoothing, elastic feed-forward without torques", ("bench",)),
+    Row("elastic-auto", "auto, smoothing, elastic feed-forward", ("bench",)),
+    Row("product", "constant mean delay, product of three ZV", ("bench",), "held", modes=3),
+    Row(UNSHAPED, "waiting, unshaped"),
+    # These are variants of the shapers above, which no menu needs beside them.
+    *(Row(name, f"TVIST-{name.upper()}, lowest mode")
+      for name in ("um_zv", "um_zvd", "ei_exact", "si", "zvdd", "ei2_exact", "zvddd", "ei3_exact")),
+)  # fmt: skip
+"""All methods, in the order in which tables have them."""
+
+
+def rows(menu: Menu | None = None) -> list[Row]:
+    """Return the rows of a menu, or all; those of shapers that have none come last."""
+    known = {row.name for row in ROWS}
+    more = [
+        Row(name, f"TVIST-{name.upper()}, lowest mode", SHOWN)
+        for name in BUILT_IN.names()
+        if name not in known
+    ]
+    return [row for row in (*ROWS, *more) if menu is None or menu in row.menus]
+
+
+def names(menu: Menu) -> tuple[str, ...]:
+    """Return the names of a menu."""
+    return tuple(row.name for row in rows(menu))
