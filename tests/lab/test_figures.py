@@ -93,7 +93,7 @@ def test_the_band_of_repeatability_has_its_number(figures, recorded):
 def test_the_example_is_the_middle_one_of_the_moves_that_count(counts, drawn):
     peaks = [0.5, 0.1, 0.3, 0.4] if any(counts) else [0.01, 0.04, 0.03, 0.02]
     judged = [
-        [{"reduction_percent": 90.0 if one else None, "unshaped_peak_m_s2": peak}]
+        {"reduction_percent": 90.0 if one else None, "unshaped_peak_m_s2": peak}
         for one, peak in zip(counts, peaks, strict=True)
     ]
     assert example(judged) == drawn
