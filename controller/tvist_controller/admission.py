@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
+from tvist_controller.command_table import COMMANDS
 from tvist_controller.session import Lease, NoControlError, check_free, check_token
 from tvist_controller.stepping import (
     ClockHold,
@@ -19,18 +20,14 @@ from tvist_controller.stepping import (
 )
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import Envelope, decode_command, decode_envelope, decode_setpoint, refusal
-from tvist_protocol.commands import Command, ReleaseClock, SetEstimator, Setpoint, TakeClock, TakeControl
+from tvist_protocol.commands import Command, ReleaseClock, Setpoint, TakeClock, TakeControl
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import EXPLAINED_BYTES
-from tvist_protocol.motions import MovePath
-from tvist_protocol.programs import ProgramInterpret, ProgramLoad, ProgramRun
 from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationStep
 
 STEP = tag(SimulationStep)
-LONG = frozenset(
-    (tag(SetEstimator), tag(MovePath), tag(ProgramLoad), tag(ProgramRun), tag(ProgramInterpret), STEP)
-)
+LONG = frozenset(tag(row.message) for row in COMMANDS.values() if row.long)
 """Types of commands that may be longer than `EXPLAINED_BYTES`."""
 
 

@@ -1,6 +1,7 @@
 """Control of the robot and of its clock: the commands for both rights, and the consequences of losing them."""
 
 from collections.abc import Callable
+from typing import ClassVar
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.events import Emit
@@ -29,14 +30,6 @@ class Authority:
         self.session, self.stepping = session, ClockLease()
         self._steppable = steppable
         self._interrupt, self._emit = interrupt, emit
-        self.rows = (
-            Row(TakeControl, self._take, lease="none"),
-            Row(KeepAlive, lambda _: None),  # every command renews the lease
-            Row(HandOver, self._hand_over),
-            Row(ReleaseControl, self._release),
-            Row(TakeClock, self._take_clock, lease="none"),
-            Row(ReleaseClock, lambda call: self.stepping.release(call.command.token), lease="none"),
-        )
 
     def watch(self, now: float) -> None:
         """End a lease that was not renewed in time."""
@@ -89,6 +82,15 @@ class Authority:
     def _release(self, _: Call[ReleaseControl]) -> None:
         self.session.release()
         self._interrupt("control was released")
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(TakeControl, _take, lease="none"),
+        Row(KeepAlive, lambda _, __: None),  # every command renews the lease
+        Row(HandOver, _hand_over),
+        Row(ReleaseControl, _release),
+        Row(TakeClock, _take_clock, lease="none"),
+        Row(ReleaseClock, lambda self, call: self.stepping.release(call.command.token), lease="none"),
+    )
 
 
 def _check_version(protocol: int) -> None:

@@ -3,6 +3,7 @@
 import heapq
 from collections.abc import Callable
 from itertools import count
+from typing import ClassVar
 
 import numpy as np
 
@@ -46,7 +47,6 @@ class Faults:
             "fault": lambda: safety.cut_power("the safety system failed", "fault"),
         }
         """Functions for the faults that have no duration."""
-        self.rows = (Row(SimulationInject, lambda call: self.inject(call.command, call.tick)),)
         plant = motion.cycle.line.plant
         self._pushable = plant if isinstance(plant, Pushable) else None
         if isinstance(plant, Breakable):
@@ -122,6 +122,10 @@ class Faults:
         self._push[joint] += torque
         if self._pushable is not None:
             self._pushable.push(self._push)
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(SimulationInject, lambda self, call: self.inject(call.command, call.tick)),
+    )
 
 
 def _check(command: SimulationInject, joints: int) -> None:

@@ -7,10 +7,11 @@ from queue import SimpleQueue
 from typing import NamedTuple
 
 from tvist_controller.admission import Admitted
+from tvist_controller.command_table import COMMANDS
 from tvist_controller.host import Host
 from tvist_controller.planner import Planner
 from tvist_controller.planning.basis import PlanBasis
-from tvist_controller.planning.plan import PLANNED, QUESTIONS, Plan
+from tvist_controller.planning.plan import Plan
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command, KeepAlive, PowerOff, Stop
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
@@ -110,9 +111,10 @@ class PlanAhead:
             answer: Takes the reply, in the controller's thread.
         """
         stops = isinstance(admitted.command, STOPPING)
-        asks = isinstance(admitted.command, QUESTIONS)
+        row = COMMANDS[type(admitted.command)]
+        asks = row.asks
         with self._lock:
-            waits = asks or isinstance(admitted.command, PLANNED)
+            waits = row.plan is not None
             waits |= self._commands > 0 and not isinstance(admitted.command, KeepAlive)
             full = self._count >= (MAX_ASKING if asks else MAX_WAITING) or self._closing
             if waits and not full:
@@ -134,7 +136,7 @@ class PlanAhead:
                 self._post(lambda answer=answer: answer(_FAILED))  # type: ignore[misc]
             with self._lock:
                 self._count -= 1
-                self._commands -= not isinstance(waiting.admitted.command, QUESTIONS)
+                self._commands -= not COMMANDS[type(waiting.admitted.command)].asks
 
     def _hand_over(self, waiting: _Waiting) -> None:
         if self._closing:
@@ -147,10 +149,11 @@ class PlanAhead:
                 return
             waiting = waiting._replace(admitted=completed)
         command = waiting.admitted.command
-        if isinstance(command, QUESTIONS):
+        row = COMMANDS[type(command)]
+        if row.asks:
             self._reply(command, waiting.answer)
             return
-        if isinstance(command, PLANNED):
+        if row.plan is not None:
             taken: SimpleQueue[bool] = SimpleQueue()
             for _ in range(TRIES):
                 self._post(lambda: taken.put(True))
@@ -184,7 +187,7 @@ class PlanAhead:
 
     def _take(self, waiting: _Waiting, plan: Plan) -> bool:
         """Carry out a command with its plan, if that still applies; runs in the controller's thread."""
-        if not plan.holds(self._host.controller.basis):
+        if not self._host.controller.plans.hold(plan):
             self._host.publish()
             return False
         waiting.answer(self._host.carry_out(waiting.admitted, plan))
