@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import msgspec
 
 from tvist_controller.command_table import COMMANDS
-from tvist_controller.session import Lease, NoControlError, check_free, check_token
+from tvist_controller.session import Lease, NoControlError, check_free, check_token, is_holders
+from tvist_controller.setpoints import Unreadable
 from tvist_controller.stepping import (
     ClockHold,
     check_clock_free,
@@ -83,16 +84,10 @@ def admit_command(
     return Admitted(command, msgspec.to_builtins(command), client=client)
 
 
-class Unreadable(NamedTuple):
-    """A set-point from the client in control that cannot be decoded."""
-
-    token: str
-    why: str
-    """A sentence with field, value and limit."""
-
-
 def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | None:
-    """Decode a set-point; return None if its sender is not known to have control.
+    """Decode a set-point; return None if its sender is not known to have control, to spare the controller's thread.
+
+    Whose it is decides the lease at the moment at which it is carried out: see `Setpoints`.
 
     Args:
         data: Encoded message.
@@ -100,11 +95,12 @@ def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | 
     """
     if lease is None or len(data) > EXPLAINED_BYTES:
         return None
+    setpoint: Setpoint | Unreadable
     try:
         setpoint = decode_setpoint(data)
     except ProtocolError as error:
-        return Unreadable(lease.token, error.why) if _token(data) == lease.token else None
-    return setpoint if setpoint.token == lease.token else None
+        setpoint = Unreadable(_token(data), error.why)
+    return setpoint if is_holders(lease, setpoint.token) else None
 
 
 def _token(data: bytes) -> str | None:

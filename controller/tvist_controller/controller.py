@@ -3,6 +3,7 @@
 It owns a `Session`, which grants control, and a `ControlCycle`, which moves the arm; neither knows of the other.
 """
 
+from collections.abc import Callable
 from functools import cached_property, partial
 from typing import Any, Unpack
 
@@ -37,7 +38,7 @@ from tvist_controller.reporting import Reporter, truth_of
 from tvist_controller.safety_control import SafetyControl
 from tvist_controller.sample import Sample
 from tvist_controller.session import NoControlError, Session
-from tvist_controller.setpoints import Setpoints
+from tvist_controller.setpoints import Setpoints, Unreadable
 from tvist_controller.setup import Setup, body
 from tvist_controller.stop_reasons import StopReasons
 from tvist_plant.fingerprint import fingerprint
@@ -185,9 +186,16 @@ class Controller(WholeRobot):
         self.peripherals.changed |= COMMANDS[type(command)].changes_io
         return reply
 
-    def receive_setpoint(self, setpoint: c.Setpoint) -> None:
-        """Take a set-point. If it is not accepted, it is counted and dropped, since its sender expects no answer."""
-        self._setpoints.receive(setpoint, self.now)
+    def receive_setpoint(
+        self, setpoint: c.Setpoint | Unreadable | None, note: Callable[[], None] | None = None
+    ) -> None:
+        """Take a set-point. If it is not accepted, it is counted and dropped, since its sender expects no answer.
+
+        Args:
+            setpoint: The set-point; None for one that was not admitted.
+            note: Notes it in the journal; called if it is of the client in control.
+        """
+        self._setpoints.receive(setpoint, self.now, note)
 
     def refuse_setpoint(self, why: str) -> None:
         """Count and drop a set-point of the client in control; if the stream falls silent, its end gives the reason."""
