@@ -155,7 +155,7 @@ class Controller(WholeRobot):
 
         Args:
             command: The command.
-            plan: Plan for the command, if it was made beforehand; it must hold on the present `basis`.
+            plan: Plan for the command, if it was made beforehand; it is used if it still holds.
             session: Session of the client that gets control, if `client_gone` will report its end.
             origin: IP address of the machine that sent it, if known.
         """

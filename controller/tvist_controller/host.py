@@ -61,7 +61,7 @@ class Host:
 
         Args:
             admitted: The command.
-            plan: Plan for the command, if it was made beforehand and still holds.
+            plan: Plan for the command, if it was made beforehand; it is used if it still holds.
             attend: Called before each tick of a step, so that others may send something meanwhile. It may carry out
                 other commands, but no step.
         """
@@ -103,10 +103,6 @@ class Host:
         self._note(Entry(tick=self._next, kind="missed", count=ticks))
         self.controller.missed(ticks)
 
-    def publish(self) -> None:
-        """Update the state that any thread may read; after a tick this is done only if it may have changed."""
-        self.standing = self._standing()
-
     def info(self) -> bytes:
         """Return the encoded description of the controller, which is made at most once between two ticks."""
         now = self.controller.tick_number, self.standing
@@ -130,12 +126,8 @@ class Host:
             sink.report(report)
             if truth is not None:
                 sink.truth(truth)
-        told = self.standing
-        if (
-            self.controller.session.lease is not told.lease
-            or self.controller.motion.may_move is not told.may_move
-        ):
-            self.publish()
+        if self.controller.session.lease is not self.standing.lease:
+            self.standing = self._standing()
         for one in news:
             self.socket(one)
 
@@ -188,7 +180,7 @@ class Host:
 
     def _standing(self) -> Standing:
         controller = self.controller
-        return Standing(controller.session.lease, controller.basis, controller.stepping.hold)
+        return Standing(controller.session.lease, controller.stepping.hold)
 
     def _step(self, step: SimulationStep, attend: Attend | None) -> Done:
         """Tick as often as a step says, or until its token no longer gives the right to advance time."""

@@ -14,7 +14,6 @@ from tvist_controller.planning.basis import PlanBasis
 from tvist_controller.planning.plan import Plan
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command, KeepAlive, PowerOff, Stop
-from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.motions import StopJ, StopL
 from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Posture, Refused, Reply, ToolPose
@@ -56,11 +55,11 @@ class _Waiting(NamedTuple):
 class PlanAhead:
     """Passes commands to the controller in their order; those that take long to plan come with a finished plan.
 
-    A plan is based on the state that the controller last published. If something that the plan depends on has changed
-    by the time the controller gets it, it is made again. A command waits while an earlier one is being planned, unless
-    it only renews the lease. A
-    command that stops the arm is carried out at once, and again in its turn: so it ends the present motion, and also
-    a motion that was sent before it and would begin after it.
+    A plan is based on the state that the controller's thread tells when the command's turn has come. If something that
+    the plan depends on has changed by the time the controller gets it, it is made again. A command waits while an
+    earlier one is being planned, unless it only renews the lease. A command that stops the arm is carried out at once,
+    and again in its turn: so it ends the present motion, and also a motion that was sent before it and would begin
+    after it.
 
     Args:
         host: The controller.
@@ -156,10 +155,9 @@ class PlanAhead:
         if row.plan is not None:
             taken: SimpleQueue[bool] = SimpleQueue()
             for _ in range(TRIES):
-                self._post(lambda: taken.put(True))
-                taken.get()  # just before a tick, as most plans are ready long before the next
+                basis = self._present()
                 try:
-                    plan = self._planner.plan(command, self._host.standing.basis)
+                    plan = self._planner.plan(command, basis)
                 except Exception:
                     log.exception("a plan failed, its command is refused")
                     self._post(lambda: waiting.answer(_FAILED))
@@ -171,10 +169,7 @@ class PlanAhead:
 
     def _reply(self, question: Command, answer: Answer) -> None:
         """Answer a question, which anyone may ask: it does not reach the controller or its journal."""
-        basis, present = self._host.standing.basis, SimpleQueue[PlanBasis]()
-        if isinstance(question, InverseKinematics | ForwardKinematics) and _about_now(question):
-            self._post(lambda: present.put(self._host.controller.basis))
-            basis = present.get()
+        basis = self._present()
         try:
             found = self._planner.plan(question, basis).found
         except Exception:
@@ -185,18 +180,21 @@ class PlanAhead:
         reply = found.reply if isinstance(found, RefusalError) else found
         self._post(lambda: answer(reply))
 
+    def _present(self) -> PlanBasis:
+        """The present state, which only the controller's thread may read.
+
+        It does so just before a tick, so that most plans are ready long before the next.
+        """
+        present = SimpleQueue[PlanBasis]()
+        self._post(lambda: present.put(self._host.controller.basis))
+        return present.get()
+
     def _take(self, waiting: _Waiting, plan: Plan) -> bool:
         """Carry out a command with its plan, if that still applies; runs in the controller's thread."""
         if not self._host.controller.plans.hold(plan):
-            self._host.publish()
             return False
         waiting.answer(self._host.carry_out(waiting.admitted, plan))
         return True
-
-
-def _about_now(question: InverseKinematics | ForwardKinematics) -> bool:
-    """Return whether the answer depends on the present posture, which changes with every tick."""
-    return (question.near if isinstance(question, InverseKinematics) else question.q) is None
 
 
 def _nobody(reply: Reply) -> None:

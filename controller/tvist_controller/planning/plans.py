@@ -51,12 +51,12 @@ class Plans:
 
         Args:
             command: The command.
-            plan: Plan for it that holds; None to make one now.
+            plan: Plan that was made before and is used if it still holds; without one, a plan is made now.
 
         Raises:
             RefusalError: The command cannot be carried out.
         """
-        found = (plan or self.now(command)).found
+        found = (plan if plan is not None and self.hold(plan) else self.now(command)).found
         if isinstance(found, RefusalError):
             raise found
         return found

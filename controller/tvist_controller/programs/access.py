@@ -27,7 +27,7 @@ class Access:
     peripherals: Peripherals
     emit: Emit
     send: Callable[[Command, Plan | None], Reply | None]
-    """Carries out a command with a plan that holds, or without one; raises `RefusalError`."""
+    """Carries out a command, with a plan that was made before or without one; raises `RefusalError`."""
     plans: Plans
     """The way to plans."""
     latest: Callable[[], State]
