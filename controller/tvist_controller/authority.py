@@ -8,10 +8,17 @@ from tvist_controller.events import Emit
 from tvist_controller.refusal import RefusalError
 from tvist_controller.session import Session
 from tvist_controller.stepping import ClockLease, check_step
+from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import HandOver, KeepAlive, ReleaseClock, ReleaseControl, TakeClock, TakeControl
 from tvist_protocol.replies import Accepted, Reply
 from tvist_protocol.simulation import SimulationStep
 from tvist_protocol.values import PROTOCOL_VERSION
+
+
+def _check_version(command: TakeControl | TakeClock, _: RobotDescription) -> None:
+    if command.protocol != PROTOCOL_VERSION:
+        why = f"protocol is {command.protocol}; this server speaks {PROTOCOL_VERSION}"
+        raise RefusalError("unsupported_version", "protocol", why, PROTOCOL_VERSION)
 
 
 class Authority:
@@ -60,7 +67,6 @@ class Authority:
             raise RefusalError("wrong_mode", "type", why)
 
     def _take_clock(self, call: Call[TakeClock]) -> Reply:
-        _check_version(call.command.protocol)
         self._check_steppable()
         return Accepted(token=self.stepping.take(call.command.client, call.session).token)
 
@@ -71,7 +77,6 @@ class Authority:
 
     def _take(self, call: Call[TakeControl]) -> Reply:
         command = call.command
-        _check_version(command.protocol)
         lease = self.session.take(command.client, command.lease_s, call.now, call.session)
         return Accepted(token=lease.token, lease_s=lease.seconds)
 
@@ -84,16 +89,10 @@ class Authority:
         self._interrupt("control was released")
 
     rows: ClassVar[tuple[Row, ...]] = (
-        Row(TakeControl, _take, lease="none"),
+        Row(TakeControl, _take, lease="none", check=_check_version),
         Row(KeepAlive, lambda _, __: None),  # every command renews the lease
         Row(HandOver, _hand_over),
         Row(ReleaseControl, _release),
-        Row(TakeClock, _take_clock, lease="none"),
+        Row(TakeClock, _take_clock, lease="none", check=_check_version),
         Row(ReleaseClock, lambda self, call: self.stepping.release(call.command.token), lease="none"),
     )
-
-
-def _check_version(protocol: int) -> None:
-    if protocol != PROTOCOL_VERSION:
-        why = f"protocol is {protocol}; this server speaks {PROTOCOL_VERSION}"
-        raise RefusalError("unsupported_version", "protocol", why, PROTOCOL_VERSION)
