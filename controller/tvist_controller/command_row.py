@@ -51,6 +51,8 @@ class Row(NamedTuple):
     """How it is planned; None if carrying it out takes no longer than a tick can wait."""
     long: bool = False
     """Whether the message may be longer than `EXPLAINED_BYTES`."""
+    stops: bool = False
+    """Whether it stops the arm, so that it waits for no plan of a command before it."""
 
     @property
     def asks(self) -> bool:

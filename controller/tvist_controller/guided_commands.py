@@ -58,8 +58,8 @@ class GuidedCommands:
         Row(m.ServoJ, _servo_j, check=lambda command, description: check_joints(command.q, description)),
         Row(m.SpeedJ, _speed_j, check=_check_speed),
         Row(m.SpeedL, _speed_l),
-        Row(m.StopJ, _stop_j),
-        Row(m.StopL, _stop_l),
+        Row(m.StopJ, _stop_j, stops=True),
+        Row(m.StopL, _stop_l, stops=True),
     )
 
 

@@ -13,9 +13,7 @@ from tvist_controller.planner import Planner
 from tvist_controller.planning.basis import PlanBasis
 from tvist_controller.planning.plan import Plan
 from tvist_controller.refusal import RefusalError
-from tvist_protocol.commands import Command, KeepAlive, PowerOff, Stop
-from tvist_protocol.motions import StopJ, StopL
-from tvist_protocol.programs import ProgramStop
+from tvist_protocol.commands import Command, KeepAlive
 from tvist_protocol.replies import Posture, Refused, Reply, ToolPose
 from tvist_server.gateways.base import Answer
 
@@ -30,9 +28,6 @@ TRIES = 10
 CLOSE_WAIT = 1.0
 """Longest time to finish the current plan at close [s]."""
 
-
-STOPPING = (Stop, StopJ, StopL, PowerOff, ProgramStop)
-"""Commands that stop the arm."""
 _BUSY = Refused(
     code="busy",
     where="",
@@ -109,9 +104,8 @@ class PlanAhead:
             admitted: The command.
             answer: Takes the reply, in the controller's thread.
         """
-        stops = isinstance(admitted.command, STOPPING)
         row = COMMANDS[type(admitted.command)]
-        asks = row.asks
+        stops, asks = row.stops, row.asks
         with self._lock:
             waits = row.plan is not None
             waits |= self._commands > 0 and not isinstance(admitted.command, KeepAlive)

@@ -368,7 +368,7 @@ class ProgramPlayer:
         Row(ProgramRun, _run, changes_io=True, plan=_COMPILED, long=True),
         Row(ProgramPlay, _play, changes_io=True),
         Row(ProgramPause, _pause, changes_io=True),
-        Row(ProgramStop, _stop, lease="if named", changes_io=True),
+        Row(ProgramStop, _stop, lease="if named", changes_io=True, stops=True),
         Row(ProgramClosePopup, lambda self, _: self._popups.dismiss(), lease="none"),
         Row(
             ProgramInterpret,
