@@ -307,6 +307,7 @@ def test_a_change_of_the_tool_is_part_of_the_plan():
     assert controller.plans.hold(stale)
     robot.send(SetTcp, offset=TOOL)
     assert not controller.plans.hold(stale)
+    assert controller.plans.found(line, stale) is not stale.found, "it is made again"
 
 
 @pytest.mark.parametrize("radius", [1e-9, 1e-6, 1e-4])
