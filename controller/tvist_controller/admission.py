@@ -9,7 +9,9 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from tvist_controller.session import Lease, NoControlError, check_free, check_token
+from tvist_controller.command_table import COMMANDS
+from tvist_controller.session import Lease, NoControlError, check_free, check_token, is_holders
+from tvist_controller.setpoints import Unreadable
 from tvist_controller.stepping import (
     ClockHold,
     check_clock_free,
@@ -19,18 +21,14 @@ from tvist_controller.stepping import (
 )
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import Envelope, decode_command, decode_envelope, decode_setpoint, refusal
-from tvist_protocol.commands import Command, ReleaseClock, SetEstimator, Setpoint, TakeClock, TakeControl
+from tvist_protocol.commands import Command, ReleaseClock, Setpoint, TakeClock, TakeControl
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import EXPLAINED_BYTES
-from tvist_protocol.motions import MovePath
-from tvist_protocol.programs import ProgramInterpret, ProgramLoad, ProgramRun
 from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationStep
 
 STEP = tag(SimulationStep)
-LONG = frozenset(
-    (tag(SetEstimator), tag(MovePath), tag(ProgramLoad), tag(ProgramRun), tag(ProgramInterpret), STEP)
-)
+LONG = frozenset(tag(row.message) for row in COMMANDS.values() if row.long)
 """Types of commands that may be longer than `EXPLAINED_BYTES`."""
 
 
@@ -86,16 +84,10 @@ def admit_command(
     return Admitted(command, msgspec.to_builtins(command), client=client)
 
 
-class Unreadable(NamedTuple):
-    """A set-point from the client in control that cannot be decoded."""
-
-    token: str
-    why: str
-    """A sentence with field, value and limit."""
-
-
 def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | None:
-    """Decode a set-point; return None if its sender is not known to have control.
+    """Decode a set-point; return None if its sender is not known to have control, to spare the controller's thread.
+
+    Whose it is decides the lease at the moment at which it is carried out: see `Setpoints`.
 
     Args:
         data: Encoded message.
@@ -103,11 +95,12 @@ def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | 
     """
     if lease is None or len(data) > EXPLAINED_BYTES:
         return None
+    setpoint: Setpoint | Unreadable
     try:
         setpoint = decode_setpoint(data)
     except ProtocolError as error:
-        return Unreadable(lease.token, error.why) if _token(data) == lease.token else None
-    return setpoint if setpoint.token == lease.token else None
+        setpoint = Unreadable(_token(data), error.why)
+    return setpoint if is_holders(lease, setpoint.token) else None
 
 
 def _token(data: bytes) -> str | None:

@@ -1,16 +1,24 @@
 """Control of the robot and of its clock: the commands for both rights, and the consequences of losing them."""
 
 from collections.abc import Callable
+from typing import ClassVar
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.events import Emit
 from tvist_controller.refusal import RefusalError
 from tvist_controller.session import Session
 from tvist_controller.stepping import ClockLease, check_step
+from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import HandOver, KeepAlive, ReleaseClock, ReleaseControl, TakeClock, TakeControl
 from tvist_protocol.replies import Accepted, Reply
 from tvist_protocol.simulation import SimulationStep
 from tvist_protocol.values import PROTOCOL_VERSION
+
+
+def _check_version(command: TakeControl | TakeClock, _: RobotDescription) -> None:
+    if command.protocol != PROTOCOL_VERSION:
+        why = f"protocol is {command.protocol}; this server speaks {PROTOCOL_VERSION}"
+        raise RefusalError("unsupported_version", "protocol", why, PROTOCOL_VERSION)
 
 
 class Authority:
@@ -29,14 +37,6 @@ class Authority:
         self.session, self.stepping = session, ClockLease()
         self._steppable = steppable
         self._interrupt, self._emit = interrupt, emit
-        self.rows = (
-            Row(TakeControl, self._take, lease="none"),
-            Row(KeepAlive, lambda _: None),  # every command renews the lease
-            Row(HandOver, self._hand_over),
-            Row(ReleaseControl, self._release),
-            Row(TakeClock, self._take_clock, lease="none"),
-            Row(ReleaseClock, lambda call: self.stepping.release(call.command.token), lease="none"),
-        )
 
     def watch(self, now: float) -> None:
         """End a lease that was not renewed in time."""
@@ -67,7 +67,6 @@ class Authority:
             raise RefusalError("wrong_mode", "type", why)
 
     def _take_clock(self, call: Call[TakeClock]) -> Reply:
-        _check_version(call.command.protocol)
         self._check_steppable()
         return Accepted(token=self.stepping.take(call.command.client, call.session).token)
 
@@ -78,7 +77,6 @@ class Authority:
 
     def _take(self, call: Call[TakeControl]) -> Reply:
         command = call.command
-        _check_version(command.protocol)
         lease = self.session.take(command.client, command.lease_s, call.now, call.session)
         return Accepted(token=lease.token, lease_s=lease.seconds)
 
@@ -90,8 +88,11 @@ class Authority:
         self.session.release()
         self._interrupt("control was released")
 
-
-def _check_version(protocol: int) -> None:
-    if protocol != PROTOCOL_VERSION:
-        why = f"protocol is {protocol}; this server speaks {PROTOCOL_VERSION}"
-        raise RefusalError("unsupported_version", "protocol", why, PROTOCOL_VERSION)
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(TakeControl, _take, lease="none", check=_check_version),
+        Row(KeepAlive, lambda _, __: None),  # every command renews the lease
+        Row(HandOver, _hand_over),
+        Row(ReleaseControl, _release),
+        Row(TakeClock, _take_clock, lease="none", check=_check_version),
+        Row(ReleaseClock, lambda self, call: self.stepping.release(call.command.token), lease="none"),
+    )

@@ -1,79 +1,101 @@
-"""The table of commands: which handler carries out a command, and with which plan."""
+"""The table of commands: the rows of all parts of a robot, and what carries them out.
 
-from collections.abc import Callable, Iterable
-from typing import Any
+The rows are known without a robot, since admission and planning need them in other threads.
+"""
 
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from typing import Any, ClassVar, Protocol
+
+from tvist_controller.authority import Authority
 from tvist_controller.command_row import Call, Row
-from tvist_controller.planner import Planner
-from tvist_controller.planning.basis import PlanBasis
-from tvist_controller.planning.plan import Plan
-from tvist_controller.refusal import RefusalError
+from tvist_controller.declared_payload import DeclaredPayload
+from tvist_controller.faults import Faults
+from tvist_controller.filters import Filters
+from tvist_controller.guided_commands import GuidedCommands
+from tvist_controller.motion_commands import MotionCommands
+from tvist_controller.peripherals import Peripherals
+from tvist_controller.planning.filter_planner import FilterPlanner
+from tvist_controller.planning.plan import Planning
+from tvist_controller.planning.reachable import Reachable
+from tvist_controller.programs.player import ProgramPlayer
+from tvist_controller.refusal import check_body, check_joints
+from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import Command
+from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.replies import Reply
+from tvist_protocol.simulation import SimulationReset, SimulationStep
 
-Order = Callable[[Command, PlanBasis], Callable[[], Plan]]
-"""Has a command planned on a state; returns what waits for the plan."""
+
+def _check_reset(command: SimulationReset, description: RobotDescription) -> None:
+    if command.q is not None:
+        check_joints(command.q, description)
+    if command.payload is not None:
+        check_body(command.payload, "payload")
+
+
+class Part(Protocol):
+    """Part of a robot that carries out commands."""
+
+    rows: ClassVar[tuple[Row, ...]]
+    """Its commands."""
+
+
+class WholeRobot(ABC):
+    """Commands that concern all parts of a robot; the controller, which knows these, carries them out."""
+
+    @abstractmethod
+    def place(self, call: Call[SimulationReset]) -> Reply:
+        """Place the simulated arm somewhere at rest."""
+
+    @abstractmethod
+    def check_step(self, call: Call[SimulationStep]) -> Reply:
+        """Check that a client may advance time; the host then does so."""
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(
+            SimulationReset,
+            lambda self, call: self.place(call),
+            check=_check_reset,
+            plan=Planning("filter", FilterPlanner, lambda planner, command, on: None if command.shaper is None
+                          else planner.choose(command.shaper, 1, on.source, on.declared)),
+        ),
+        Row(SimulationStep, lambda self, call: self.check_step(call), lease="none", long=True),
+        Row(InverseKinematics, lambda _, call: call.planned(), lease="none",
+            plan=Planning("tool", Reachable, Reachable.posture)),
+        Row(ForwardKinematics, lambda _, call: call.planned(), lease="none",
+            plan=Planning("tool", Reachable, Reachable.pose)),
+    )  # fmt: skip
+
+
+_PARTS: tuple[type[Part], ...] = (
+    Authority, MotionCommands, GuidedCommands, Filters, DeclaredPayload, Peripherals, Faults, ProgramPlayer,
+    WholeRobot,
+)  # fmt: skip
+COMMANDS: dict[type[Command], Row] = {row.message: row for part in _PARTS for row in part.rows}
+"""The row of each command."""
 
 
 class CommandTable:
-    """The commands of one robot.
+    """Carries out the commands of one robot.
 
     Args:
-        planner: Plans them, where no plan comes with them.
-        basis: Returns the present state that plans depend on.
+        parts: Its parts, one of each kind that has commands.
+        description: The robot.
     """
 
-    def __init__(self, planner: Planner, basis: Callable[[], PlanBasis]) -> None:
-        self._planner, self._basis = planner, basis
-        self._rows: dict[type[Command], Row] = {}
+    def __init__(self, parts: Iterable[Part], description: RobotDescription) -> None:
+        self._description = description
+        self._parts = {row.message: part for part in parts for row in part.rows}
 
-    def add(self, rows: Iterable[Row]) -> None:
-        """Add commands."""
-        self._rows.update({row.message: row for row in rows})
-
-    def row(self, command: Command) -> Row:
-        """Return the row of a command."""
-        return self._rows[type(command)]
-
-    def plan(self, command: Command) -> Plan:
-        """Plan a command on the present state."""
-        return self._planner.plan(command, self._basis())
-
-    def plan_at_once(self, command: Command) -> Plan:
-        """Plan a command on the present state within a tick; see `MovePlanner.move`."""
-        return self._planner.plan(command, self._basis(), at_once=True)
-
-    def plan_later(self, command: Command, basis: PlanBasis) -> Callable[[], Plan]:
-        """Return what plans a command on a state: an `Order` that needs no thread."""
-        return lambda: self._planner.plan(command, basis)
-
-    def carry_out(
-        self,
-        command: Command,
-        tick: int,
-        now: float,
-        plan: Plan | None = None,
-        session: str | None = None,
-        origin: str | None = None,
-    ) -> Reply | None:
-        """Carry out a command between two ticks.
-
-        Args:
-            command: The command.
-            tick: Number of the next control period.
-            now: Time [s].
-            plan: Plan for the command that holds, if it was made beforehand.
-            session: Session of the client that gets control, if its end will be reported.
-            origin: IP address of the machine that sent it, if known.
+    def carry_out(self, call: Call[Any]) -> Reply | None:
+        """Carry out a command between two ticks; return None if its reply is `Done`.
 
         Raises:
             RefusalError: It cannot be carried out, and has changed nothing.
+            NoControlError: Its sender may not send it.
         """
-
-        def planned() -> Any:
-            found = (plan or self.plan(command)).found
-            if isinstance(found, RefusalError):
-                raise found
-            return found
-
-        return self.row(command).handle(Call(command, tick, now, session, planned, origin))
+        row = COMMANDS[type(call.command)]
+        if row.check is not None:
+            row.check(call.command, self._description)
+        return row.handle(self._parts[row.message], call)

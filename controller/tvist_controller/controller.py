@@ -4,15 +4,16 @@ It owns a `Session`, which grants control, and a `ControlCycle`, which moves the
 """
 
 import math
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 from typing import Any, Unpack
 
 import numpy as np
 
 from tvist_controller.authority import Authority
 from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.command_row import Call, Row
-from tvist_controller.command_table import CommandTable, Order
+from tvist_controller.command_row import Call
+from tvist_controller.command_table import COMMANDS, CommandTable, WholeRobot
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.counters import Counters
 from tvist_controller.cycle import ControlCycle
@@ -28,16 +29,17 @@ from tvist_controller.motion_commands import MotionCommands
 from tvist_controller.peripherals import Peripherals
 from tvist_controller.planner import Planner
 from tvist_controller.planning.basis import PlanBasis, ToolBasis
-from tvist_controller.planning.plan import QUESTIONS, Plan
+from tvist_controller.planning.plan import Plan
+from tvist_controller.planning.plans import Order, Plans
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
-from tvist_controller.refusal import RefusalError, check_content
+from tvist_controller.refusal import RefusalError
 from tvist_controller.report import Report
 from tvist_controller.reporting import Reporter, truth_of
 from tvist_controller.safety_control import SafetyControl
 from tvist_controller.sample import Sample
 from tvist_controller.session import NoControlError, Session
-from tvist_controller.setpoints import Setpoints
+from tvist_controller.setpoints import Setpoints, Unreadable
 from tvist_controller.setup import Setup, body
 from tvist_controller.stop_reasons import StopReasons
 from tvist_plant.fingerprint import fingerprint
@@ -52,7 +54,7 @@ from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
 
-class Controller:
+class Controller(WholeRobot):
     """One robot.
 
     Args:
@@ -80,7 +82,8 @@ class Controller:
         self._changed = True
         """Whether a command, an event or a program may have changed the modes since the last tick."""
         self._modes = 0, 0, 0
-        self._commands = CommandTable(planner, lambda: self.basis)
+        self.plans = Plans(planner, lambda: self.basis, order)
+        """The way to plans."""
         first = planner.filters.first()
         self.cycle = ControlCycle(
             setup.description, first.tvist, elastic=first.elastic, q=np.array(setup.q, dtype=float),
@@ -104,29 +107,19 @@ class Controller:
         self._faults = Faults(self.motion, safety)
         self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
         guidance = Guidance(self.motion)
-        self.programs = ProgramPlayer(self._access(guidance, order or self._commands.plan_later), safety)
+        self.programs = ProgramPlayer(self._access(guidance), safety)
         self._told_program = self.programs.progress
         self.filters = Filters(self.motion, first.source, setup.payload, self._emit)
         self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
         parts = (
             self._authority, MotionCommands(self.motion, safety, self.programs),
-            GuidedCommands(guidance, setup.description, self.programs), self.filters, self._payload, self.peripherals,
+            GuidedCommands(guidance, self.programs), self.filters, self._payload, self.peripherals,
             self._faults, self.programs, self,
         )  # fmt: skip
-        for part in parts:
-            self._commands.add(part.rows)
+        self._commands = CommandTable(parts, setup.description)
         self._update_modes()
         self.report = self._report(self.cycle.sample)
         """Report of the last tick, or of the arm at rest if it has not ticked yet or was placed somewhere since."""
-
-    @property
-    def rows(self) -> tuple[Row, ...]:
-        """Commands that concern the whole robot."""
-        return (
-            Row(SimulationReset, self._reset),
-            Row(SimulationStep, self._check_step, lease="none"),
-            *(Row(kind, lambda call: call.planned(), lease="none") for kind in QUESTIONS),
-        )
 
     @property
     def declared(self) -> Payload:
@@ -168,27 +161,48 @@ class Controller:
 
         Args:
             command: The command.
-            plan: Plan for the command, if it was made beforehand; it must hold on the present `basis`.
+            plan: Plan for the command, if it was made beforehand; it is used if it still holds.
             session: Session of the client that gets control, if `client_gone` will report its end.
             origin: IP address of the machine that sent it, if known.
         """
         self.counters.commands += 1
-        self._attend()
-        row = self._commands.row(command)
+        row = COMMANDS[type(command)]
         try:
             token: Any = getattr(command, "token", None)
             if row.lease == "needed" or (row.lease == "if named" and token is not None):
                 self.session.renew(token, self.now)
-            reply = self._commands.carry_out(command, self.tick_number + 1, self.now, plan, session, origin)
+            reply = self._carry_out(command, plan, session, origin)
         except (RefusalError, NoControlError) as refusal:
             self.counters.refused += 1
             return refusal.reply
-        self.peripherals.changed |= row.changes_io
         return Done() if reply is None else reply
 
-    def receive_setpoint(self, setpoint: c.Setpoint) -> None:
-        """Take a set-point. If it is not accepted, it is counted and dropped, since its sender expects no answer."""
-        self._setpoints.receive(setpoint, self.now)
+    def _carry_out(
+        self,
+        command: c.Command,
+        plan: Plan | None = None,
+        session: str | None = None,
+        origin: str | None = None,
+    ) -> Reply | None:
+        """Carry out a command of a client, or of a program; see `CommandTable.carry_out`."""
+        self._attend()
+        planned = partial(self.plans.found, command, plan)
+        reply = self._commands.carry_out(
+            Call(command, self.tick_number + 1, self.now, session, planned, origin)
+        )
+        self.peripherals.changed |= COMMANDS[type(command)].changes_io
+        return reply
+
+    def receive_setpoint(
+        self, setpoint: c.Setpoint | Unreadable | None, note: Callable[[], None] | None = None
+    ) -> None:
+        """Take a set-point. If it is not accepted, it is counted and dropped, since its sender expects no answer.
+
+        Args:
+            setpoint: The set-point; None for one that was not admitted.
+            note: Notes it in the journal; called if it is of the client in control.
+        """
+        self._setpoints.receive(setpoint, self.now, note)
 
     def refuse_setpoint(self, why: str) -> None:
         """Count and drop a set-point of the client in control; if the stream falls silent, its end gives the reason."""
@@ -333,7 +347,7 @@ class Controller:
         self.programs.end(why)
         self.motion.interrupt(why)
 
-    def _access(self, guidance: Guidance, order: Order) -> Access:
+    def _access(self, guidance: Guidance) -> Access:
         """What programs may use of the robot."""
         return Access(
             description=self.setup.description,
@@ -341,10 +355,8 @@ class Controller:
             guidance=guidance,
             peripherals=self.peripherals,
             emit=self._emit,
-            send=self._send,
-            plan=self._commands.plan_at_once,
-            order=lambda command: order(command, self.basis),
-            basis=lambda: self.basis,
+            send=self._carry_out,
+            plans=self.plans,
             latest=lambda: self.latest,
             declared=lambda: self.declared,
             torques=lambda: self._wrench.felt(self.latest).tolist(),
@@ -353,16 +365,9 @@ class Controller:
             shape_guided=self.setup.shape_servo,
         )
 
-    def _send(self, command: c.Command, plan: Plan | None) -> Reply | None:
-        """Carry out a command of a program."""
-        self._attend()
-        reply = self._commands.carry_out(command, self.tick_number + 1, self.now, plan)
-        self.peripherals.changed |= self._commands.row(command).changes_io
-        return reply
-
     # ------------------------------------------------------------------ commands that concern the whole robot
 
-    def _reset(self, call: Call[SimulationReset]) -> Reply:
+    def place(self, call: Call[SimulationReset]) -> Reply:
         """Place the simulated arm somewhere at rest."""
         command, chosen = call.command, call.planned()
         if not isinstance(self.cycle.line.plant, Placeable):
@@ -370,7 +375,6 @@ class Controller:
             raise RefusalError(
                 "unknown_type", "type", f"the plant {name} cannot be put anywhere: it has no reset"
             )
-        check_content(command, self.setup.description)
         q = self.cycle.line.shaped.position if command.q is None else np.array(command.q, dtype=float)
         carried = None if command.payload is None else body(command.payload)
         self._check_place(command, q)
@@ -404,7 +408,7 @@ class Controller:
             why = f"{met}: choose a posture in which the arm and its payload are clear"
             raise RefusalError("collision", where, why, CLEARANCE)
 
-    def _check_step(self, call: Call[SimulationStep]) -> Reply:
+    def check_step(self, call: Call[SimulationStep]) -> Reply:
         """Check that a client may advance time; the host then does so."""
         self._authority.check_step(call.command, call.now)
         self._setpoints.check(call.command)

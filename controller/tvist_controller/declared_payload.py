@@ -1,18 +1,31 @@
 """The declared payload, which a client sets and the drives' torques may contradict."""
 
+from typing import ClassVar
+
 from tvist_controller.command_row import Call, Row
 from tvist_controller.control.inverse_dynamics import SLEW
 from tvist_controller.events import Emit
 from tvist_controller.filters import Filters
 from tvist_controller.motion import MotionControl
 from tvist_controller.payload_monitor import PayloadMonitor
-from tvist_controller.refusal import check_content, payload_of
+from tvist_controller.planning.filter_planner import FilterPlanner
+from tvist_controller.planning.plan import Planning
+from tvist_controller.refusal import check_body
 from tvist_controller.sample import Sample
 from tvist_controller.setup import body
+from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.values import Payload
+
+
+def _payload_of(command: SetPayload) -> Payload:
+    return Payload(mass=command.mass, com=command.com, inertia=command.inertia)
+
+
+def _check(command: SetPayload, description: RobotDescription) -> None:
+    check_body(_payload_of(command), rated=description.limits.payload)
 
 
 class DeclaredPayload:
@@ -33,7 +46,6 @@ class DeclaredPayload:
         self._monitor = PayloadMonitor(self._description, body(payload))
         self._held = False
         """Whether the brakes have held the arm since the last measurement of the drives."""
-        self.rows = (Row(SetPayload, self._declare, changes_io=True),)
 
     def watch(self, sample: Sample) -> None:
         """Warn if the arm does not carry the declared payload; this cannot be checked while the brakes hold it."""
@@ -52,8 +64,7 @@ class DeclaredPayload:
         self._monitor.reset()
 
     def _declare(self, call: Call[SetPayload]) -> None:
-        check_content(call.command, self._description)
-        payload = payload_of(call.command)
+        payload = _payload_of(call.command)
         tvist = call.planned()
         carried = body(payload)
         self._motion.ahead.check_payload(carried, tvist)
@@ -64,3 +75,17 @@ class DeclaredPayload:
         self._filters.declare(payload, tvist)
         self._monitor.declare(carried)
         self._held = False
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(
+            SetPayload,
+            _declare,
+            changes_io=True,
+            check=_check,
+            plan=Planning(
+                "filter",
+                FilterPlanner,
+                lambda planner, command, on: planner.with_payload(_payload_of(command), on),
+            ),
+        ),
+    )

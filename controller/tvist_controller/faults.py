@@ -4,6 +4,7 @@ import heapq
 import math
 from collections.abc import Callable
 from itertools import count
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,9 +12,28 @@ from tvist_controller.command_row import Row
 from tvist_controller.motion import MotionControl
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety_control import SafetyControl
+from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD, Breakable, Pushable
 from tvist_protocol.faults import FAULTS
 from tvist_protocol.simulation import SimulationInject
+
+
+def _check(command: SimulationInject, description: RobotDescription) -> None:
+    joints = description.joints
+    fault = FAULTS.get(command.fault)
+    if fault is None:
+        why = f"fault is {command.fault!r}: must be one of {', '.join(FAULTS)}"
+        raise RefusalError("unknown_fault", "fault", why)
+    for field in ("joint", "value", "seconds"):
+        given = getattr(command, field) is not None
+        if field in fault.needs and not given:
+            raise RefusalError("missing_field", field, f"{field} is missing: fault {command.fault} needs it")
+        if given and field not in (*fault.needs, *fault.may):
+            why = f"{field} does not belong to fault {command.fault}"
+            raise RefusalError("out_of_range", field, why)
+    if command.joint is not None and command.joint >= joints:
+        why = f"joint is {command.joint}; the arm's joints are 0 to {joints - 1}"
+        raise RefusalError("out_of_range", "joint", why, joints - 1)
 
 
 class Faults:
@@ -47,7 +67,6 @@ class Faults:
             "fault": lambda: safety.cut_power("the safety system failed", "fault"),
         }
         """Functions for the faults that have no duration."""
-        self.rows = (Row(SimulationInject, lambda call: self.inject(call.command, call.tick)),)
         plant = motion.cycle.line.plant
         self._pushable = plant if isinstance(plant, Pushable) else None
         if isinstance(plant, Breakable):
@@ -64,10 +83,8 @@ class Faults:
             tick: Number of the next tick.
 
         Raises:
-            RefusalError: There is no such fault, a field it needs is missing, it has no such field, or the plant does
-                not support it.
+            RefusalError: The plant does not support it.
         """
-        _check(command, self._motion.cycle.description.joints)
         self._check_plant(command.fault)
         fault, seconds = command.fault, command.seconds
         ends = tick + round((seconds or 0.0) / PERIOD)
@@ -129,19 +146,6 @@ class Faults:
         if self._pushable is not None:
             self._pushable.push(self._push)
 
-
-def _check(command: SimulationInject, joints: int) -> None:
-    fault = FAULTS.get(command.fault)
-    if fault is None:
-        why = f"fault is {command.fault!r}: must be one of {', '.join(FAULTS)}"
-        raise RefusalError("unknown_fault", "fault", why)
-    for field in ("joint", "value", "seconds"):
-        given = getattr(command, field) is not None
-        if field in fault.needs and not given:
-            raise RefusalError("missing_field", field, f"{field} is missing: fault {command.fault} needs it")
-        if given and field not in (*fault.needs, *fault.may):
-            why = f"{field} does not belong to fault {command.fault}"
-            raise RefusalError("out_of_range", field, why)
-    if command.joint is not None and command.joint >= joints:
-        why = f"joint is {command.joint}; the arm's joints are 0 to {joints - 1}"
-        raise RefusalError("out_of_range", "joint", why, joints - 1)
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(SimulationInject, lambda self, call: self.inject(call.command, call.tick), check=_check),
+    )

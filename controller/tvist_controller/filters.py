@@ -1,5 +1,7 @@
 """The control line's filter and the source of its modes: changes and supervision."""
 
+from typing import ClassVar
+
 from tvist_controller.calibrations import fits
 from tvist_controller.command_row import Call, Row
 from tvist_controller.events import Emit
@@ -7,7 +9,8 @@ from tvist_controller.line_mode import LineMode
 from tvist_controller.mode_source import ModeSource
 from tvist_controller.motion import MotionControl
 from tvist_controller.planning.basis import FilterBasis
-from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
+from tvist_controller.planning.plan import Planning
 from tvist_controller.sample import Sample
 from tvist_protocol.commands import SetEstimator, SetShaper
 from tvist_protocol.values import Payload
@@ -29,7 +32,6 @@ class Filters:
         self._declared, self._clipped, self._limited = declared, False, False
         self.source = source
         """Source of the filter's modes."""
-        self.rows = (Row(SetShaper, self._choose), Row(SetEstimator, self._estimate))
         self._warn_of_payload()
         self._warn_of_arm()
 
@@ -126,3 +128,20 @@ class Filters:
             self._emit("warning", code="limit_torque", why=why)
             self._limited = True
         self._limited = self._limited and not self._cycle.mode.at_rest
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(
+            SetShaper,
+            _choose,
+            plan=Planning(
+                "filter",
+                FilterPlanner,
+                lambda planner, command, on: planner.choose(
+                    command.name, command.modes, on.source, on.declared, "name"
+                ),
+            ),
+        ),
+        Row(
+            SetEstimator, _estimate, plan=Planning("filter", FilterPlanner, FilterPlanner.estimate), long=True
+        ),
+    )

@@ -1,14 +1,21 @@
 """Commands that guide the arm, and the stops of URScript."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.guided import Guidance
 from tvist_controller.programs.player import ProgramPlayer
-from tvist_controller.refusal import check_content
+from tvist_controller.refusal import check_acceleration, check_joints, check_speeds
 from tvist_plant.description import RobotDescription
 from tvist_protocol import motions as m
 from tvist_protocol.replies import Accepted, Reply
+
+
+def _check_speed(command: m.SpeedJ, description: RobotDescription) -> None:
+    check_speeds(command.qd, description)
+    check_acceleration(command.acceleration, description)
 
 
 class GuidedCommands:
@@ -16,30 +23,20 @@ class GuidedCommands:
 
     Args:
         guidance: Starts and stops guided motions.
-        description: The robot.
         programs: The program, which ends with every stop.
     """
 
-    def __init__(self, guidance: Guidance, description: RobotDescription, programs: ProgramPlayer) -> None:
-        self._guidance, self._description, self._programs = guidance, description, programs
-        self.rows = (
-            Row(m.ServoJ, self._servo_j),
-            Row(m.SpeedJ, self._speed_j),
-            Row(m.SpeedL, self._speed_l),
-            Row(m.StopJ, self._stop_j),
-            Row(m.StopL, self._stop_l),
-        )
+    def __init__(self, guidance: Guidance, programs: ProgramPlayer) -> None:
+        self._guidance, self._programs = guidance, programs
 
     def _servo_j(self, call: Call[m.ServoJ]) -> Reply:
         command = call.command
-        check_content(command, self._description)
         q = np.array(command.q, dtype=float)
         number = self._guidance.servo(q, command.lookahead, command.gain, shaped=command.shaped)
         return Accepted(id=number)
 
     def _speed_j(self, call: Call[m.SpeedJ]) -> Reply:
         command = call.command
-        check_content(command, self._description)
         qd = np.array(command.qd, dtype=float)
         return Accepted(id=self._guidance.move_joints(qd, command.acceleration, shaped=command.shaped))
 
@@ -56,6 +53,14 @@ class GuidedCommands:
     def _stop_l(self, call: Call[m.StopL]) -> None:
         self._programs.stop_moving("stop_l was commanded")
         self._guidance.stop_tool(*_accelerations(call.command))
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(m.ServoJ, _servo_j, check=lambda command, description: check_joints(command.q, description)),
+        Row(m.SpeedJ, _speed_j, check=_check_speed),
+        Row(m.SpeedL, _speed_l),
+        Row(m.StopJ, _stop_j, stops=True),
+        Row(m.StopL, _stop_l, stops=True),
+    )
 
 
 def _accelerations(command: m.SpeedL | m.StopL) -> tuple[float, float]:

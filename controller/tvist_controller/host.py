@@ -7,16 +7,18 @@ does this through `simulation.step`.
 from collections.abc import Callable, Sequence
 
 from tvist_controller.about import info_of
-from tvist_controller.admission import Admitted, Unreadable, admit, admit_setpoint
+from tvist_controller.admission import Admitted, admit, admit_setpoint
 from tvist_controller.controller import Controller
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.socket_traffic import SocketNews
+from tvist_controller.session import is_holders
+from tvist_controller.setpoints import Unreadable
 from tvist_controller.sink import Sink
 from tvist_controller.socket_ports import NoPorts, SocketPorts
 from tvist_controller.standing import Standing
 from tvist_controller.stepping import may_step
 from tvist_protocol.codec import encode
-from tvist_protocol.commands import Command, Setpoint
+from tvist_protocol.commands import Setpoint
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationStep
@@ -59,7 +61,7 @@ class Host:
 
         Args:
             admitted: The command.
-            plan: Plan for the command, if it was made beforehand and still holds.
+            plan: Plan for the command, if it was made beforehand; it is used if it still holds.
             attend: Called before each tick of a step, so that others may send something meanwhile. It may carry out
                 other commands, but no step.
         """
@@ -75,7 +77,9 @@ class Host:
             raise
         self._carry_out_orders()  # of programs that it has ended
         # A command of the client in control renews the lease even if it is refused; another client's does not.
-        if not isinstance(reply, Refused) or self._is_holders(command):
+        if not isinstance(reply, Refused) or is_holders(
+            self.controller.session.lease, getattr(command, "token", None)
+        ):
             self._note(entry)
         if isinstance(command, SimulationStep) and isinstance(reply, Done):
             reply = self._step(command, attend)
@@ -84,12 +88,7 @@ class Host:
 
     def setpoint(self, data: bytes) -> None:
         """Admit and take a set-point."""
-        setpoint = admit_setpoint(data, self.standing.lease)
-        if setpoint is None:
-            self.controller.counters.setpoints_received += 1
-            self.controller.counters.setpoints_refused += 1
-        else:
-            self.receive_setpoint(setpoint)
+        self.receive_setpoint(admit_setpoint(data, self.standing.lease))
 
     def client_gone(self, client: str, session: str) -> None:
         """Handle the end of a client's session; this matters only if it held control or the clock."""
@@ -103,10 +102,6 @@ class Host:
         """Count ticks that began too late."""
         self._note(Entry(tick=self._next, kind="missed", count=ticks))
         self.controller.missed(ticks)
-
-    def publish(self) -> None:
-        """Update the state that any thread may read; after a tick this is done only if it may have changed."""
-        self.standing = self._standing()
 
     def info(self) -> bytes:
         """Return the encoded description of the controller, which is made at most once between two ticks."""
@@ -131,12 +126,8 @@ class Host:
             sink.report(report)
             if truth is not None:
                 sink.truth(truth)
-        told = self.standing
-        if (
-            self.controller.session.lease is not told.lease
-            or self.controller.motion.may_move is not told.may_move
-        ):
-            self.publish()
+        if self.controller.session.lease is not self.standing.lease:
+            self.standing = self._standing()
         for one in news:
             self.socket(one)
 
@@ -175,24 +166,21 @@ class Host:
         for sink in self._sinks:
             sink.journal(entry)
 
-    def receive_setpoint(self, setpoint: Setpoint | Unreadable) -> None:
-        """Take an admitted set-point."""
-        if isinstance(setpoint, Unreadable):
-            if self._is_holders(setpoint):
-                self._note(Entry(tick=self._next, kind="setpoint_refused", why=setpoint.why))
-                self.controller.refuse_setpoint(setpoint.why)
-            return
-        if self._is_holders(setpoint):
-            self._note(entry_of(self._next, setpoint))
-        self.controller.receive_setpoint(setpoint)
+    def receive_setpoint(self, setpoint: Setpoint | Unreadable | None) -> None:
+        """Take an admitted set-point, or None for one that was not admitted; the controller judges whose it is."""
 
-    def _is_holders(self, message: Command | Setpoint | Unreadable) -> bool:
-        lease = self.controller.session.lease
-        return lease is not None and getattr(message, "token", None) == lease.token
+        def note() -> None:
+            match setpoint:
+                case Setpoint():
+                    self._note(entry_of(self._next, setpoint))
+                case Unreadable():
+                    self._note(Entry(tick=self._next, kind="setpoint_refused", why=setpoint.why))
+
+        self.controller.receive_setpoint(setpoint, note)
 
     def _standing(self) -> Standing:
         controller = self.controller
-        return Standing(controller.session.lease, controller.basis, controller.stepping.hold)
+        return Standing(controller.session.lease, controller.stepping.hold)
 
     def _step(self, step: SimulationStep, attend: Attend | None) -> Done:
         """Tick as often as a step says, or until its token no longer gives the right to advance time."""

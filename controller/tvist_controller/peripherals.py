@@ -1,7 +1,7 @@
 """Terminals, registers and tool centre point of a robot: set by commands, and published as `Io`."""
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, TypeVar
+from typing import ClassVar, Protocol, TypeVar
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.refusal import RefusalError
@@ -69,12 +69,6 @@ class Peripherals:
 
     def __init__(self, *on_tcp: Callable[[tuple[float, ...]], None]) -> None:
         self._on_tcp = on_tcp
-        self.rows = (
-            Row(SetIo, lambda call: self.set_outputs(call.command), changes_io=True),
-            Row(SetRegisters, self._set_registers, lease="if named", changes_io=True),
-            Row(SetTcp, lambda call: self.set_tcp(call.command.offset), changes_io=True),
-            Row(SimulationSetInputs, lambda call: self.set_inputs(call.command), changes_io=True),
-        )
         self._digital_inputs = 0
         self._digital_outputs = 0
         self._analog_inputs = [CURRENT[0], CURRENT[0]]
@@ -285,6 +279,13 @@ class Peripherals:
 
     def _analog_output(self, number: int) -> float:
         return analog_value(self._analog_ratios[number], voltage=self.output_is_voltage(number))
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(SetIo, lambda self, call: self.set_outputs(call.command), changes_io=True),
+        Row(SetRegisters, _set_registers, lease="if named", changes_io=True),
+        Row(SetTcp, lambda self, call: self.set_tcp(call.command.offset), changes_io=True),
+        Row(SimulationSetInputs, lambda self, call: self.set_inputs(call.command), changes_io=True),
+    )
 
 
 def _with(values: list[Number], first: int, new: list[Number]) -> list[Number]:

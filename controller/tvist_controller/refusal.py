@@ -4,10 +4,7 @@ import math
 from collections.abc import Sequence
 
 from tvist_plant.description import RobotDescription, is_real_body
-from tvist_protocol.commands import Command, MoveJ, SetPayload
-from tvist_protocol.motions import JointSegment, MoveC, MoveL, MovePath, ServoJ, SpeedJ
 from tvist_protocol.replies import Code, Refused
-from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
@@ -127,46 +124,3 @@ def check_pace(velocity: float, acceleration: float, jerk: float, where: str = "
             field = f"{where}{name}"
             why = f"{field} is {value:g} {unit}; it must be at least {lowest:g}"
             raise RefusalError("out_of_range", field, why, lowest)
-
-
-def check_path(command: MovePath, description: RobotDescription) -> None:
-    """Refuse a path with a part that no state of the robot permits."""
-    for number, segment in enumerate(command.segments):
-        where = f"segments[{number}]."
-        if isinstance(segment, JointSegment):
-            check_joints(segment.q, description, f"{where}q")
-            check_motion(
-                segment.velocity, segment.acceleration, min(description.limits.jerk), description, where
-            )
-        else:
-            check_pace(segment.velocity, segment.acceleration, command.jerk, where)
-    check_pace(SLOWEST["velocity"], SLOWEST["acceleration"], command.jerk)
-
-
-def check_content(command: Command, description: RobotDescription) -> None:
-    """Refuse a command that such a robot cannot carry out in any state."""
-    match command:
-        case MoveJ():
-            check_joints(command.q, description)
-            check_motion(command.velocity, command.acceleration, command.jerk, description)
-        case MoveL() | MoveC():
-            check_pace(command.velocity, command.acceleration, command.jerk)
-        case MovePath():
-            check_path(command, description)
-        case ServoJ():
-            check_joints(command.q, description)
-        case SpeedJ():
-            check_speeds(command.qd, description)
-            check_acceleration(command.acceleration, description)
-        case SetPayload():
-            check_body(payload_of(command), rated=description.limits.payload)
-        case SimulationReset():
-            if command.q is not None:
-                check_joints(command.q, description)
-            if command.payload is not None:
-                check_body(command.payload, "payload")
-
-
-def payload_of(command: SetPayload) -> Payload:
-    """Return the payload that a command declares."""
-    return Payload(mass=command.mass, com=command.com, inertia=command.inertia)

@@ -5,7 +5,7 @@ from typing import Literal
 
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.modes import SafetyMode
-from tvist_protocol.transitions import Activity
+from tvist_protocol.transitions import TRANSITIONS, Activity
 
 Emergency = Literal["robot", "system"]
 Latched = Literal["violation", "fault"]
@@ -16,9 +16,15 @@ _EMERGENCIES = {
 }
 _LATCHED = {"violation": SafetyMode.VIOLATION, "fault": SafetyMode.FAULT}
 _MOTION = frozenset(
-    {"move_j", "move_l", "move_c", "move_path", "servo_j", "speed_j", "speed_l", "servo_start", "resume"}
+    row.trigger for row in TRANSITIONS if row.target in {Activity.MOVING, Activity.STREAMING, Activity.GUIDED}
 )
-_LIVE = frozenset({*_MOTION, "power_on", "power", "unlock_protective_stop"})
+"""Triggers that let the arm move: the table of transitions says where each leads."""
+_LIVE = _MOTION | frozenset(
+    row.trigger
+    for row in TRANSITIONS
+    if row.target in {Activity.IDLE, Activity.REST} and row.trigger != "at_rest"
+)
+"""Triggers after which the arm has power, or moves."""
 
 
 @dataclass

@@ -54,6 +54,11 @@ def check_token(lease: Lease | None, token: str, where: str = "token") -> Lease:
     return lease
 
 
+def is_holders(lease: Lease | None, token: str | None) -> bool:
+    """Return whether a token is that of the client in control."""
+    return lease is not None and token == lease.token
+
+
 def check_free(lease: Lease | None, client: str) -> None:
     """Check that a client may take control.
 

@@ -1,17 +1,31 @@
 """Set-points of the client in control, which are not answered."""
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 
 from tvist_controller.counters import Counters
 from tvist_controller.motion import MotionControl
 from tvist_controller.refusal import RefusalError, check_joints
-from tvist_controller.session import Session
+from tvist_controller.session import Session, is_holders
 from tvist_protocol.commands import Setpoint
 from tvist_protocol.simulation import SimulationStep
 
 
+class Unreadable(NamedTuple):
+    """A set-point that cannot be decoded."""
+
+    token: str | None
+    """Token in it, if one is found."""
+    why: str
+    """A sentence with field, value and limit."""
+
+
 class Setpoints:
-    """Passes set-points to the stream; those that are not accepted are counted and dropped.
+    """Judges set-points: those of the client in control go into the journal, and to the stream if it accepts them.
+
+    All others are counted and dropped.
 
     Args:
         session: The lease.
@@ -23,16 +37,23 @@ class Setpoints:
         self._session, self._motion, self._counters = session, motion, counters
         self._description = motion.cycle.description
 
-    def receive(self, setpoint: Setpoint, now: float) -> None:
+    def receive(
+        self, setpoint: Setpoint | Unreadable | None, now: float, note: Callable[[], None] | None = None
+    ) -> None:
         """Take a set-point.
 
         Args:
-            setpoint: The set-point.
+            setpoint: The set-point; None for one that admission has found to be no holder's.
             now: Time [s].
+            note: Notes it in the journal; called before anything changes, if it is the holder's.
         """
-        lease = self._session.lease
-        if lease is None or setpoint.token != lease.token:
+        if setpoint is None or not is_holders(self._session.lease, setpoint.token):
             self._count_refused()  # another client's: neither the stream nor the journal is concerned
+            return
+        if note is not None:
+            note()
+        if isinstance(setpoint, Unreadable):
+            self.refuse(setpoint.why)
             return
         try:
             check_joints(setpoint.q, self._description)

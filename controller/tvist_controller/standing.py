@@ -1,8 +1,7 @@
-"""The part of a controller's state that other threads may read."""
+"""The part of a controller's state that other threads may read: which clients have rights."""
 
 from typing import NamedTuple
 
-from tvist_controller.planning.basis import PlanBasis
 from tvist_controller.session import Lease
 from tvist_controller.stepping import ClockHold
 
@@ -12,8 +11,6 @@ class Standing(NamedTuple):
 
     lease: Lease | None
     """Lease of the client that has control."""
-    basis: PlanBasis
-    """State that plans for commands depend on."""
     clock: ClockHold | None
     """Hold of the client that has the clock."""
 
@@ -21,8 +18,3 @@ class Standing(NamedTuple):
         """Sessions whose end takes control or the clock from a client; empty if it has neither."""
         rights = (self.lease, self.clock)
         return {right.session for right in rights if right is not None and right.client == client}
-
-    @property
-    def may_move(self) -> bool:
-        """Whether a point-to-point motion may begin."""
-        return self.basis.motion is not None

@@ -126,11 +126,10 @@ class Beside:
     def __init__(self, robot) -> None:
         self.controller = robot.controller
         self._planner, self._waiting = Planner(robot.controller.setup), []
-        access = robot.controller.programs.arm._access
-        object.__setattr__(access, "order", self._order)
+        robot.controller.plans._order = self._order
 
-    def _order(self, command):
-        found, basis = [], self.controller.basis
+    def _order(self, command, basis):
+        found = []
         self._waiting.append((command, basis, found))
         return lambda: found[0] if found else self._planner.plan(command, basis)
 

@@ -302,9 +302,9 @@ def test_a_secondary_program_waits_in_its_protective_stop():
 def test_plans_of_killed_threads_are_ordered_one_after_the_other():
     """Each takes longer than a tick beside the ticks: a queue of them would hold up the robot in the end."""
     robot, orders = a_robot(), []
-    access = robot.controller.programs.arm._access
-    order = access.order
-    object.__setattr__(access, "order", lambda command: (orders.append(len(robot.states)), order(command))[1])
+    plans = robot.controller.plans
+    order = plans._order
+    plans._order = lambda command, basis: (orders.append(len(robot.states)), order(command, basis))[1]
     line = "movel(pose_trans(get_target_tcp_pose(), p[0, 0, 0.01, 0, 0, 0]))"
     start(
         robot, "thread f():", line, "end", "while True:", "h = run f()", "sync()", "sync()", "kill h", "end"

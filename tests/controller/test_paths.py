@@ -303,10 +303,11 @@ def test_a_change_of_the_tool_is_part_of_the_plan():
     robot = begun()
     controller = robot.controller
     line = MoveL(token=robot.token, pose=away((0.05, 0.05, 0.0), tcp=TOOL))
-    stale = controller._commands.plan(line)
-    assert stale.holds(controller.basis)
+    stale = controller.plans.now(line)
+    assert controller.plans.hold(stale)
     robot.send(SetTcp, offset=TOOL)
-    assert not stale.holds(controller.basis)
+    assert not controller.plans.hold(stale)
+    assert controller.plans.found(line, stale) is not stale.found, "it is made again"
 
 
 @pytest.mark.parametrize("radius", [1e-9, 1e-6, 1e-4])

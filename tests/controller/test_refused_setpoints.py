@@ -5,6 +5,7 @@ import math
 import msgspec
 import pytest
 
+from tvist_controller.admission import admit_setpoint
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.streaming import TIMEOUT
@@ -72,6 +73,23 @@ def test_a_stranger_s_set_points_are_not_blamed(streaming, fault):
     host, sink = streaming
     offered(host, token="other", **fault)
     assert end_of(host, sink) == "no set-point for 0.25 s"
+    assert host.controller.counters.setpoints_refused == 1
+
+
+@pytest.mark.parametrize("fault", [{}, {"q": (math.nan, *Q1[1:])}])
+def test_the_lease_at_the_moment_of_carrying_out_counts(streaming, fault):
+    """A set-point may wait long after its admission: then it is none of the client's that has control meanwhile."""
+    host, sink = streaming
+    token = host.controller.session.lease.token
+    waiting = admit_setpoint(
+        encode(c.Setpoint(**{"token": token, "sequence": 1, "q": Q1} | fault)), host.standing.lease
+    )
+    host.request(encode(c.ReleaseControl(token=token)))
+    host.request(encode(c.TakeControl(client="b")))
+    known = len(sink.entries)
+    host.receive_setpoint(waiting)
+    assert len(sink.entries) == known
+    assert host.controller.counters.setpoints_received == 1
     assert host.controller.counters.setpoints_refused == 1
 
 

@@ -56,10 +56,14 @@ class Served:
     def serve(self, replies):
         """Run jobs until there are so many replies."""
         while len(self.replies) < replies:
-            with self.came:
-                assert self.came.wait_for(lambda: self.jobs, WAIT), "no job came"
-                job = self.jobs.popleft()
-            job()
+            self.do_next()
+
+    def do_next(self):
+        """Run the next job, for which this waits."""
+        with self.came:
+            assert self.came.wait_for(lambda: self.jobs, WAIT), "no job came"
+            job = self.jobs.popleft()
+        job()
 
     def empty(self, ticks=0):
         """Run jobs, and ticks between them, until nothing waits any more."""
@@ -127,10 +131,11 @@ def test_a_motion_is_planned_anew_where_what_it_was_planned_on_has_changed(serve
     """The other payload comes from a client that the queue of the first does not know of."""
     move = served.of(c.MoveJ, q=tuple(Q3.tolist()))
     served.send(move)
+    served.do_next()  # tells what the plan depends on
     with served.came:
-        assert served.came.wait_for(lambda: served.jobs, WAIT)
+        assert served.came.wait_for(lambda: served.jobs, WAIT), "it is planned"
     served.host.controller.receive(served.of(c.SetPayload, **LIGHT))
-    served.tick()  # tells of it
+    served.tick()
     served.serve(len(served.replies) + 1)
     assert isinstance(served.replies[-1], Accepted)
     alone = Robot()

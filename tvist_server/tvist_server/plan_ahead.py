@@ -7,15 +7,13 @@ from queue import SimpleQueue
 from typing import NamedTuple
 
 from tvist_controller.admission import Admitted
+from tvist_controller.command_table import COMMANDS
 from tvist_controller.host import Host
 from tvist_controller.planner import Planner
 from tvist_controller.planning.basis import PlanBasis
-from tvist_controller.planning.plan import PLANNED, QUESTIONS, Plan
+from tvist_controller.planning.plan import Plan
 from tvist_controller.refusal import RefusalError
-from tvist_protocol.commands import Command, KeepAlive, PowerOff, Stop
-from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
-from tvist_protocol.motions import StopJ, StopL
-from tvist_protocol.programs import ProgramStop
+from tvist_protocol.commands import Command, KeepAlive
 from tvist_protocol.replies import Posture, Refused, Reply, ToolPose
 from tvist_server.gateways.base import Answer
 
@@ -30,9 +28,6 @@ TRIES = 10
 CLOSE_WAIT = 1.0
 """Longest time to finish the current plan at close [s]."""
 
-
-STOPPING = (Stop, StopJ, StopL, PowerOff, ProgramStop)
-"""Commands that stop the arm."""
 _BUSY = Refused(
     code="busy",
     where="",
@@ -55,11 +50,11 @@ class _Waiting(NamedTuple):
 class PlanAhead:
     """Passes commands to the controller in their order; those that take long to plan come with a finished plan.
 
-    A plan is based on the state that the controller last published. If something that the plan depends on has changed
-    by the time the controller gets it, it is made again. A command waits while an earlier one is being planned, unless
-    it only renews the lease. A
-    command that stops the arm is carried out at once, and again in its turn: so it ends the present motion, and also
-    a motion that was sent before it and would begin after it.
+    A plan is based on the state that the controller's thread tells when the command's turn has come. If something that
+    the plan depends on has changed by the time the controller gets it, it is made again. A command waits while an
+    earlier one is being planned, unless it only renews the lease. A command that stops the arm is carried out at once,
+    and again in its turn: so it ends the present motion, and also a motion that was sent before it and would begin
+    after it.
 
     Args:
         host: The controller.
@@ -109,10 +104,10 @@ class PlanAhead:
             admitted: The command.
             answer: Takes the reply, in the controller's thread.
         """
-        stops = isinstance(admitted.command, STOPPING)
-        asks = isinstance(admitted.command, QUESTIONS)
+        row = COMMANDS[type(admitted.command)]
+        stops, asks = row.stops, row.asks
         with self._lock:
-            waits = asks or isinstance(admitted.command, PLANNED)
+            waits = row.plan is not None
             waits |= self._commands > 0 and not isinstance(admitted.command, KeepAlive)
             full = self._count >= (MAX_ASKING if asks else MAX_WAITING) or self._closing
             if waits and not full:
@@ -134,7 +129,7 @@ class PlanAhead:
                 self._post(lambda answer=answer: answer(_FAILED))  # type: ignore[misc]
             with self._lock:
                 self._count -= 1
-                self._commands -= not isinstance(waiting.admitted.command, QUESTIONS)
+                self._commands -= not COMMANDS[type(waiting.admitted.command)].asks
 
     def _hand_over(self, waiting: _Waiting) -> None:
         if self._closing:
@@ -147,16 +142,16 @@ class PlanAhead:
                 return
             waiting = waiting._replace(admitted=completed)
         command = waiting.admitted.command
-        if isinstance(command, QUESTIONS):
+        row = COMMANDS[type(command)]
+        if row.asks:
             self._reply(command, waiting.answer)
             return
-        if isinstance(command, PLANNED):
+        if row.plan is not None:
             taken: SimpleQueue[bool] = SimpleQueue()
             for _ in range(TRIES):
-                self._post(lambda: taken.put(True))
-                taken.get()  # just before a tick, as most plans are ready long before the next
+                basis = self._present()
                 try:
-                    plan = self._planner.plan(command, self._host.standing.basis)
+                    plan = self._planner.plan(command, basis)
                 except Exception:
                     log.exception("a plan failed, its command is refused")
                     self._post(lambda: waiting.answer(_FAILED))
@@ -168,10 +163,7 @@ class PlanAhead:
 
     def _reply(self, question: Command, answer: Answer) -> None:
         """Answer a question, which anyone may ask: it does not reach the controller or its journal."""
-        basis, present = self._host.standing.basis, SimpleQueue[PlanBasis]()
-        if isinstance(question, InverseKinematics | ForwardKinematics) and _about_now(question):
-            self._post(lambda: present.put(self._host.controller.basis))
-            basis = present.get()
+        basis = self._present()
         try:
             found = self._planner.plan(question, basis).found
         except Exception:
@@ -182,18 +174,21 @@ class PlanAhead:
         reply = found.reply if isinstance(found, RefusalError) else found
         self._post(lambda: answer(reply))
 
+    def _present(self) -> PlanBasis:
+        """The present state, which only the controller's thread may read.
+
+        It does so just before a tick, so that most plans are ready long before the next.
+        """
+        present = SimpleQueue[PlanBasis]()
+        self._post(lambda: present.put(self._host.controller.basis))
+        return present.get()
+
     def _take(self, waiting: _Waiting, plan: Plan) -> bool:
         """Carry out a command with its plan, if that still applies; runs in the controller's thread."""
-        if not plan.holds(self._host.controller.basis):
-            self._host.publish()
+        if not self._host.controller.plans.hold(plan):
             return False
         waiting.answer(self._host.carry_out(waiting.admitted, plan))
         return True
-
-
-def _about_now(question: InverseKinematics | ForwardKinematics) -> bool:
-    """Return whether the answer depends on the present posture, which changes with every tick."""
-    return (question.near if isinstance(question, InverseKinematics) else question.q) is None
 
 
 def _nobody(reply: Reply) -> None:

@@ -88,3 +88,4 @@ class PlanBasis(NamedTuple):
     """Basis of a planned motion; None while none may begin."""
     tool: ToolBasis
     statement: StatementBasis = StatementBasis(None)
+    script: ScriptBasis = ScriptBasis()

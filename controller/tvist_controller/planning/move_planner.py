@@ -72,17 +72,19 @@ class MovePlanner:
         self.fitter = Fitter(setup)
         """Keeps motions within the limits of the joints."""
 
-    def move(self, command: MoveJ, basis: MotionBasis, *, at_once: bool = False) -> PlannedMove:
+    def move(self, command: MoveJ, basis: MotionBasis) -> PlannedMove:
         """Plan a motion from rest; the command's content has been checked.
-
-        Args:
-            command: The command.
-            basis: State that the motion depends on.
-            at_once: Whether the plan must be made within a tick, which is too short for a quiet motion.
 
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
         """
+        return self._move(command, basis, at_once=False)
+
+    def move_within_tick(self, command: MoveJ, basis: MotionBasis) -> PlannedMove:
+        """Plan a motion as `move` does, but within a tick, which is too short for a quiet motion."""
+        return self._move(command, basis, at_once=True)
+
+    def _move(self, command: MoveJ, basis: MotionBasis, *, at_once: bool) -> PlannedMove:
         path = JointLine(basis.q, np.array(command.q, dtype=float))
         limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
         if command.duration is None:

@@ -1,6 +1,8 @@
-"""Plans for commands that take longer than a tick can wait, and which commands these are."""
+"""Plans for commands that take longer than a tick can wait, and how they are made."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
 
 from tvist_controller.planning.basis import (
     FilterBasis,
@@ -13,23 +15,9 @@ from tvist_controller.planning.basis import (
 from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.refusal import RefusalError
-from tvist_protocol import commands as c
-from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
-from tvist_protocol.motions import MoveC, MoveL, MovePath
-from tvist_protocol.programs import ProgramInterpret, ProgramLoad, ProgramRun
 from tvist_protocol.replies import Posture, ToolPose
-from tvist_protocol.simulation import SimulationReset
 from tvist_shaping.base import Filter
 from tvist_urscript import Script
-
-MOTIONS = (c.MoveJ, MoveL, MoveC, MovePath)
-"""Commands for motions, which are planned on the state at rest."""
-QUESTIONS = (InverseKinematics, ForwardKinematics)
-"""Questions about the tool's kinematics."""
-SCRIPTS = (ProgramLoad, ProgramRun, ProgramInterpret)
-"""Commands with the text of a program, which is compiled."""
-PLANNED = (*MOTIONS, *QUESTIONS, *SCRIPTS, c.SetShaper, c.SetEstimator, c.SetPayload, SimulationReset)
-"""Commands that are planned."""
 
 Found = PlannedMove | PlannedFilter | Filter | Posture | ToolPose | Script | None
 """What a plan may contain; None if nothing has to change."""
@@ -37,6 +25,19 @@ Found = PlannedMove | PlannedFilter | Filter | Posture | ToolPose | Script | Non
 
 Basis = FilterBasis | MotionBasis | ToolBasis | ScriptBasis | StatementBasis
 """State that a plan was made on."""
+
+
+class Planning(NamedTuple):
+    """How one type of command is planned."""
+
+    on: Literal["filter", "motion", "tool", "script", "statement"]
+    """Field of `PlanBasis` with the state that the plan depends on. If it is None, nothing is planned."""
+    by: type
+    """Class of the planner, of which a `Planner` has one object."""
+    make: Callable[[Any, Any, Any], Found]
+    """Returns the plan; takes the planner, the command and the state. It raises `RefusalError`."""
+    within_tick: Callable[[Any, Any, Any], Found] | None = None
+    """Makes a plan that may be worse but takes no longer than a tick can wait; None if `make` is all there is."""
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from tvist_controller.events import Emit
 from tvist_controller.guided import Guidance
 from tvist_controller.motion import MotionControl
 from tvist_controller.peripherals import Peripherals
-from tvist_controller.planning.basis import PlanBasis
 from tvist_controller.planning.plan import Plan
+from tvist_controller.planning.plans import Plans
 from tvist_controller.programs.steadiness import Steadiness
 from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import Command
@@ -27,13 +27,9 @@ class Access:
     peripherals: Peripherals
     emit: Emit
     send: Callable[[Command, Plan | None], Reply | None]
-    """Carries out a command with a plan that holds, or without one; raises `RefusalError`."""
-    plan: Callable[[Command], Plan]
-    """Plans a command on the present state within a tick."""
-    order: Callable[[Command], Callable[[], Plan]]
-    """Has a command planned on the present state, beside the ticks if the host can; returns what waits for the plan."""
-    basis: Callable[[], PlanBasis]
-    """The present state that plans depend on."""
+    """Carries out a command, with a plan that was made before or without one; raises `RefusalError`."""
+    plans: Plans
+    """The way to plans."""
     latest: Callable[[], State]
     """State of the last tick."""
     declared: Callable[[], Payload]

@@ -157,21 +157,21 @@ class ProgramArm:
 
     def _planned(self, legs: list[Segment]) -> Generator[None, None, Plan]:
         """The plan of a move. Lines and paths, and joint moves in debt, begin a fixed time after it is ordered."""
-        access, command = self._access, command_of(legs)
+        plans, command = self._access.plans, command_of(legs)
         if isinstance(command, MoveJ) and self._debt < PAUSE:
             self._owe()
-            return access.plan(command)
+            return plans.now(command, within_tick=True)
         while True:
             while self._planning > 0:  # of a thread that was killed meanwhile: one after the other
                 yield
             self._planning = DELAY + DELAY_PER_PART * (len(legs) - 1)
-            ordered = access.order(command)
+            ordered = plans.later(command)
             for _ in range(self._planning):
                 yield
             yield from self._come_to_rest()  # a client may have moved the arm meanwhile
             self._check_ready()
             plan = ordered()
-            if plan.holds(access.basis()):
+            if plans.hold(plan):
                 return plan
 
     def _beyond(self, marks: tuple[tuple[int, float], ...], leg: int) -> bool:

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable
 
-from tvist_controller.command_row import Call, Row
+from tvist_controller.command_row import Call
 from tvist_controller.events import Emit
 from tvist_controller.peripherals import Peripherals
 from tvist_controller.planning.basis import StatementBasis
@@ -49,10 +49,6 @@ class StatementQueue:
         """Characters of the statements that are held, and of those since the last that forgets."""
         self._waiting = self._ending = self._clearing = self._published = False
         self._interpreted = self._executed = self._cleared = self._forgotten = 0
-        self.rows = (
-            Row(ProgramInterpret, self._interpret, changes_io=True),
-            Row(ProgramSkip, self._skip, changes_io=True),
-        )
 
     @property
     def basis(self) -> StatementBasis:
@@ -163,7 +159,8 @@ class StatementQueue:
 
     # ------------------------------------------------------------------ for clients
 
-    def _interpret(self, call: Call[ProgramInterpret]) -> Accepted:
+    def interpret(self, call: Call[ProgramInterpret]) -> Accepted:
+        """Add a statement; `call` is the command with its text."""
         script: Script = call.planned()
         assert self._program is not None, "the statement was compiled after a program"
         clears = CLEAR in script.used
@@ -189,7 +186,8 @@ class StatementQueue:
             why = f"the program has taken {MOST} statements or {MAX_SCRIPT} characters: clear them with {CLEAR}()"
             raise RefusalError("busy", "text", why, MOST)
 
-    def _skip(self, call: Call[ProgramSkip]) -> None:
+    def skip(self, call: Call[ProgramSkip]) -> None:
+        """Leave out statements that wait, or the move that the program makes; `call` is the command."""
         if call.command.what == "statements":
             self._queue.clear()
         else:

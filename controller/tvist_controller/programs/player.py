@@ -1,12 +1,15 @@
 """The loaded program and its progress, and the programs that run beside it."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from tvist_controller.command_row import Call, Row
+from tvist_controller.planning.plan import Planning
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.built_in import built_in
+from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.library import MOVING, functions
 from tvist_controller.programs.popups import Popups
@@ -18,10 +21,13 @@ from tvist_controller.safety_control import SafetyControl
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.programs import (
     Interpreter,
+    ProgramClosePopup,
+    ProgramInterpret,
     ProgramLoad,
     ProgramPause,
     ProgramPlay,
     ProgramRun,
+    ProgramSkip,
     ProgramState,
     ProgramStop,
 )
@@ -39,6 +45,13 @@ MAX_BESIDE = 8
 
 MAX_KEPT = 100
 """Number of programs that are kept under their names."""
+
+_COMPILED = Planning("script", ScriptCompiler, lambda compiler, command, _: compiler.compile(command))
+_COMPILED_AFTER = Planning(
+    "statement",
+    ScriptCompiler,
+    lambda compiler, command, on: compiler.compile_statement(command.text, on.after),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,15 +105,6 @@ class ProgramPlayer:
         """The one whose turn it is."""
         self.line = 0
         """Present line, or the one with which playing would resume, counted from 1; 0 if there is none."""
-        self.rows = (
-            Row(ProgramLoad, self._load, lease="if named", changes_io=True),
-            Row(ProgramRun, self._run, changes_io=True),
-            Row(ProgramPlay, self._play, changes_io=True),
-            Row(ProgramPause, self._pause, changes_io=True),
-            Row(ProgramStop, self._stop, lease="if named", changes_io=True),
-            *self._popups.rows,
-            *self.statements.rows,
-        )
 
     @property
     def known(self) -> list[str]:
@@ -363,3 +367,20 @@ class ProgramPlayer:
         self._all.append(running)
         self._emit("program_started", program=name, secondary=script.secondary or None)
         return running
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(ProgramLoad, _load, lease="if named", changes_io=True, plan=_COMPILED, long=True),
+        Row(ProgramRun, _run, changes_io=True, plan=_COMPILED, long=True),
+        Row(ProgramPlay, _play, changes_io=True),
+        Row(ProgramPause, _pause, changes_io=True),
+        Row(ProgramStop, _stop, lease="if named", changes_io=True, stops=True),
+        Row(ProgramClosePopup, lambda self, _: self._popups.dismiss(), lease="none"),
+        Row(
+            ProgramInterpret,
+            lambda self, call: self.statements.interpret(call),
+            changes_io=True,
+            plan=_COMPILED_AFTER,
+            long=True,
+        ),
+        Row(ProgramSkip, lambda self, call: self.statements.skip(call), changes_io=True),
+    )

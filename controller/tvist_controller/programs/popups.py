@@ -2,9 +2,7 @@
 
 from collections.abc import Callable
 
-from tvist_controller.command_row import Call, Row
 from tvist_controller.events import Emit
-from tvist_protocol.programs import ProgramClosePopup
 from tvist_protocol.stream import PopupKind
 
 
@@ -19,7 +17,6 @@ class Popups:
     def __init__(self, emit: Emit, owner: Callable[[], object]) -> None:
         self._emit, self._owner = emit, owner
         self._owners: object | None = None
-        self.rows = (Row(ProgramClosePopup, self._close, lease="none"),)
 
     def show(self, text: str, title: str, kind: PopupKind, *, blocking: bool) -> None:
         """Show a popup.
@@ -43,5 +40,6 @@ class Popups:
         if self._owners is owner:
             self._owners = None
 
-    def _close(self, _: Call[ProgramClosePopup]) -> None:
+    def dismiss(self) -> None:
+        """Close the popup, whichever program shows it."""
         self._owners = None

@@ -90,11 +90,10 @@ class SettingFunctions:
         command = SetPayload(token=OWN_TOKEN, mass=mass, com=xyz, inertia=six, transition_time=seconds)
         # Planned beside the ticks and taken after a fixed number of them, as a move is: so it takes effect at the same
         # tick on every machine (decision 26).
-        ordered = self._access.order(command)
+        ordered = self._access.plans.later(command)
         for _ in range(DELAY):
             yield
-        plan = ordered()
-        self._send(command, plan if plan.holds(self._access.basis()) else self._access.plan(command))
+        self._send(command, ordered())
 
     def _send(self, command: SetTcp | SetPayload, plan: Plan | None = None) -> None:
         try:

@@ -1,0 +1,62 @@
+"""The one way to a plan for whatever is carried out in the ticks of a robot: now, or later beside the ticks."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from tvist_controller.planning.basis import PlanBasis
+from tvist_controller.planning.plan import Plan
+from tvist_controller.refusal import RefusalError
+from tvist_protocol.commands import Command
+
+Order = Callable[[Command, PlanBasis], Callable[[], Plan]]
+"""Has a command planned on a state; returns what waits for the plan."""
+
+
+class MakesPlans(Protocol):
+    """A `Planner`, which lies above all that uses plans."""
+
+    def plan(self, command: Command, basis: PlanBasis, *, within_tick: bool = False) -> Plan:
+        """Plan a command on a state."""
+
+
+class Plans:
+    """Plans of one robot, for the commands of clients and of programs.
+
+    Args:
+        planner: Plans in the ticks.
+        basis: Returns the present state that plans depend on.
+        order: Has commands planned beside the ticks; None to plan them in the tick that needs the plan.
+    """
+
+    def __init__(
+        self, planner: MakesPlans, basis: Callable[[], PlanBasis], order: Order | None = None
+    ) -> None:
+        self._planner, self._basis = planner, basis
+        self._order = order or (lambda command, on: lambda: planner.plan(command, on))
+
+    def now(self, command: Command, *, within_tick: bool = False) -> Plan:
+        """Plan a command on the present state; see `Planner.plan`."""
+        return self._planner.plan(command, self._basis(), within_tick=within_tick)
+
+    def later(self, command: Command) -> Callable[[], Plan]:
+        """Have a command planned on the present state; returns what waits for the plan."""
+        return self._order(command, self._basis())
+
+    def hold(self, plan: Plan) -> bool:
+        """Return whether a plan that was made before is valid for the present state."""
+        return plan.holds(self._basis())
+
+    def found(self, command: Command, plan: Plan | None = None) -> Any:
+        """Return what was planned for a command.
+
+        Args:
+            command: The command.
+            plan: Plan that was made before and is used if it still holds; without one, a plan is made now.
+
+        Raises:
+            RefusalError: The command cannot be carried out.
+        """
+        found = (plan if plan is not None and self.hold(plan) else self.now(command)).found
+        if isinstance(found, RefusalError):
+            raise found
+        return found

@@ -1,0 +1,21 @@
+"""Every command has one row, which says all that is true of it."""
+
+from typing import get_args
+
+from tvist_controller.command_table import COMMANDS
+from tvist_protocol import commands as c
+from tvist_protocol.channels import tag
+from tvist_protocol.transitions import TRANSITIONS, Activity
+
+from .robots import Robot
+
+
+def test_every_command_has_a_row_and_a_part_of_the_robot_that_carries_it_out():
+    assert set(COMMANDS) == set(get_args(c.Command))
+    assert set(Robot().controller._commands._parts) == set(COMMANDS)
+
+
+def test_what_is_planned_on_the_arm_at_rest_is_what_moves_it_along_a_path():
+    """The row says on which state a command is planned, the table of transitions where it leads."""
+    planned = {tag(row.message) for row in COMMANDS.values() if row.plan and row.plan.on == "motion"}
+    assert planned == {row.trigger for row in TRANSITIONS if row.target is Activity.MOVING} - {"resume"}
