@@ -106,8 +106,9 @@ class SafetyControl:
             RefusalError: The arm is moving, or is in a protective stop.
         """
         motion, cycle = self._motion, self._motion.cycle
+        held = motion.robot_mode is RobotMode.RUNNING
         motion.go("power_on" if release_brakes else "power")
-        if cycle.mode.at_rest and not isinstance(cycle.line.plant, Placeable):
+        if not (held or isinstance(cycle.line.plant, Placeable)):
             # Without power the arm may have been moved, and its brakes stop it where they do.
             cycle.reset(cycle.line.shaped.joints.position)
 

@@ -63,6 +63,19 @@ def test_power_and_brakes_follow_the_robot_mode_and_it_goes_on_from_where_it_was
     assert robot.states[-1].actual_q == pytest.approx(STANDS + 0.05, abs=5e-4)
 
 
+def test_power_on_does_not_let_an_arm_that_is_held_sink_to_where_it_is_measured():
+    plant, robot = ready()
+    plant.measure, measure = lambda: sagging(measure()), plant.measure
+    assert isinstance(robot.send(c.PowerOn), Done)
+    robot.tick()
+    assert robot.states[-1].target_q == pytest.approx(STANDS)
+
+
+def sagging(measured):
+    measured.q = measured.q - 0.002
+    return measured
+
+
 def test_a_fault_of_its_own_stops_it_until_the_fault_is_gone_and_safety_is_restarted():
     plant, robot = ready()
     robot.send(c.MoveJ, q=TARGET)
