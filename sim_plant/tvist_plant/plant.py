@@ -199,12 +199,18 @@ def posture_of(plant: Plant, q: Floats) -> Floats:
     """Return where a controller begins with a plant, shape (n,) [rad]: at q if it can be placed, else where it stands.
 
     Raises:
-        ValueError: The measurement has the wrong shape, or the plant can neither be placed nor measured.
+        ValueError: The plant does not answer, its measurement has the wrong shape or is not finite, or it can neither be
+            placed nor measured.
     """
     if isinstance(plant, Placeable):
         return q
-    measured = _standing(plant).measure()
+    try:
+        measured = _standing(plant).measure()
+    except PlantError as error:
+        raise ValueError(f"plant {type(plant).__name__}: where it stands is unknown: {error}") from error
     check_measurement(measured, len(q), plant)
+    if not np.isfinite(measured.q).all():
+        raise ValueError(f"plant {type(plant).__name__}: measured q is {measured.q.tolist()}: must be finite")
     return measured.q.copy()
 
 

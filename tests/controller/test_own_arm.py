@@ -6,6 +6,7 @@ from tests.own_arm import STANDS, SWITCHES, OwnArm
 
 from tvist_controller.arm_power import STALE
 from tvist_controller.controller import Controller
+from tvist_plant.plant import PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Accepted, Done
@@ -130,6 +131,45 @@ def test_one_that_does_not_answer_is_told_of_once():
     assert robot.states[-1].target_q == pytest.approx(stood)
     assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
     assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
+
+
+@pytest.mark.parametrize("unknown", ["failing", "not finite"])
+def test_where_it_stands_may_be_unknown_until_it_answers_again(unknown):
+    plant, robot = ready()
+    robot.send(c.MoveJ, q=TARGET)
+    robot.tick(100)
+    plant.silent, plant.measure = True, fails if unknown == "failing" else lambda: not_finite(plant)
+    robot.tick(3)
+    assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
+    assert np.isfinite(robot.states[-1].target_q).all()
+    robot.send(c.RestartSafety)
+    refused = robot.send(c.PowerOn)
+    assert (refused.code, "plant OwnArm" in refused.why) == ("wrong_mode", True)
+    robot.send(c.RestartSafety)
+    plant.silent = False
+    del plant.measure
+    assert isinstance(robot.send(c.PowerOn), Done)
+    robot.tick(SWITCHES + 2)
+    assert robot.states[-1].target_q == pytest.approx(plant.q)
+    assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
+    assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
+
+
+def test_it_cannot_be_served_if_nobody_knows_where_it_stands():
+    plant = OwnArm(UR5E, UR5E.payload)
+    plant.measure = fails
+    with pytest.raises(ValueError, match="where it stands is unknown: no answer"):
+        Controller(setup(), plant)
+
+
+def fails():
+    raise PlantError("no answer")
+
+
+def not_finite(plant):
+    measured = OwnArm.measure(plant)
+    measured.q = measured.q * np.nan
+    return measured
 
 
 def test_measurements_whose_time_does_not_pass_are_no_measurements():
