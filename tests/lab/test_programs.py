@@ -1,8 +1,12 @@
 """A run of a program: how it ends, what it says, how it moves, and how much the tool shakes after each stop."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from tests.controller.robots import NoArm
 
+from tvist_controller.own_plants import OwnPlant
 from tvist_lab.in_process import free_setup
 from tvist_lab.metrics import amplitude, motions, tool_acceleration
 from tvist_lab.programs.in_lockstep import run_in_lockstep
@@ -21,8 +25,8 @@ def script(*lines, kind="def"):
     return "\n".join((f"{kind} prog():", *(f"  {line}" for line in lines), "end", ""))
 
 
-def run(*lines, inputs=(), timeout=100.0, record=None, kind="def", **changes):
-    setup = free_setup(profile="ursim", **changes)
+def run(*lines, inputs=(), timeout=100.0, record=None, kind="def", plant=None, **changes):
+    setup = replace(free_setup(profile="ursim", **changes), plant=plant)
     return run_in_lockstep(
         setup,
         script(*lines, kind=kind),
@@ -199,6 +203,11 @@ def test_the_report_tells_everything():
     (move,) = told["moves"]
     assert move["peak_after_stop_m_s2"] == told["largest_peak_after_stop_m_s2"] > 0.0
     assert 0.3 < move["seconds"] < told["seconds"]
+
+
+def test_of_an_arm_without_truth_nobody_knows_how_its_tool_shakes():
+    watch = run(MOVES[0], plant=OwnPlant("mine.py:NoArm", "", lambda *_: NoArm()), truth=False)
+    assert (watch.reason, len(watch.moves), largest_peak(watch)) == ("finished", 1, None)
 
 
 def test_the_summary_is_a_sentence():
