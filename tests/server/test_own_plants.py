@@ -39,6 +39,9 @@ def nothing(description, payload):
 
 def fails(description, payload):
     raise OSError("no cable")
+
+def leaves(description, payload):
+    raise SystemExit(3)
 """
 
 
@@ -59,7 +62,11 @@ def test_an_installed_one_is_found_by_its_name():
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("nothing", "makes a NoneType, which is no plant"), ("fails", "making it raises OSError: no cable")],
+    [
+        ("nothing", "makes a NoneType, which is no plant"),
+        ("fails", "making it raises OSError: no cable"),
+        ("leaves", "making it raises SystemExit: 3"),
+    ],
 )
 def test_one_that_cannot_be_made_says_why(place, name, said):
     plant = load_plant(place.replace("Echo", name))
