@@ -195,6 +195,19 @@ class Pacing(Protocol):
         """Wait until the next control period begins; return False if it does not within the timeout [s]."""
 
 
+def check_unpaced(plant: Plant) -> None:
+    """Check that a plant may be moved as fast as a machine computes, without a clock.
+
+    Raises:
+        ValueError: It gives the tick, so it may be a real arm.
+    """
+    if isinstance(plant, Pacing):
+        raise ValueError(
+            f"the plant {type(plant).__name__} gives the tick: it moves in real time only, and not as fast as this "
+            "machine computes"
+        )
+
+
 def posture_of(plant: Plant, q: Floats) -> Floats:
     """Return where a controller begins with a plant, shape (n,) [rad]: at q if it can be placed, else where it stands.
 

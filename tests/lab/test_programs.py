@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.controller.robots import NoArm
+from tests.own_arm import OwnArm
 
 from tvist_controller.own_plants import OwnPlant
 from tvist_lab.in_process import free_setup
@@ -16,6 +17,7 @@ from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.io import SetRegisters, SimulationSetInputs
+from tvist_server.config import ConfigError
 
 THERE, BACK = "[-1.2, -1.5, -2.0, -0.8, 1.6, 0]", "[-1.6, -1.7, -2.2, -0.8, 1.6, 0]"
 MOVES = (f"movej({THERE}, a=3, v=2)", "sleep(0.5)", f"movej({BACK}, a=3, v=2)", f"movej({THERE}, a=3, v=2)")
@@ -208,6 +210,16 @@ def test_the_report_tells_everything():
 def test_of_an_arm_without_truth_nobody_knows_how_its_tool_shakes():
     watch = run(MOVES[0], plant=OwnPlant("mine.py:NoArm", "", lambda *_: NoArm()), truth=False)
     assert (watch.reason, len(watch.moves), largest_peak(watch)) == ("finished", 1, None)
+
+
+def test_an_arm_that_gives_the_tick_is_not_moved_faster():
+    with pytest.raises(ConfigError, match="the plant OwnArm gives the tick"):
+        run(MOVES[0], plant=OwnPlant("mine.py:OwnArm", "", OwnArm), truth=False)
+
+
+def test_a_plant_that_cannot_be_made_is_an_error_of_the_configuration():
+    with pytest.raises(ConfigError, match="which is no plant"):
+        run(MOVES[0], plant=OwnPlant("mine.py:nothing", "", lambda *_: None), truth=False)
 
 
 def test_the_summary_is_a_sentence():

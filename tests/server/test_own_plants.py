@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 from tests.controller.robots import Q2, UR5E, setup
+from tests.own_arm import OwnArm
 
 from tvist_controller.about import info_of
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.own_plants import OwnPlantError, RecordedPlant, installed_plants, load_plant
+from tvist_controller.own_plants import OwnPlant, OwnPlantError, RecordedPlant, installed_plants, load_plant
 from tvist_controller.setup import Setup, body
 from tvist_lab.mujoco_arm import MujocoArm
 from tvist_lab.recordings.mcap_file import read
@@ -110,6 +111,13 @@ def test_a_setup_survives_its_recording_and_a_run_its_replay(tmp_path, place):
     assert replay_file(content, plant=own).first_difference is None
     with pytest.raises(ReplayError, match=f"give --plant {place}"):
         replay_file(content)
+
+
+def test_a_replay_does_not_move_an_arm_that_gives_the_tick(tmp_path, place):
+    content = recorded(tmp_path, load_plant(place))
+    real = OwnPlant(place, "", OwnArm)
+    with pytest.raises(ValueError, match="the plant OwnArm gives the tick"):
+        replay_file(content, plant=real)
 
 
 def test_a_plant_is_not_taken_where_there_was_none(tmp_path, place):
