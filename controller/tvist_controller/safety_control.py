@@ -155,7 +155,7 @@ class SafetyControl:
             for danger in self._protection.dangers(sample):
                 motion.protect(danger.why, danger.code)
         if motion.power is not None:
-            trouble = motion.power.trouble(motion.robot_mode, sample.measured.timestamp)
+            trouble = motion.power.trouble(motion.robot_mode, sample.measured)
             if trouble is not None and motion.safety.latched is None:
                 self.cut_power(trouble, "fault")
 

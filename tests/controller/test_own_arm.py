@@ -10,7 +10,7 @@ from tvist_plant.plant import PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Accepted, Done
-from tvist_protocol.simulation import SimulationReset
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 
 from .robots import UR5E, NoArm, Robot, setup
 
@@ -102,6 +102,16 @@ def test_a_fault_of_its_own_stops_it_until_the_fault_is_gone_and_safety_is_resta
     assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
 
 
+def test_power_that_comes_back_before_the_next_tick_is_switched_on_again():
+    plant, robot = ready()
+    for kind, fields in ((SimulationInject, {"fault": "fault"}), (c.RestartSafety, {}), (c.PowerOn, {})):
+        assert isinstance(robot.send(kind, **fields), Done)
+    robot.tick(SWITCHES + 1)
+    assert modes(robot) == (RobotMode.RUNNING, SafetyMode.NORMAL)
+    assert plant.calls == [(True, False), (True, False)]
+    assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
+
+
 def test_one_that_switches_itself_off_stops_the_robot():
     plant, robot = ready()
     robot.send(c.MoveJ, q=TARGET)
@@ -170,6 +180,56 @@ def not_finite(plant):
     measured = OwnArm.measure(plant)
     measured.q = measured.q * np.nan
     return measured
+
+
+@pytest.mark.parametrize("method", ["condition", "stop", "switch"])
+def test_one_that_does_not_answer_may_fail_in_any_method(method):
+    class Fails(OwnArm):
+        broken = False
+
+    def answer(self, *_, **given):
+        if self.broken:
+            raise PlantError("no answer")
+        return own.fget(self) if isinstance(own, property) else own(self, **given)
+
+    own = getattr(OwnArm, method)
+    setattr(Fails, method, property(answer) if isinstance(own, property) else answer)
+    plant = Fails(UR5E, UR5E.payload)
+    robot = Robot(plant=plant)
+    robot.tick(SWITCHES + 1)
+    robot.send(c.MoveJ, q=TARGET)
+    robot.tick(100)
+    plant.broken = True
+    robot.send(SimulationInject, fault="fault")
+    robot.tick(1000)
+    assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
+    robot.send(c.RestartSafety)
+    robot.send(c.PowerOn)
+    robot.tick()
+    assert robot.send(c.MoveJ, q=TARGET).code == "wrong_mode"
+    plant.broken = False
+    robot.send(c.RestartSafety)
+    robot.send(c.PowerOn)
+    robot.tick(SWITCHES + 2)
+    assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
+
+
+@pytest.mark.parametrize("field", ["q", "moment"])
+def test_one_that_measures_what_is_no_number_stops_the_robot(field):
+    plant, robot = ready()
+    robot.send(c.MoveJ, q=TARGET)
+    robot.tick(100)
+    step = plant.step
+
+    def wrong(command):
+        measured = step(command)
+        setattr(measured, field, np.full(6, np.nan))
+        return measured
+
+    plant.step = wrong
+    robot.tick()
+    assert any("no number" in (event.why or "") for event in robot.events)
+    assert modes(robot)[1] is SafetyMode.FAULT
 
 
 def test_measurements_whose_time_does_not_pass_are_no_measurements():
