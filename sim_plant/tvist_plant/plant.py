@@ -201,10 +201,11 @@ def check_unpaced(plant: Plant) -> None:
     Raises:
         ValueError: It gives the tick, so it may be a real arm.
     """
-    if isinstance(plant, Pacing):
+    paced = isinstance(plant, Pacing)
+    if paced:
+        name = type(plant).__name__
         raise ValueError(
-            f"the plant {type(plant).__name__} gives the tick: it moves in real time only, and not as fast as this "
-            "machine computes"
+            f"the plant {name} gives the tick: it moves in real time only, and not as fast as this machine computes"
         )
 
 
@@ -212,8 +213,8 @@ def posture_of(plant: Plant, q: Floats) -> Floats:
     """Return where a controller begins with a plant, shape (n,) [rad]: at q if it can be placed, else where it stands.
 
     Raises:
-        ValueError: The plant does not answer, its measurement has the wrong shape or is not finite, or it can neither be
-            placed nor measured.
+        ValueError: The plant does not answer, its measurement has the wrong shape or is not finite, or it can
+            neither be placed nor measured.
     """
     if isinstance(plant, Placeable):
         return q

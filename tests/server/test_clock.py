@@ -2,6 +2,7 @@
 
 import os
 import threading
+import time
 from types import SimpleNamespace
 
 import pytest
@@ -81,6 +82,21 @@ def test_a_job_that_posts_another_does_not_keep_the_tick_waiting():
 
     again()
     served([robot])
+
+
+def test_an_arm_that_does_not_begin_its_tick_keeps_no_client_waiting_and_is_told_of_once():
+    paces = [True, False, False, True, False]
+    robot = Mailbox(FakeHost(), pace=lambda timeout: paces.pop(0) if paces else time.sleep(timeout))
+    clock = Realtime([robot], lambda: None, PERIOD)
+    clock.start()
+    answered = threading.Event()
+    while paces:
+        time.sleep(PERIOD)
+    robot.post(answered.set)
+    assert answered.wait(WAIT)
+    clock.close()
+    assert robot.host.ticks == 2
+    assert ["does not begin" in why for why in robot.host.warned] == [True, True]
 
 
 @pytest.mark.parametrize("error", [ArithmeticError, KeyboardInterrupt, GeneratorExit])

@@ -197,11 +197,13 @@ class Realtime(Clock):
         robots, overloads, now, sleep = self._robots, self._overloads, time.monotonic, time.sleep
         alone, handed_on = len(robots) == 1, -HAND_ON_EVERY
         schedule, pace = Schedule(len(robots), self._period, now()), robots[0].pace
-        begin = schedule.begin if pace is None else Followed(self._period, now()).begin
+        begin, silent = schedule.begin if pace is None else Followed(self._period, now()).begin, False
         while self._running:
             if pace is not None:
                 if not pace(LONGEST_SLEEP):
+                    silent = self._do_without_tick(robots[0], silent)
                     continue
+                silent = False
             elif (wait := schedule.due - now()) > 0.0:
                 sleep(min(wait, LONGEST_SLEEP))
                 if wait > LONGEST_SLEEP:
@@ -224,6 +226,16 @@ class Realtime(Clock):
         for robot in robots:
             robot.jobs.do_waiting()
         self._hand_on()
+
+    def _do_without_tick(self, robot: Mailbox, silent: bool) -> bool:
+        """Answer the clients of an arm that has fallen silent, and tell them once; return True."""
+        robot.jobs.do_waiting()
+        if not silent:
+            robot.host.warn(
+                "the arm does not begin its next tick: time stands still, and it obeys no command"
+            )
+        self._hand_on()
+        return True
 
     def _ask(self) -> None:
         """Ask the system for what belongs to the calling thread."""
