@@ -113,6 +113,23 @@ def test_a_tick_that_fails_ends_all_robots_of_the_thread_and_says_so(caplog, err
     assert "on purpose" in caplog.text
 
 
+def test_an_arm_whose_call_never_returns_does_not_keep_the_server_from_ending(caplog, monkeypatch):
+    monkeypatch.setattr("tvist_server.clock.LONGEST_TICK", 0.1)
+    begun, go_on = threading.Event(), threading.Event()
+
+    class Hanging(FakeHost):
+        def tick(self):
+            begun.set()
+            go_on.wait(WAIT)
+
+    clock = Realtime([Mailbox(Hanging())], lambda: None, PERIOD)
+    clock.start()
+    assert begun.wait(WAIT)
+    clock.close()
+    assert "has not returned" in caplog.text
+    go_on.set()
+
+
 def test_real_time_priority_is_asked_for_by_the_tick_thread_itself(monkeypatch):
     asked = []
     monkeypatch.setattr(
