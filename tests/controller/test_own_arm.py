@@ -49,6 +49,14 @@ def test_it_moves_once_its_drives_are_ready_and_not_before():
     assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
 
 
+def test_a_program_waits_until_its_drives_are_ready():
+    robot = Robot(plant=OwnArm(UR5E, UR5E.payload))
+    robot.send(c.ProgramRun, text=f"def p():\n  movej({list(TARGET)})\nend\n")
+    robot.tick(1500)
+    assert robot.kinds()[:4] == ["program_started", "motion_started", "motion_done", "program_stopped"]
+    assert robot.states[-1].actual_q == pytest.approx(TARGET, abs=5e-4)
+
+
 def test_power_and_brakes_follow_the_robot_mode_and_it_goes_on_from_where_it_was_moved_to():
     plant, robot = ready()
     assert plant.calls == [(True, False)]
