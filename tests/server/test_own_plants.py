@@ -20,6 +20,7 @@ from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ServeConfig
 from tvist_server.recording import Recorder
 from tvist_server.schedule import Followed
+from tvist_server.workers import _rehearse
 
 ECHO = """
 import numpy as np
@@ -118,6 +119,10 @@ def test_a_replay_does_not_move_an_arm_that_gives_the_tick(tmp_path, place):
     real = OwnPlant(place, "", OwnArm)
     with pytest.raises(ValueError, match="the plant OwnArm gives the tick"):
         replay_file(content, plant=real)
+
+
+def test_only_the_process_that_serves_it_makes_it():
+    _rehearse(setup(plant=OwnPlant("real.py:Arm", "", lambda *_: pytest.fail("it was touched"))))
 
 
 def test_a_plant_is_not_taken_where_there_was_none(tmp_path, place):
