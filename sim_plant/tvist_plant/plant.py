@@ -141,7 +141,11 @@ class Standing(Plant, Protocol):
     """A plant that stands somewhere by itself, as a real arm does; every plant is this or `Placeable`."""
 
     def measure(self) -> Measurement:
-        """Return the present measurements without moving the arm; at a failure, the last ones."""
+        """Return the present measurements without moving the arm.
+
+        Raises:
+            PlantError: It does not answer. The robot then cannot begin with it, or does not switch its power on.
+        """
 
 
 @runtime_checkable
