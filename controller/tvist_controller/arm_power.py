@@ -1,8 +1,11 @@
 """The power, brakes and condition of a plant that has them; simulated arms have none, and are always ready."""
 
+from contextlib import suppress
 from typing import Self
 
-from tvist_plant.plant import PERIOD, Condition, Placeable, Plant, Powered, Stoppable
+import numpy as np
+
+from tvist_plant.plant import PERIOD, Condition, Measurement, Placeable, Plant, PlantError, Powered, Stoppable
 from tvist_protocol.modes import RobotMode
 
 STALE = 10
@@ -32,8 +35,13 @@ class ArmPower:
 
     @property
     def condition(self) -> Condition:
-        """Present condition of the plant."""
-        return Condition(ready=True) if self._powered is None else self._powered.condition
+        """Present condition of the plant; one that does not answer has a fault."""
+        if self._powered is None:
+            return Condition(ready=True)
+        try:
+            return self._powered.condition
+        except PlantError as error:
+            return Condition(ready=False, fault=str(error))
 
     def follow(self, mode: RobotMode) -> None:
         """Switch power and brakes as the robot mode asks, if that has changed."""
@@ -45,23 +53,26 @@ class ArmPower:
 
     def stop(self) -> None:
         """Let the plant make its own stop, if it has one."""
+        self._told = None  # by its own stop it has switched itself
         if self._stoppable is not None:
-            self._stoppable.stop()
+            with suppress(PlantError):  # the robot stops in any case, and says why
+                self._stoppable.stop()
 
-    def trouble(self, mode: RobotMode, timestamp: float | None) -> str | None:
+    def trouble(self, mode: RobotMode, measured: Measurement) -> str | None:
         """Return why the robot cannot go on, in words; None if it can. To be called after every tick.
 
         Args:
             mode: Present robot mode.
-            timestamp: Time of the plant's measurement [s]; None if it has none.
+            measured: The plant's measurement.
         """
+        if not (np.isfinite(measured.q).all() and np.isfinite(measured.moment).all()):
+            return "the arm has measured what is no number"
+        timestamp = measured.timestamp
         self._same = self._same + 1 if timestamp is not None and timestamp == self._measured else 0
         self._measured = timestamp
         if self._same >= STALE:
             return f"the arm has not measured anything for {1e3 * STALE * PERIOD:g} ms"
-        if self._powered is None:
-            return None
-        condition = self._powered.condition
+        condition = self.condition
         if condition.fault is not None:
             return f"the arm reports: {condition.fault}"
         lost = self._was_ready and not condition.ready and mode is RobotMode.RUNNING

@@ -12,7 +12,7 @@ from tvist_controller.sample import Sample
 from tvist_controller.trajectory import Rest, StuckError, Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import PERIOD, Plant, check_measurement, placed, posture_of
+from tvist_plant.plant import PERIOD, Measurement, Plant, check_measurement, placed, posture_of
 from tvist_shaping.base import Filter
 
 T = TypeVar("T", bound=Trajectory)
@@ -169,20 +169,27 @@ class ControlCycle:
         self.mode, self.guard = LineMode.REST, None
         line.drives.rest()
 
-    def reset(self, q: Floats, *, carried: Payload | None = None, seed: int = 0) -> Sample:
+    def reset(
+        self, q: Floats, *, carried: Payload | None = None, seed: int = 0, measured: Measurement | None = None
+    ) -> Sample:
         """Place the arm somewhere at rest, in static equilibrium; the whole line restarts.
 
         Args:
             q: Joint angles, shape (n,) [rad]; of an arm that cannot be placed, the line begins where that stands.
             carried: New carried payload; None for the present one.
             seed: Seed of the arm's noise and gear errors.
+            measured: Last measurements of an arm that does not answer: the line then begins at q, and nobody asks it.
+
+        Raises:
+            ValueError: An arm that cannot be placed does not tell where it stands. Nothing has changed.
         """
-        line, q = self.line, posture_of(self.line.plant, q)
+        line, q = self.line, posture_of(self.line.plant, q) if measured is None else q
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
         signals = line.rest_at(q)
         target = Target(*signals[Q:TORQUE])
         command = line.drives.command(target, signals, line.dynamics.carried)
-        measured = placed(line.plant, command, payload=carried, seed=seed)
+        if measured is None:
+            measured = placed(line.plant, command, payload=carried, seed=seed)
         self.sample = Sample(
             self.mode, q, line.shaped.joints.window, target, signals, command.torque, measured
         )

@@ -152,6 +152,11 @@ class MotionControl:
         """Present safety mode."""
         return self.safety.mode(self.activity)
 
+    @property
+    def ready(self) -> bool:
+        """Whether the drives hold the arm; simulated arms are always ready."""
+        return self.power is None or self.power.condition.ready
+
     def protect(self, why: str, code: Code | None = None) -> None:
         """Make a protective stop; do nothing if the brakes hold the arm or its power is being switched off."""
         if after(self.activity, "protective_stop") is not None:
@@ -167,7 +172,7 @@ class MotionControl:
         if target is None:
             raise out_of_turn(trigger, self.activity)
         self.safety.check(trigger, self.activity)
-        if target.moving and self.power is not None and not (self._moving or self.power.condition.ready):
+        if target.moving and not (self._moving or self.ready):
             raise RefusalError(
                 "wrong_mode", "", "the drives of the arm are not ready: wait until they hold it"
             )

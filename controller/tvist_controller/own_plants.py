@@ -59,7 +59,7 @@ class OwnPlant:
         """
         try:
             made = self.maker(description, carried)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             said = " ".join(str(error).split())
             words = f"{type(error).__name__}: {said}" if said else type(error).__name__
             raise OwnPlantError(f"plant {self.place}: making it raises {words}") from error
@@ -108,7 +108,7 @@ def _installed(name: str) -> object:
         if one.name == name:
             try:
                 return one.load()
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 raise OwnPlantError(f"plant {name}: loading {one.value} fails: {error}") from error
     known = ", ".join(installed_plants())
     raise OwnPlantError(

@@ -7,6 +7,7 @@ from tvist_controller.brakes import brake
 from tvist_controller.events import Emit
 from tvist_controller.motion import MotionControl
 from tvist_controller.protection import Protection
+from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import REDUCED_SHARE
 from tvist_controller.safety_system import Emergency, Latched
 from tvist_controller.sample import Sample
@@ -103,13 +104,18 @@ class SafetyControl:
             release_brakes: False to leave the brakes of an arm without power closed.
 
         Raises:
-            RefusalError: The arm is moving, or is in a protective stop.
+            RefusalError: The arm is moving, is in a protective stop, or does not tell where it stands.
         """
         motion, cycle = self._motion, self._motion.cycle
-        motion.go("power_on" if release_brakes else "power")
-        if cycle.mode.at_rest and not isinstance(cycle.line.plant, Placeable):
+        trigger, held = "power_on" if release_brakes else "power", motion.robot_mode is RobotMode.RUNNING
+        motion.check(trigger)
+        if not (held or isinstance(cycle.line.plant, Placeable)):
             # Without power the arm may have been moved, and its brakes stop it where they do.
-            cycle.reset(cycle.line.shaped.position)
+            try:
+                cycle.reset(cycle.line.shaped.position)
+            except ValueError as error:
+                raise RefusalError("wrong_mode", "", str(error)) from error
+        motion.go(trigger)
 
     def cut_power(self, why: str, latched: Latched | None = None) -> None:
         """Stop with category 0: the power is off, and the brakes close at once.
@@ -149,7 +155,7 @@ class SafetyControl:
             for danger in self._protection.dangers(sample):
                 motion.protect(danger.why, danger.code)
         if motion.power is not None:
-            trouble = motion.power.trouble(motion.robot_mode, sample.measured.timestamp)
+            trouble = motion.power.trouble(motion.robot_mode, sample.measured)
             if trouble is not None and motion.safety.latched is None:
                 self.cut_power(trouble, "fault")
 
@@ -169,7 +175,13 @@ class SafetyControl:
         simulated = isinstance(cycle.line.plant, Placeable)
         why = f"{error}: the simulation put the arm at rest at its reference" if simulated else str(error)
         motion.abandon(why, "plant_failure")
-        sample = cycle.reset(cycle.line.shaped.position, seed=seed)
+        position = cycle.line.shaped.position
+        try:
+            sample = cycle.reset(position, seed=seed)
+        except ValueError:  # `power_on` asks it again
+            if simulated:
+                raise
+            sample = cycle.reset(position, measured=cycle.sample.measured)
         self._protection.forget()
         if not simulated:
             if motion.power is not None:

@@ -10,6 +10,7 @@ from msgspec.structs import fields
 from tvist_controller.api.line import OwnShaper, RecordedShaper, Setup
 from tvist_controller.api.robot import Controller, OwnPlant, Presence, RecordedPlant, SocketNews
 from tvist_lab.recordings.mcap_file import RecordingFile
+from tvist_plant.plant import check_unpaced
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError, TvistError
@@ -43,8 +44,12 @@ def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> R
         setup: Initial setup of the recorded controller.
         journal: Inputs of the recorded controller.
         states: Its states, from its first tick on; only their number and values are used.
+
+    Raises:
+        ValueError: The setup is invalid, or its plant gives the tick.
     """
     controller, presence, done, names = Controller(setup), Presence(), Replay(), known_fields(states)
+    check_unpaced(controller.cycle.line.plant)
     entries = iter(journal)
     entry = next(entries, None)
     for recorded in states:
@@ -78,7 +83,7 @@ def replay_file(
     Raises:
         ReplayError: The recording does not contain its robot's setup, or begins too late; or a shaper from a file or a
             plant is missing or not needed.
-        ValueError: The recorded setup is invalid.
+        ValueError: The recorded setup is invalid, or its plant gives the tick.
     """
     if not content.start:  # empty in recordings made by another program
         raise ReplayError(

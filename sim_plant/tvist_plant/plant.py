@@ -141,7 +141,11 @@ class Standing(Plant, Protocol):
     """A plant that stands somewhere by itself, as a real arm does; every plant is this or `Placeable`."""
 
     def measure(self) -> Measurement:
-        """Return the present measurements without moving the arm; at a failure, the last ones."""
+        """Return the present measurements without moving the arm.
+
+        Raises:
+            PlantError: It does not answer. The robot then cannot begin with it, or does not switch its power on.
+        """
 
 
 @runtime_checkable
@@ -195,16 +199,36 @@ class Pacing(Protocol):
         """Wait until the next control period begins; return False if it does not within the timeout [s]."""
 
 
+def check_unpaced(plant: Plant) -> None:
+    """Check that a plant may be moved as fast as a machine computes, without a clock.
+
+    Raises:
+        ValueError: It gives the tick, so it may be a real arm.
+    """
+    paced = isinstance(plant, Pacing)
+    if paced:
+        name = type(plant).__name__
+        raise ValueError(
+            f"the plant {name} gives the tick: it moves in real time only, and not as fast as this machine computes"
+        )
+
+
 def posture_of(plant: Plant, q: Floats) -> Floats:
     """Return where a controller begins with a plant, shape (n,) [rad]: at q if it can be placed, else where it stands.
 
     Raises:
-        ValueError: The measurement has the wrong shape, or the plant can neither be placed nor measured.
+        ValueError: The plant does not answer, its measurement has the wrong shape or is not finite, or it can
+            neither be placed nor measured.
     """
     if isinstance(plant, Placeable):
         return q
-    measured = _standing(plant).measure()
+    try:
+        measured = _standing(plant).measure()
+    except PlantError as error:
+        raise ValueError(f"plant {type(plant).__name__}: where it stands is unknown: {error}") from error
     check_measurement(measured, len(q), plant)
+    if not np.isfinite(measured.q).all():
+        raise ValueError(f"plant {type(plant).__name__}: measured q is {measured.q.tolist()}: must be finite")
     return measured.q.copy()
 
 

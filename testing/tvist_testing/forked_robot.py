@@ -19,6 +19,7 @@ import sys
 import threading
 from typing import Any
 
+from tvist_controller.own_plants import load_plant
 from tvist_server.config_file import from_mapping
 from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError
@@ -71,6 +72,8 @@ def _listening(wanted: WantedRobot, preparation: Preparation) -> tuple[Server, d
         address = _own_address() if wanted.ur else "127.0.0.1"
         endpoint = f"tcp/{address}:{_free_port(address)}"
         options: dict[str, Any] = {**wanted.options, "listen": (endpoint,)}
+        if (plant := options.get("plant")) is not None:
+            options["truth"] = hasattr(load_plant(plant).maker, "truth")
         place: dict[str, Any] = {"endpoint": endpoint}
         if wanted.ur:
             usual = address != "127.0.0.1"

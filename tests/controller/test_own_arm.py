@@ -6,10 +6,11 @@ from tests.own_arm import STANDS, SWITCHES, OwnArm
 
 from tvist_controller.arm_power import STALE
 from tvist_controller.controller import Controller
+from tvist_plant.plant import PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Accepted, Done
-from tvist_protocol.simulation import SimulationReset
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 
 from .robots import UR5E, NoArm, Robot, setup
 
@@ -48,6 +49,14 @@ def test_it_moves_once_its_drives_are_ready_and_not_before():
     assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
 
 
+def test_a_program_waits_until_its_drives_are_ready():
+    robot = Robot(plant=OwnArm(UR5E, UR5E.payload))
+    robot.send(c.ProgramRun, text=f"def p():\n  movej({list(TARGET)})\nend\n")
+    robot.tick(1500)
+    assert robot.kinds()[:4] == ["program_started", "motion_started", "motion_done", "program_stopped"]
+    assert robot.states[-1].actual_q == pytest.approx(TARGET, abs=5e-4)
+
+
 def test_power_and_brakes_follow_the_robot_mode_and_it_goes_on_from_where_it_was_moved_to():
     plant, robot = ready()
     assert plant.calls == [(True, False)]
@@ -61,6 +70,19 @@ def test_power_and_brakes_follow_the_robot_mode_and_it_goes_on_from_where_it_was
     assert plant.calls[-1] == (True, False)
     assert robot.states[-1].target_q == pytest.approx(STANDS + 0.05)
     assert robot.states[-1].actual_q == pytest.approx(STANDS + 0.05, abs=5e-4)
+
+
+def test_power_on_does_not_let_an_arm_that_is_held_sink_to_where_it_is_measured():
+    plant, robot = ready()
+    plant.measure, measure = lambda: sagging(measure()), plant.measure
+    assert isinstance(robot.send(c.PowerOn), Done)
+    robot.tick()
+    assert robot.states[-1].target_q == pytest.approx(STANDS)
+
+
+def sagging(measured):
+    measured.q = measured.q - 0.002
+    return measured
 
 
 def test_a_fault_of_its_own_stops_it_until_the_fault_is_gone_and_safety_is_restarted():
@@ -86,6 +108,16 @@ def test_a_fault_of_its_own_stops_it_until_the_fault_is_gone_and_safety_is_resta
     robot.tick(SWITCHES + 1)
     assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
     assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
+
+
+def test_power_that_comes_back_before_the_next_tick_is_switched_on_again():
+    plant, robot = ready()
+    for kind, fields in ((SimulationInject, {"fault": "fault"}), (c.RestartSafety, {}), (c.PowerOn, {})):
+        assert isinstance(robot.send(kind, **fields), Done)
+    robot.tick(SWITCHES + 1)
+    assert modes(robot) == (RobotMode.RUNNING, SafetyMode.NORMAL)
+    assert plant.calls == [(True, False), (True, False)]
+    assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
 
 
 def test_one_that_switches_itself_off_stops_the_robot():
@@ -117,6 +149,95 @@ def test_one_that_does_not_answer_is_told_of_once():
     assert robot.states[-1].target_q == pytest.approx(stood)
     assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
     assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
+
+
+@pytest.mark.parametrize("unknown", ["failing", "not finite"])
+def test_where_it_stands_may_be_unknown_until_it_answers_again(unknown):
+    plant, robot = ready()
+    robot.send(c.MoveJ, q=TARGET)
+    robot.tick(100)
+    plant.silent, plant.measure = True, fails if unknown == "failing" else lambda: not_finite(plant)
+    robot.tick(3)
+    assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
+    assert np.isfinite(robot.states[-1].target_q).all()
+    robot.send(c.RestartSafety)
+    refused = robot.send(c.PowerOn)
+    assert (refused.code, "plant OwnArm" in refused.why) == ("wrong_mode", True)
+    robot.send(c.RestartSafety)
+    plant.silent = False
+    del plant.measure
+    assert isinstance(robot.send(c.PowerOn), Done)
+    robot.tick(SWITCHES + 2)
+    assert robot.states[-1].target_q == pytest.approx(plant.q)
+    assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
+    assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
+
+
+def test_it_cannot_be_served_if_nobody_knows_where_it_stands():
+    plant = OwnArm(UR5E, UR5E.payload)
+    plant.measure = fails
+    with pytest.raises(ValueError, match="where it stands is unknown: no answer"):
+        Controller(setup(), plant)
+
+
+def fails():
+    raise PlantError("no answer")
+
+
+def not_finite(plant):
+    measured = OwnArm.measure(plant)
+    measured.q = measured.q * np.nan
+    return measured
+
+
+@pytest.mark.parametrize("method", ["condition", "stop", "switch"])
+def test_one_that_does_not_answer_may_fail_in_any_method(method):
+    class Fails(OwnArm):
+        broken = False
+
+    def answer(self, *_, **given):
+        if self.broken:
+            raise PlantError("no answer")
+        return own.fget(self) if isinstance(own, property) else own(self, **given)
+
+    own = getattr(OwnArm, method)
+    setattr(Fails, method, property(answer) if isinstance(own, property) else answer)
+    plant = Fails(UR5E, UR5E.payload)
+    robot = Robot(plant=plant)
+    robot.tick(SWITCHES + 1)
+    robot.send(c.MoveJ, q=TARGET)
+    robot.tick(100)
+    plant.broken = True
+    robot.send(SimulationInject, fault="fault")
+    robot.tick(1000)
+    assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
+    robot.send(c.RestartSafety)
+    robot.send(c.PowerOn)
+    robot.tick()
+    assert robot.send(c.MoveJ, q=TARGET).code == "wrong_mode"
+    plant.broken = False
+    robot.send(c.RestartSafety)
+    robot.send(c.PowerOn)
+    robot.tick(SWITCHES + 2)
+    assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
+
+
+@pytest.mark.parametrize("field", ["q", "moment"])
+def test_one_that_measures_what_is_no_number_stops_the_robot(field):
+    plant, robot = ready()
+    robot.send(c.MoveJ, q=TARGET)
+    robot.tick(100)
+    step = plant.step
+
+    def wrong(command):
+        measured = step(command)
+        setattr(measured, field, np.full(6, np.nan))
+        return measured
+
+    plant.step = wrong
+    robot.tick()
+    assert any("no number" in (event.why or "") for event in robot.events)
+    assert modes(robot)[1] is SafetyMode.FAULT
 
 
 def test_measurements_whose_time_does_not_pass_are_no_measurements():

@@ -1,8 +1,13 @@
 """A run of a program: how it ends, what it says, how it moves, and how much the tool shakes after each stop."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from tests.controller.robots import NoArm
+from tests.own_arm import OwnArm
 
+from tvist_controller.own_plants import OwnPlant
 from tvist_lab.in_process import free_setup
 from tvist_lab.metrics import amplitude, motions, tool_acceleration
 from tvist_lab.programs.in_lockstep import run_in_lockstep
@@ -12,6 +17,7 @@ from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.io import SetRegisters, SimulationSetInputs
+from tvist_server.config import ConfigError
 
 THERE, BACK = "[-1.2, -1.5, -2.0, -0.8, 1.6, 0]", "[-1.6, -1.7, -2.2, -0.8, 1.6, 0]"
 MOVES = (f"movej({THERE}, a=3, v=2)", "sleep(0.5)", f"movej({BACK}, a=3, v=2)", f"movej({THERE}, a=3, v=2)")
@@ -21,8 +27,8 @@ def script(*lines, kind="def"):
     return "\n".join((f"{kind} prog():", *(f"  {line}" for line in lines), "end", ""))
 
 
-def run(*lines, inputs=(), timeout=100.0, record=None, kind="def", **changes):
-    setup = free_setup(profile="ursim", **changes)
+def run(*lines, inputs=(), timeout=100.0, record=None, kind="def", plant=None, **changes):
+    setup = replace(free_setup(profile="ursim", **changes), plant=plant)
     return run_in_lockstep(
         setup,
         script(*lines, kind=kind),
@@ -199,6 +205,21 @@ def test_the_report_tells_everything():
     (move,) = told["moves"]
     assert move["peak_after_stop_m_s2"] == told["largest_peak_after_stop_m_s2"] > 0.0
     assert 0.3 < move["seconds"] < told["seconds"]
+
+
+def test_of_an_arm_without_truth_nobody_knows_how_its_tool_shakes():
+    watch = run(MOVES[0], plant=OwnPlant("mine.py:NoArm", "", lambda *_: NoArm()), truth=False)
+    assert (watch.reason, len(watch.moves), largest_peak(watch)) == ("finished", 1, None)
+
+
+def test_an_arm_that_gives_the_tick_is_not_moved_faster():
+    with pytest.raises(ConfigError, match="the plant OwnArm gives the tick"):
+        run(MOVES[0], plant=OwnPlant("mine.py:OwnArm", "", OwnArm), truth=False)
+
+
+def test_a_plant_that_cannot_be_made_is_an_error_of_the_configuration():
+    with pytest.raises(ConfigError, match="which is no plant"):
+        run(MOVES[0], plant=OwnPlant("mine.py:nothing", "", lambda *_: None), truth=False)
 
 
 def test_the_summary_is_a_sentence():

@@ -2,6 +2,7 @@
 
 import os
 import threading
+import time
 from types import SimpleNamespace
 
 import pytest
@@ -83,6 +84,21 @@ def test_a_job_that_posts_another_does_not_keep_the_tick_waiting():
     served([robot])
 
 
+def test_an_arm_that_does_not_begin_its_tick_keeps_no_client_waiting_and_is_told_of_once():
+    paces = [True, False, False, True, False]
+    robot = Mailbox(FakeHost(), pace=lambda timeout: paces.pop(0) if paces else time.sleep(timeout))
+    clock = Realtime([robot], lambda: None, PERIOD)
+    clock.start()
+    answered = threading.Event()
+    while paces:
+        time.sleep(PERIOD)
+    robot.post(answered.set)
+    assert answered.wait(WAIT)
+    clock.close()
+    assert robot.host.ticks == 2
+    assert ["does not begin" in why for why in robot.host.warned] == [True, True]
+
+
 @pytest.mark.parametrize("error", [ArithmeticError, KeyboardInterrupt, GeneratorExit])
 def test_a_tick_that_fails_ends_all_robots_of_the_thread_and_says_so(caplog, error):
     class Failing(FakeHost):
@@ -95,6 +111,23 @@ def test_a_tick_that_fails_ends_all_robots_of_the_thread_and_says_so(caplog, err
     clock._thread.join(WAIT)
     assert all("see the log" in robot.host.failure for robot in robots)
     assert "on purpose" in caplog.text
+
+
+def test_an_arm_whose_call_never_returns_does_not_keep_the_server_from_ending(caplog, monkeypatch):
+    monkeypatch.setattr("tvist_server.clock.LONGEST_TICK", 0.1)
+    begun, go_on = threading.Event(), threading.Event()
+
+    class Hanging(FakeHost):
+        def tick(self):
+            begun.set()
+            go_on.wait(WAIT)
+
+    clock = Realtime([Mailbox(Hanging())], lambda: None, PERIOD)
+    clock.start()
+    assert begun.wait(WAIT)
+    clock.close()
+    assert "has not returned" in caplog.text
+    go_on.set()
 
 
 def test_real_time_priority_is_asked_for_by_the_tick_thread_itself(monkeypatch):

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 from tests.controller.robots import Q2, UR5E, setup
+from tests.own_arm import OwnArm
 
 from tvist_controller.about import info_of
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.own_plants import OwnPlantError, RecordedPlant, installed_plants, load_plant
+from tvist_controller.own_plants import OwnPlant, OwnPlantError, RecordedPlant, installed_plants, load_plant
 from tvist_controller.setup import Setup, body
 from tvist_lab.mujoco_arm import MujocoArm
 from tvist_lab.recordings.mcap_file import read
@@ -19,6 +20,7 @@ from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ServeConfig
 from tvist_server.recording import Recorder
 from tvist_server.schedule import Followed
+from tvist_server.workers import _rehearse
 
 ECHO = """
 import numpy as np
@@ -39,6 +41,9 @@ def nothing(description, payload):
 
 def fails(description, payload):
     raise OSError("no cable")
+
+def leaves(description, payload):
+    raise SystemExit(3)
 """
 
 
@@ -59,7 +64,11 @@ def test_an_installed_one_is_found_by_its_name():
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("nothing", "makes a NoneType, which is no plant"), ("fails", "making it raises OSError: no cable")],
+    [
+        ("nothing", "makes a NoneType, which is no plant"),
+        ("fails", "making it raises OSError: no cable"),
+        ("leaves", "making it raises SystemExit: 3"),
+    ],
 )
 def test_one_that_cannot_be_made_says_why(place, name, said):
     plant = load_plant(place.replace("Echo", name))
@@ -103,6 +112,17 @@ def test_a_setup_survives_its_recording_and_a_run_its_replay(tmp_path, place):
     assert replay_file(content, plant=own).first_difference is None
     with pytest.raises(ReplayError, match=f"give --plant {place}"):
         replay_file(content)
+
+
+def test_a_replay_does_not_move_an_arm_that_gives_the_tick(tmp_path, place):
+    content = recorded(tmp_path, load_plant(place))
+    real = OwnPlant(place, "", OwnArm)
+    with pytest.raises(ValueError, match="the plant OwnArm gives the tick"):
+        replay_file(content, plant=real)
+
+
+def test_only_the_process_that_serves_it_makes_it():
+    _rehearse(setup(plant=OwnPlant("real.py:Arm", "", lambda *_: pytest.fail("it was touched"))))
 
 
 def test_a_plant_is_not_taken_where_there_was_none(tmp_path, place):

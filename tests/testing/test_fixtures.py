@@ -7,10 +7,12 @@ import socket
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from tvist_client import MotionStoppedError
 from tvist_client.errors import ClientError
+from tvist_plant.plant import Measurement
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_testing import assert_settles_within
 from tvist_testing import robots as making
@@ -22,6 +24,27 @@ from tvist_client.blocking import Robot
 with Robot.connect(sys.argv[1]) as robot, robot.control("other") as arm:
     arm.move_j([0.5, -3.1, 0.2, -1.6, 0.0, 0.0])
 """
+
+
+class Echo:
+    """An arm that does what it is told, and knows no truth."""
+
+    def __init__(self, _description, payload):
+        self.payload = payload
+
+    def reset(self, command, **_):
+        return self.step(command)
+
+    def step(self, command):
+        return Measurement(command.q, command.qd, np.zeros_like(command.q), np.zeros(3))
+
+
+@pytest.mark.tvist_plant(f"{__file__}:Echo")
+def test_an_arm_of_one_s_own_need_not_know_the_truth(tvist_robot):
+    with tvist_robot.control("me") as arm:
+        arm.move_j(TARGET)
+    assert tvist_robot.state().actual_q == pytest.approx(TARGET, abs=1e-2)
+    assert_settles_within(tvist_robot, seconds=0.1)
 
 
 class TestReady:

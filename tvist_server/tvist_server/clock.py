@@ -27,6 +27,8 @@ HAND_ON_EVERY = 0.0009
 switches, about as much as a tick. A single robot hands on every tick at once; several robots hand on together what
 they produced within a millisecond.
 """
+LONGEST_TICK = 10.0
+"""Longest wait at the end for a tick in progress [s]: a call of somebody's own arm may never return."""
 REPEAT_EVERY = 1.0
 """Time after which a robot in lockstep publishes its last state again, if there was no step meanwhile [s]."""
 SET_TIMER_SLACK = 29
@@ -95,13 +97,18 @@ class Clock(ABC):
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread: a step ends before its next tick; in real time, all waiting jobs are done first."""
+        """End the thread: a step ends before its next tick; in real time, all waiting jobs are done first.
+
+        A thread that an arm never lets go is left to the end of the process.
+        """
         self._running = False
         for robot in self._robots:
             robot.ending = True
             robot.post(_nothing)
         if self._thread.is_alive():
-            self._thread.join()
+            self._thread.join(LONGEST_TICK)
+            if self._thread.is_alive():
+                log.error("a call of the arm has not returned for %g s", LONGEST_TICK)
 
     @abstractmethod
     def punctuality(self, robot: Mailbox) -> Punctuality | None:
@@ -197,11 +204,13 @@ class Realtime(Clock):
         robots, overloads, now, sleep = self._robots, self._overloads, time.monotonic, time.sleep
         alone, handed_on = len(robots) == 1, -HAND_ON_EVERY
         schedule, pace = Schedule(len(robots), self._period, now()), robots[0].pace
-        begin = schedule.begin if pace is None else Followed(self._period, now()).begin
+        begin, silent = schedule.begin if pace is None else Followed(self._period, now()).begin, False
         while self._running:
             if pace is not None:
                 if not pace(LONGEST_SLEEP):
+                    silent = self._do_without_tick(robots[0], silent)
                     continue
+                silent = False
             elif (wait := schedule.due - now()) > 0.0:
                 sleep(min(wait, LONGEST_SLEEP))
                 if wait > LONGEST_SLEEP:
@@ -224,6 +233,16 @@ class Realtime(Clock):
         for robot in robots:
             robot.jobs.do_waiting()
         self._hand_on()
+
+    def _do_without_tick(self, robot: Mailbox, silent: bool) -> bool:
+        """Answer the clients of an arm that has fallen silent, and tell them once; return True."""
+        robot.jobs.do_waiting()
+        if not silent:
+            robot.host.warn(
+                "the arm does not begin its next tick: time stands still, and it obeys no command"
+            )
+        self._hand_on()
+        return True
 
     def _ask(self) -> None:
         """Ask the system for what belongs to the calling thread."""

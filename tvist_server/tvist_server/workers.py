@@ -11,7 +11,7 @@ import multiprocessing
 import multiprocessing.process
 import signal
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing.connection import Connection, wait
 from typing import Any
@@ -265,7 +265,11 @@ def _begin(
 
 
 def _rehearse(setup: Setup) -> None:
-    """Compile and load what a robot needs, so that the other processes have it, and share its memory."""
+    """Compile and load what a robot needs, so that the other processes have it, and share its memory.
+
+    Somebody's own arm is not touched: only the process that serves it makes it.
+    """
+    setup = replace(setup, plant=None)
     Planner(setup).rehearse()
     Host(Controller(setup)).tick()
 

@@ -168,8 +168,10 @@ class ProgramPlayer:
 
     @property
     def _held(self) -> bool:
-        """Whether the program waits: in a safeguard stop nothing may move, so it waits as its motion does."""
-        return self.state != "PLAYING" or self._motion.safety.safeguard
+        """Whether the program waits: in a safeguard stop and before the drives are ready nothing may move."""
+        motion = self._motion
+        unready = motion.robot_mode is RobotMode.RUNNING and not motion.ready
+        return self.state != "PLAYING" or motion.safety.safeguard or unready
 
     def _resume(self, running: _Running, left: int) -> int:
         """Give a program its turn; return what it leaves of the evaluations."""

@@ -8,9 +8,11 @@ from tvist_controller.api.line import Setup
 from tvist_controller.api.robot import Controller, Host, Sink, info_of
 from tvist_lab.programs.start import start
 from tvist_lab.programs.watch import ProgramWatch
+from tvist_plant.plant import check_unpaced
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.programs import ProgramClosePopup
+from tvist_server.config import ConfigError
 from tvist_server.recording import Recorder
 
 ATTEND_EVERY = 50
@@ -44,9 +46,13 @@ def run_in_lockstep(
         InputError: An input is wrong.
         RefusedError: The robot refuses the program.
         RecorderError: The recording cannot be written.
-        ValueError: The setup is invalid.
+        ConfigError: The setup is invalid, or its plant cannot be made or gives the tick.
     """
-    controller = Controller(setup)
+    try:
+        controller = Controller(setup)
+        check_unpaced(controller.cycle.line.plant)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
     waiting: list[Command] = []
     watch = ProgramWatch(
         controller, lambda: waiting.append(ProgramClosePopup()), _nothing, timeout=timeout, alone=True

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tvist_controller.api.robot import Controller, Sink, truth_of
-from tvist_plant.plant import GRAVITY, PERIOD
+from tvist_plant.plant import GRAVITY, PERIOD, Truthful
 from tvist_protocol.stream import Event, State
 
 AFTER_STOP = 5
@@ -59,7 +59,7 @@ class Move:
     """Why it was stopped before its target; None if it was not."""
     peak: float | None = None
     """Largest acceleration of the tool from 10 ms until 0.3 s after the stop, without gravity [m/s²]; None if the arm
-    did not rest long enough to tell."""
+    did not rest long enough to tell, or cannot tell."""
     peak_so_far: float = 0.0
 
 
@@ -75,7 +75,7 @@ class Place:
 class ProgramWatch(Sink):
     """Observes a program from its start until it has ended and the arm is at rest.
 
-    The tool's acceleration is the simulation's true one, free of the sensor's noise.
+    The tool's acceleration is the simulation's true one, free of the sensor's noise; other arms have none.
 
     Args:
         controller: The robot; the program is the first one that it starts.
@@ -117,6 +117,8 @@ class ProgramWatch(Sink):
         self._ended = 0
         self._rest = 0
         """Ticks for which the shaped reference has rested after the last move."""
+        plant = controller.cycle.line.plant
+        self._truthful = isinstance(plant, Truthful) and plant.truth() is not None
 
     @property
     def seconds(self) -> float:
@@ -188,9 +190,9 @@ class ProgramWatch(Sink):
             self._rest = 0
         elif self._rest <= WINDOW:
             self._rest += 1
-            if self._rest > AFTER_STOP:
+            if self._rest > AFTER_STOP and self._truthful:
                 move.peak_so_far = max(move.peak_so_far, self._acceleration())
-            if self._rest >= SEEN:
+            if self._rest >= SEEN and self._truthful:
                 move.peak = move.peak_so_far
 
     def _note_end(self, event: Event) -> None:
