@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from tvist_cli.failure import Failure, told
 
 if TYPE_CHECKING:
-    from tvist_controller.own_shapers import OwnShaper
+    from tvist_controller.sources.own_shapers import OwnShaper
     from tvist_lab.study.method import Method
     from tvist_plant.description import RobotDescription
     from tvist_protocol.calibration import Calibration
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @contextmanager
 def designing(code: int = 2) -> Iterator[None]:
     """Tell why a shaper cannot be made of a calibration for an arm."""
-    from tvist_controller.refusal import RefusalError
+    from tvist_controller.commands.refusal import RefusalError
     from tvist_lab.study.recipes import RecipeError
     from tvist_shaping.errors import ShapingError
 
@@ -34,7 +34,7 @@ def loaded(shaper: str) -> "tuple[str, tuple[OwnShaper, ...]]":
     Raises:
         Failure: The file contains no such shaper.
     """
-    from tvist_controller.own_files import is_file
+    from tvist_controller.sources.own_files import is_file
 
     if not is_file(shaper):
         return shaper.lower(), ()
@@ -48,7 +48,7 @@ def load_given(place: str) -> "OwnShaper":
     Raises:
         Failure: The file contains no such shaper, or no file is named.
     """
-    from tvist_controller.own_shapers import OwnShaperError, load_own
+    from tvist_controller.sources.own_shapers import OwnShaperError, load_own
 
     with told(OwnShaperError, code=2):
         return load_own(place)
@@ -91,9 +91,9 @@ def calibration_for(
         Failure: There is no such calibration or shaper.
     """
     from tvist_controller.calibrations import default_for, load
-    from tvist_controller.choices import wanted_modes
-    from tvist_controller.mode_source import modal_source
-    from tvist_controller.refusal import RefusalError
+    from tvist_controller.commands.refusal import RefusalError
+    from tvist_controller.planning.choices import wanted_modes
+    from tvist_controller.sources.mode_source import modal_source
     from tvist_protocol.calibration import CalibrationError
     from tvist_shaping import Registry
 

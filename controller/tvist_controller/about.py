@@ -4,7 +4,7 @@ from importlib.metadata import version
 
 from tvist_controller.calibrations import available, fits
 from tvist_controller.controller import Controller
-from tvist_controller.stopping import stopping
+from tvist_controller.reporting.stop_report import stopping
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.channels import COMMANDS, tag

@@ -10,38 +10,38 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from tvist_controller.authority import Authority
-from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.command_row import Call
-from tvist_controller.command_table import COMMANDS, CommandTable, WholeRobot
-from tvist_controller.control.differentiator import Floats
-from tvist_controller.counters import Counters
-from tvist_controller.cycle import ControlCycle
-from tvist_controller.declared_payload import DeclaredPayload
-from tvist_controller.events import Fields
-from tvist_controller.faults import Faults
-from tvist_controller.filters import Filters
-from tvist_controller.guided import Guidance
-from tvist_controller.guided_commands import GuidedCommands
+from tvist_controller.authority.rights import Authority
+from tvist_controller.authority.session import NoControlError, Session
+from tvist_controller.commands.counters import Counters
+from tvist_controller.commands.events import Fields
+from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.dispatch.guided_commands import GuidedCommands
+from tvist_controller.dispatch.motion_commands import MotionCommands
+from tvist_controller.dispatch.planner import Planner
+from tvist_controller.dispatch.setpoints import Setpoints, Unreadable
+from tvist_controller.dispatch.table import COMMANDS, CommandTable, WholeRobot
+from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
+from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.wrench import ToolWrench, since_zeroed
-from tvist_controller.motion import MotionControl
-from tvist_controller.motion_commands import MotionCommands
-from tvist_controller.peripherals import Peripherals
-from tvist_controller.planner import Planner
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.sample import Sample
+from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.motion.filter_control import Filters
+from tvist_controller.motion.guidance import Guidance
 from tvist_controller.planning.basis import PlanBasis, ToolBasis
+from tvist_controller.planning.command_row import Call
 from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.plans import Order, Plans
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
-from tvist_controller.refusal import RefusalError
-from tvist_controller.report import Report
-from tvist_controller.reporting import Reporter, truth_of
-from tvist_controller.safety_control import SafetyControl
-from tvist_controller.sample import Sample
-from tvist_controller.session import NoControlError, Session
-from tvist_controller.setpoints import Setpoints, Unreadable
+from tvist_controller.reporting.report import Report
+from tvist_controller.reporting.reporter import Reporter, truth_of
+from tvist_controller.safety.declared_payload import DeclaredPayload
+from tvist_controller.safety.faults import Faults
+from tvist_controller.safety.safety_control import SafetyControl
+from tvist_controller.safety.stop_reasons import StopReasons
 from tvist_controller.setup import Setup, body
-from tvist_controller.stop_reasons import StopReasons
 from tvist_plant.fingerprint import fingerprint
 from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError
 from tvist_protocol import commands as c

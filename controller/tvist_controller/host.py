@@ -7,16 +7,16 @@ does this through `simulation.step`.
 from collections.abc import Callable, Sequence
 
 from tvist_controller.about import info_of
-from tvist_controller.admission import Admitted, admit, admit_setpoint
+from tvist_controller.authority.session import is_holders
+from tvist_controller.authority.standing import Standing
+from tvist_controller.authority.stepping import may_step
 from tvist_controller.controller import Controller
+from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
+from tvist_controller.dispatch.setpoints import Unreadable
 from tvist_controller.planning.plan import Plan
+from tvist_controller.programs.socket_ports import NoPorts, SocketPorts
 from tvist_controller.programs.socket_traffic import SocketNews
-from tvist_controller.session import is_holders
-from tvist_controller.setpoints import Unreadable
-from tvist_controller.sink import Sink
-from tvist_controller.socket_ports import NoPorts, SocketPorts
-from tvist_controller.standing import Standing
-from tvist_controller.stepping import may_step
+from tvist_controller.reporting.sink import Sink
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Setpoint
 from tvist_protocol.journal import Entry, entry_of

@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
-from tvist_controller.report import Report
+from tvist_controller.reporting.report import Report
+from tvist_controller.reporting.sink import Sink, Topic
 from tvist_controller.setup import Setup
-from tvist_controller.sink import Sink, Topic
 from tvist_plant.plant import Plant
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io

@@ -8,10 +8,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from tvist_controller.collision import CollisionModel
-from tvist_controller.mode_source import ModeSource, first_source
-from tvist_controller.own_plants import OwnPlant
-from tvist_controller.own_shapers import OwnShaper
+from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.sources.mode_source import ModeSource, first_source
+from tvist_controller.sources.own_plants import OwnPlant
+from tvist_controller.sources.own_shapers import OwnShaper
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
 from tvist_plant.plant import Placeable, Plant, posture_of

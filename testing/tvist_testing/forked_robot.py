@@ -19,7 +19,7 @@ import sys
 import threading
 from typing import Any
 
-from tvist_controller.own_plants import load_plant
+from tvist_controller.sources.own_plants import load_plant
 from tvist_server.config_file import from_mapping
 from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError

@@ -4,7 +4,7 @@ import numpy as np
 from proof.search.draws import SHAPERS
 from proof.search.subject import Subject
 
-from tvist_controller.collision import CollisionModel
+from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.setup import body, paper_payload

@@ -8,10 +8,10 @@ from proof.search.draws import postures
 from proof.search.subject import RigidArm
 
 from tvist_controller.calibrations import load as load_calibration
-from tvist_controller.collision import CollisionModel
-from tvist_controller.control.differentiator import central_differences
-from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.controller import Controller
+from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.line.differentiator import central_differences
+from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD

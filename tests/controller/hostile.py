@@ -4,7 +4,7 @@ from random import Random
 
 import numpy as np
 
-from tvist_controller.planner import Planner
+from tvist_controller.dispatch.planner import Planner
 from tvist_protocol.programs import ProgramRun
 
 from .robots import UR5E

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from proof.search.subject import Subject, torques
 
-from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.safety import TORQUE_SHARE
+from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
+from tvist_controller.line.limits import TORQUE_SHARE
 from tvist_controller.setup import body, paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetTcp

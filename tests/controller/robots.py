@@ -4,11 +4,11 @@ import msgspec
 import numpy as np
 
 from tvist_controller.controller import Controller
-from tvist_controller.cycle import ControlCycle
-from tvist_controller.outlook import Outlook
-from tvist_controller.safety import StreamTorqueRoom
+from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.limits import StreamTorqueRoom
+from tvist_controller.reporting.sink import Sink
 from tvist_controller.setup import Setup, body, paper_payload
-from tvist_controller.sink import Sink
 from tvist_controller.trajectory import JointLine, MotionLimits, SetpointStream, quickest_motion
 from tvist_plant.description import RobotDescription, load
 from tvist_plant.plant import PERIOD, Measurement, Plant

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from tests.controller.extremes import ARMS, SHAPES, Extreme, accepted
 
-from tvist_controller.planner import Planner
+from tvist_controller.dispatch.planner import Planner
+from tvist_controller.line.limits import arm_limits
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.safety import arm_limits
 from tvist_protocol import commands as c
 from tvist_protocol.kinematics import ForwardKinematics
 from tvist_protocol.motions import MoveL

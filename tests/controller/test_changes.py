@@ -4,11 +4,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from tvist_controller.collision import CollisionModel
-from tvist_controller.control.differentiator import STILL
-from tvist_controller.control.inverse_dynamics import SLEW, InverseDynamics
-from tvist_controller.outlook import Outlook
-from tvist_controller.safety import TORQUE_SHARE
+from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.line.differentiator import STILL
+from tvist_controller.line.inverse_dynamics import SLEW, InverseDynamics
+from tvist_controller.line.limits import TORQUE_SHARE
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
 from tvist_protocol import commands as c

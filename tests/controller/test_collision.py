@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tvist_controller.collision import CLEARANCE, CollisionModel
+from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
 from tvist_controller.trajectory import JointLine
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import Payload, load

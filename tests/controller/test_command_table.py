@@ -2,7 +2,7 @@
 
 from typing import get_args
 
-from tvist_controller.command_table import COMMANDS
+from tvist_controller.dispatch.table import COMMANDS
 from tvist_protocol import commands as c
 from tvist_protocol.channels import tag
 from tvist_protocol.transitions import TRANSITIONS, Activity

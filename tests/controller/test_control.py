@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from tests.plant.arms import frames
 
-from tvist_controller.control.differentiator import Differentiator, Target
-from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.control.joint_controllers import JointControllers
-from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
+from tvist_controller.line.differentiator import Differentiator, Target
+from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.line.joint_controllers import JointControllers
+from tvist_controller.line.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import Payload
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tvist_controller.control.differentiator import STILL
-from tvist_controller.line_mode import LineMode
+from tvist_controller.line.differentiator import STILL
+from tvist_controller.line.line_mode import LineMode
 from tvist_shaping.estimators.fixed import Fixed
 
 from .robots import FITTING, PAPER, Q1, Q2, Q3, H, cycle, without_arm

@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, calibration, cut
 
 from tvist_controller.calibrations import load
-from tvist_controller.control.differentiator import Target
-from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.control.elastic_lead import follow
-from tvist_controller.control.elastic_model import ElasticModel
-from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.control.kinematics import ForwardKinematics
-from tvist_controller.elastic_source import elastic_model
+from tvist_controller.line.differentiator import Target
+from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.line.elastic_lead import follow
+from tvist_controller.line.elastic_model import ElasticModel
+from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.line.kinematics import ForwardKinematics
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.setup import Setup, body, paper_payload
+from tvist_controller.sources.elastic_source import elastic_model
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c

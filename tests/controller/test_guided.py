@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tvist_controller.control.kinematics import ForwardKinematics
 from tvist_controller.kinematics.tool import ToolKinematics, turn
+from tvist_controller.line.kinematics import ForwardKinematics
 from tvist_controller.trajectory import JointSpeed, MotionLimits
 from tvist_controller.trajectory.servo import _step
 from tvist_protocol import commands as c

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
+from tvist_controller.dispatch.planner import Planner
+from tvist_controller.foresight.stopper import Outlook
 from tvist_controller.kinematics.straight_step import LOST, pseudo_inverse, straight_step
 from tvist_controller.kinematics.tool import ToolKinematics
-from tvist_controller.outlook import Outlook
-from tvist_controller.planner import Planner
 from tvist_controller.programs.arm import DELAY, PAUSE
 from tvist_controller.trajectory.speed import TRIES
 from tvist_protocol import motions as m

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.controller.robots import PAPER, Q1, Q3, H, without_arm
 
-from tvist_controller.line_mode import LineMode, check_change, diagram
+from tvist_controller.line.line_mode import LineMode, check_change, diagram
 from tvist_controller.trajectory import JointStop
 
 PAGE = Path(__file__).parents[2] / "docs/explanations/architecture.md"

@@ -7,10 +7,10 @@ import pytest
 from proof.search import changes, streams
 
 from tvist_controller.about import info_of
-from tvist_controller.ahead import MAX_AHEAD, resting_after
-from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.control.differentiator import STILL
-from tvist_controller.outlook import Outlook
+from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
+from tvist_controller.foresight.line_copy import MAX_AHEAD, resting_after
+from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.line.differentiator import STILL
 from tvist_controller.trajectory import StuckError
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tvist_controller.protection import TICKS, Overload
-from tvist_controller.safety import REDUCED_SHARE
-from tvist_controller.session import NoControlError, Session
+from tvist_controller.authority.session import NoControlError, Session
+from tvist_controller.line.limits import REDUCED_SHARE
+from tvist_controller.safety.protection import TICKS, Overload
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode

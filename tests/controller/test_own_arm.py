@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from tests.own_arm import STANDS, SWITCHES, OwnArm
 
-from tvist_controller.arm_power import STALE
 from tvist_controller.controller import Controller
+from tvist_controller.motion.arm_power import STALE
 from tvist_plant.plant import PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, SafetyMode

@@ -5,7 +5,7 @@ import pytest
 from proof.search.draws import SHAPERS
 from proof.search.stops import KINDS, PAUSES
 
-from tvist_controller.ahead import resting_after
+from tvist_controller.foresight.line_copy import resting_after
 from tvist_protocol.commands import MoveJ, Pause, Resume, SetPayload, Stop
 from tvist_protocol.motions import LineSegment, MoveL, MovePath
 from tvist_protocol.replies import Accepted

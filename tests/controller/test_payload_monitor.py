@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from tests.controller.robots import Line
 
-from tvist_controller.collision import CollisionModel
-from tvist_controller.payload_monitor import TOLERATED, PayloadMonitor
+from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.safety.payload_monitor import TOLERATED, PayloadMonitor
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
 from tvist_lab.in_process import free_setup, robot_in_process

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_controller.peripherals import Peripherals
+from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.setup import paper_payload
 from tvist_protocol.commands import PowerOff, PowerOn
 from tvist_protocol.io import BITS, NUMBERS, Registers, SetIo, SetRegisters, SetTcp, SimulationSetInputs

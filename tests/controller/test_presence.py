@@ -2,8 +2,8 @@
 
 import pytest
 
-from tvist_controller.presence import Presence
-from tvist_controller.session import NoControlError
+from tvist_controller.authority.presence import Presence
+from tvist_controller.authority.session import NoControlError
 
 
 @pytest.fixture

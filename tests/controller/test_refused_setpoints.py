@@ -5,10 +5,10 @@ import math
 import msgspec
 import pytest
 
-from tvist_controller.admission import admit_setpoint
 from tvist_controller.controller import Controller
+from tvist_controller.dispatch.admission import admit_setpoint
 from tvist_controller.host import Host
-from tvist_controller.streaming import TIMEOUT
+from tvist_controller.motion.streaming import TIMEOUT
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.journal import Entry

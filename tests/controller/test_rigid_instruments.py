@@ -4,10 +4,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.instruments import wrench as module
 from tvist_controller.instruments.rigid_body import RigidBody
 from tvist_controller.instruments.wrench import DAMPING, NEAR_SINGULAR, ToolWrench, determinant
+from tvist_controller.line.kinematics import ForwardKinematics, rotation_vector
 from tvist_plant.chain import chain_of
 from tvist_plant.description import Payload, load
 from tvist_plant.model import FLANGE, rigid_model

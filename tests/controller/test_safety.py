@@ -4,16 +4,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from tvist_controller.control.differentiator import Target
-from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.safety import (
+from tvist_controller.foresight.stops import STEP, StopPlanner
+from tvist_controller.line.differentiator import Target
+from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.line.limits import (
     GENTLEST_STOP,
     TORQUE_SHARE,
     StopTorque,
     acceleration_on_way,
     largest_torque,
 )
-from tvist_controller.stops import STEP, StopPlanner
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c

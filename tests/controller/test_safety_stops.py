@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tvist_controller.brakes import brake
-from tvist_controller.control.differentiator import Target
 from tvist_controller.instruments.status import _SAFETY_BITS
+from tvist_controller.line.differentiator import Target
+from tvist_controller.safety.brakes import brake
 from tvist_controller.setup import body, paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode

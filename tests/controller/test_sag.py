@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, cut
 
-from tvist_controller.control.inverse_dynamics import SLEW
+from tvist_controller.line.inverse_dynamics import SLEW
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import Payload, load
 from tvist_plant.flexible_arm import FlexibleArm

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tvist_controller.session import NoControlError, Session, check_token
+from tvist_controller.authority.session import NoControlError, Session, check_token
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 from tests.examples import share
 
-from tvist_controller.admission import Admitted, admit
 from tvist_controller.controller import Controller
+from tvist_controller.dispatch.admission import Admitted, admit
 from tvist_controller.host import Host
 from tvist_lab.replay import replay
 from tvist_protocol import commands as c

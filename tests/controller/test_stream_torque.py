@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.safety import GENTLEST_STOP, TORQUE_SHARE, StreamTorqueRoom
+from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.line.limits import GENTLEST_STOP, TORQUE_SHARE, StreamTorqueRoom
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
 

@@ -5,7 +5,7 @@ import pytest
 from tests.controller.robots import Q1, Q3, H, Robot
 from tests.controller.spaces import BENT, pose_of, tool_pose
 
-from tvist_controller.control.differentiator import central_differences
+from tvist_controller.line.differentiator import central_differences
 from tvist_protocol import commands as c
 from tvist_protocol.motions import MoveL, SpeedJ
 from tvist_protocol.simulation import SimulationReset

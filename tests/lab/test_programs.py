@@ -7,7 +7,7 @@ import pytest
 from tests.controller.robots import NoArm
 from tests.own_arm import OwnArm
 
-from tvist_controller.own_plants import OwnPlant
+from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.in_process import free_setup
 from tvist_lab.metrics import amplitude, motions, tool_acceleration
 from tvist_lab.programs.in_lockstep import run_in_lockstep

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.calibrations.modal import modal_estimator
-from tvist_controller.collision import CollisionModel
+from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.setup import body, paper_payload
 from tvist_lab.identification import modal_calibration
 from tvist_lab.identification.design import choose, predicted

@@ -10,8 +10,14 @@ from tests.own_arm import OwnArm
 
 from tvist_controller.about import info_of
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.own_plants import OwnPlant, OwnPlantError, RecordedPlant, installed_plants, load_plant
 from tvist_controller.setup import Setup, body
+from tvist_controller.sources.own_plants import (
+    OwnPlant,
+    OwnPlantError,
+    RecordedPlant,
+    installed_plants,
+    load_plant,
+)
 from tvist_lab.mujoco_arm import MujocoArm
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file

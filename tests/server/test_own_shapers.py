@@ -8,10 +8,10 @@ import pytest
 from tests.controller.robots import PAPER, Q1, Q2, Q3, H, Robot, calibration, setup
 
 from tvist_controller.about import info_of
-from tvist_controller.own_files import is_file
-from tvist_controller.own_shapers import OwnShaper, OwnShaperError, load_own
-from tvist_controller.planner import Planner
+from tvist_controller.dispatch.planner import Planner
 from tvist_controller.setup import Setup
+from tvist_controller.sources.own_files import is_file
+from tvist_controller.sources.own_shapers import OwnShaper, OwnShaperError, load_own
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
 from tvist_plant.user_file import UserFileError

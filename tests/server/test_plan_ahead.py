@@ -7,8 +7,8 @@ import pytest
 from tests.controller.robots import Q2, Q3, Kept, Robot, calibration, setup
 
 from tvist_controller.controller import Controller
+from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
-from tvist_controller.planner import Planner
 from tvist_protocol import commands as c
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import encode

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 from tests.controller.robots import Robot
 
-from tvist_controller.admission import Admitted
+from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.host import Host
 from tvist_controller.programs.checking import check_program
 from tvist_plant.user_file import UserFileError

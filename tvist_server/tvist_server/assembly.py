@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from tvist_controller.controller import Controller
+from tvist_controller.reporting.sink import Sink
 from tvist_controller.setup import Setup
-from tvist_controller.sink import Sink
 from tvist_plant.plant import PERIOD
 from tvist_server.clock import Clock, Lockstep, Realtime
 from tvist_server.config import ConfigError, ServeConfig

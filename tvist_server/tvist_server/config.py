@@ -9,8 +9,8 @@ from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from tvist_controller import calibrations
-from tvist_controller.own_plants import load_plant
 from tvist_controller.setup import Setup, check_rating, paper_payload
+from tvist_controller.sources.own_plants import load_plant
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
 from tvist_protocol.calibration import Calibration

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
-from tvist_controller.own_files import is_file
-from tvist_controller.own_shapers import check_for, load_own
 from tvist_controller.setup import Setup
+from tvist_controller.sources.own_files import is_file
+from tvist_controller.sources.own_shapers import check_for, load_own
 from tvist_plant.user_file import read_bytes, read_toml
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError

@@ -7,9 +7,9 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
+from tvist_controller.dispatch.planner import Planner
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.planner import Planner
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import Command, MoveJ, SetShaper, Stop, TakeControl
 from tvist_protocol.kinematics import ForwardKinematics

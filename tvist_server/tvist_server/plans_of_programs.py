@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-from tvist_controller.planner import Planner
+from tvist_controller.dispatch.planner import Planner
 from tvist_controller.planning.basis import PlanBasis
 from tvist_controller.planning.plan import Plan
 from tvist_protocol.commands import Command

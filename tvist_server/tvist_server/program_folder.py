@@ -6,7 +6,7 @@ from typing import Final
 
 import msgspec
 
-from tvist_controller.admission import Admitted
+from tvist_controller.dispatch.admission import Admitted
 from tvist_plant.user_file import LARGEST, UserFileError, read_bytes
 from tvist_protocol.codec import decode_info, encode
 from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad

@@ -9,7 +9,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
-from tvist_controller.sink import Sink, Topic
+from tvist_controller.reporting.sink import Sink, Topic
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
 from tvist_protocol.stream import Event, State, Telemetry, Truth

@@ -4,14 +4,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from tvist_controller.about import info_of
-from tvist_controller.admission import Admitted
 from tvist_controller.controller import Controller
+from tvist_controller.dispatch.admission import Admitted
+from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
-from tvist_controller.planner import Planner
+from tvist_controller.line.rehearsal import rehearse
 from tvist_controller.programs.socket_traffic import SocketNews
-from tvist_controller.rehearsal import rehearse
+from tvist_controller.reporting.sink import Sink
 from tvist_controller.setup import Setup
-from tvist_controller.sink import Sink
 from tvist_plant.plant import Pacing
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command

@@ -17,8 +17,8 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from tvist_controller.controller import Controller
+from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
-from tvist_controller.planner import Planner
 from tvist_controller.setup import Setup
 from tvist_server.assembly import protected
 from tvist_server.config import ConfigError, ServeConfig

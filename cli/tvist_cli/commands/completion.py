@@ -40,7 +40,7 @@ def _option_values() -> dict[str, _Values]:
     """Return the values of options, by the option's name without dashes."""
     from typing import get_args
 
-    from tvist_controller.own_plants import installed_plants
+    from tvist_controller.sources.own_plants import installed_plants
     from tvist_lab.study.menus import UNSHAPED, names
     from tvist_plant.description import robots
     from tvist_server.profiles import ProfileName

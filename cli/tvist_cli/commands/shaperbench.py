@@ -14,7 +14,7 @@ from tvist_cli.shapers_of import load_given, modal_calibration, on_the_bench
 from tvist_cli.studying import Figures, Places, check_range, check_seed, command, gathered, give, show
 
 if TYPE_CHECKING:
-    from tvist_controller.own_shapers import OwnShaper
+    from tvist_controller.sources.own_shapers import OwnShaper
     from tvist_lab.report import Page
 
 MOVES, QUICK = 100, 3

@@ -104,7 +104,7 @@ def _live(
 
 def _compared(shapers: Sequence[str], robot: str) -> "list[Track]":
     """The same motions with each shaper, simulated now."""
-    from tvist_controller.refusal import RefusalError
+    from tvist_controller.commands.refusal import RefusalError
     from tvist_lab.compared import run_beside
     from tvist_plant.description import DescriptionError, load
     from tvist_server.config import ConfigError

@@ -3,30 +3,30 @@
 The modules behind it may change; a study of moves imports nothing else of this package.
 """
 
-from tvist_controller.ahead import resting_after
 from tvist_controller.calibrations import available as calibrations
 from tvist_controller.calibrations import default_for as default_calibration
 from tvist_controller.calibrations import estimator_of
 from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.calibrations.modal import drivetrain, mass_matrix, modal_estimator
-from tvist_controller.choices import choose_filter, wanted_modes
-from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.control.differentiator import STILL, central_differences
-from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.cycle import ControlCycle
-from tvist_controller.elastic_source import elastic_feed_forward
-from tvist_controller.mode_source import ModeSource
-from tvist_controller.own_shapers import OwnShaper, RecordedShaper
+from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
+from tvist_controller.foresight.line_copy import resting_after
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.differentiator import STILL, central_differences
+from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.line.limits import TORQUE_SHARE
+from tvist_controller.line.whole_motion import Driven, DrivenLine, respond
+from tvist_controller.planning.choices import choose_filter, wanted_modes
 from tvist_controller.planning.keeping import keeping_motion
 from tvist_controller.quiet.elastic_arm import ElasticArm
 from tvist_controller.quiet.interior_point import Programme, inside, optimize
 from tvist_controller.quiet.quiet_motion import quiet_motion
-from tvist_controller.refusal import RefusalError
-from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import Setup, body, paper_payload
+from tvist_controller.sources.elastic_source import elastic_feed_forward
+from tvist_controller.sources.mode_source import ModeSource
+from tvist_controller.sources.own_shapers import OwnShaper, RecordedShaper
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Trajectory, quickest_motion
-from tvist_controller.whole_motion import Driven, DrivenLine, respond
 
 __all__ = [
     "CLEARANCE",

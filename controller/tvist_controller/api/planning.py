@@ -3,7 +3,7 @@
 The modules behind it may change.
 """
 
-from tvist_controller.from_rest import plan_from_rest
+from tvist_controller.dispatch.from_rest import plan_from_rest
 from tvist_controller.kinematics.tool import ToolKinematics, turned
 from tvist_controller.paths.poses import placement_vector
 

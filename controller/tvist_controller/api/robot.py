@@ -4,15 +4,15 @@ The modules behind it may change.
 """
 
 from tvist_controller.about import info_of
+from tvist_controller.authority.presence import Presence
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.own_plants import OwnPlant, RecordedPlant
-from tvist_controller.presence import Presence
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.programs.socket_traffic import SocketNews
-from tvist_controller.reporting import truth_of
-from tvist_controller.sink import Sink
+from tvist_controller.reporting.reporter import truth_of
+from tvist_controller.reporting.sink import Sink
+from tvist_controller.sources.own_plants import OwnPlant, RecordedPlant
 
 __all__ = [
     "Controller",

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.control.kinematics import tool_motion
+from tvist_controller.line.kinematics import tool_motion
 from tvist_plant.chain import SCRATCH, chain_of, sweep
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription

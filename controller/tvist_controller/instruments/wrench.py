@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.elimination import eliminate
+from tvist_controller.quiet.elimination import eliminate
 from tvist_plant.chain import bend, chain_of, start, step_along, twist
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, Floats, rigid_model

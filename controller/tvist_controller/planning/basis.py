@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from msgspec import Struct
 
-from tvist_controller.control.differentiator import Floats
-from tvist_controller.mode_source import ModeSource
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.sources.mode_source import ModeSource
 from tvist_plant.description import Payload as Body
 from tvist_protocol.values import Payload
 from tvist_urscript import Script

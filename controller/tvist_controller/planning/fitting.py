@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.control.differentiator import Floats, central_differences
-from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.line.differentiator import Floats, central_differences
+from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.line.limits import largest_torque
 from tvist_controller.planning.basis import MotionBasis
 from tvist_controller.planning.keeping import SHARE, shaped_ahead
-from tvist_controller.safety import largest_torque
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import JointLine, PlannedMotion
 from tvist_plant.plant import PERIOD

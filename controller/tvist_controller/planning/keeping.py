@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from tvist_controller.ahead import MAX_AHEAD, Ahead
-from tvist_controller.control.differentiator import Floats
-from tvist_controller.control.shaped_reference import ShapedReference
-from tvist_controller.line_filter import LineFilter
+from tvist_controller.foresight.line_copy import MAX_AHEAD, Ahead
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.line_filter import LineFilter
+from tvist_controller.line.shaped_reference import ShapedReference
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, quickest_motion
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter

@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tvist_controller.collision import CLEARANCE, CollisionModel, Meeting
+from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
+from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.planning.basis import FilterBasis, MotionBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitted, Fitter, Slower
 from tvist_controller.planning.keeping import keeping_motion
 from tvist_controller.quiet.elastic_arm import ElasticArm
 from tvist_controller.quiet.quiet_motion import quiet_motion
-from tvist_controller.refusal import RefusalError
-from tvist_controller.safety import arm_limits, rate_of
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import (
     JointLine,

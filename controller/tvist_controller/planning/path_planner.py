@@ -4,8 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tvist_controller.collision import CLEARANCE
-from tvist_controller.control.differentiator import Floats
+from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.foresight.collision import CLEARANCE
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
 from tvist_controller.paths.pacing import JointLimits, fastest, joined, law_of, timed
 from tvist_controller.paths.poses import Placement, placement
@@ -17,8 +19,6 @@ from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitted, Slower
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove, limited
 from tvist_controller.planning.reachable import Reachable
-from tvist_controller.refusal import RefusalError
-from tvist_controller.safety import arm_limits, rate_of
 from tvist_controller.setup import Setup
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, at_least, quickest_motion
 from tvist_controller.trajectory.spline import Knots, SplineCurve

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
+from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.basis import (
     FilterBasis,
     MotionBasis,
@@ -14,7 +15,6 @@ from tvist_controller.planning.basis import (
 )
 from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.refusal import RefusalError
 from tvist_protocol.replies import Posture, ToolPose
 from tvist_shaping.base import Filter
 from tvist_urscript import Script

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from typing import Any, Protocol
 
+from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.basis import PlanBasis
 from tvist_controller.planning.plan import Plan
-from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command
 
 Order = Callable[[Command, PlanBasis], Callable[[], Plan]]

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from tvist_controller.control.differentiator import Floats
-from tvist_controller.safety import arm_limits
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.limits import arm_limits
 from tvist_plant.description import RobotDescription
 from tvist_shaping.base import Filter
 from tvist_shaping.estimators.base import Estimator

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from tvist_controller.events import Emit
-from tvist_controller.guided import Guidance
-from tvist_controller.motion import MotionControl
-from tvist_controller.peripherals import Peripherals
+from tvist_controller.commands.events import Emit
+from tvist_controller.instruments.peripherals import Peripherals
+from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.motion.guidance import Guidance
 from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.plans import Plans
 from tvist_controller.programs.steadiness import Steadiness

@@ -4,11 +4,11 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.moves import command_of
-from tvist_controller.refusal import RefusalError
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
 from tvist_protocol.motions import Segment

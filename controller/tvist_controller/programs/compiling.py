@@ -2,10 +2,10 @@
 
 from functools import lru_cache
 
+from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.programs.built_in import built_in
 from tvist_controller.programs.interpreter import WAITS
 from tvist_controller.programs.library import MOVING, SIGNATURES
-from tvist_controller.refusal import RefusalError
 from tvist_plant.description import RobotDescription
 from tvist_protocol.programs import ProgramLoad, ProgramRun
 from tvist_urscript import Script, ScriptError, compile_script

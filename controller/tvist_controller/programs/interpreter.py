@@ -3,12 +3,12 @@
 from collections import deque
 from collections.abc import Callable
 
-from tvist_controller.command_row import Call
-from tvist_controller.events import Emit
-from tvist_controller.peripherals import Peripherals
+from tvist_controller.commands.events import Emit
+from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.planning.basis import StatementBasis
+from tvist_controller.planning.command_row import Call
 from tvist_controller.programs.arm import ProgramArm, Turns
-from tvist_controller.refusal import RefusalError
 from tvist_protocol.programs import MAX_SCRIPT, Interpreter, ProgramInterpret, ProgramSkip
 from tvist_protocol.replies import Accepted
 from tvist_urscript import Fault, Machine, Script

@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tvist_controller.control.differentiator import Floats
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
 from tvist_controller.kinematics.tool import ToolKinematics, turn
-from tvist_controller.motion import MotionControl
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.paths.poses import placement, placement_vector
 from tvist_plant.description import RobotDescription
 from tvist_urscript import Fault

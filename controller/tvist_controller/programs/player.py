@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from tvist_controller.command_row import Call, Row
+from tvist_controller.commands.refusal import RefusalError, out_of_turn
+from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.plan import Planning
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import readable
@@ -16,8 +17,7 @@ from tvist_controller.programs.popups import Popups
 from tvist_controller.programs.sockets import Sockets
 from tvist_controller.programs.steadiness import Steadiness
 from tvist_controller.programs.watchdogs import Watchdogs
-from tvist_controller.refusal import RefusalError, out_of_turn
-from tvist_controller.safety_control import SafetyControl
+from tvist_controller.safety.safety_control import SafetyControl
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.programs import (
     Interpreter,

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from tvist_controller.events import Emit
+from tvist_controller.commands.events import Emit
 from tvist_protocol.stream import PopupKind
 
 

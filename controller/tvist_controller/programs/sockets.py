@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import ceil
 from typing import Any, TypeVar
 
-from tvist_controller.events import Emit
+from tvist_controller.commands.events import Emit
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.socket_traffic import (
     Close,

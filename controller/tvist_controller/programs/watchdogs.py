@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from tvist_controller.peripherals import Peripherals
+from tvist_controller.instruments.peripherals import Peripherals
 from tvist_plant.plant import PERIOD
 from tvist_protocol.io import BITS, NUMBERS, Bank
 from tvist_urscript import Fault

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_controller._compiled import compiled
-from tvist_controller.elimination import eliminate
+from tvist_controller.quiet.elimination import eliminate
 from tvist_controller.trajectory.limits import Floats
 
 STEPS = 60

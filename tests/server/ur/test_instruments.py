@@ -9,8 +9,8 @@ import pytest
 from tests.controller.robots import UR5E, cut
 from tests.plant.arms import chain
 
-from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.instruments.snapshot import Instruments, Snapshot
+from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.model import FLANGE, rigid_model
 from tvist_protocol import commands as c

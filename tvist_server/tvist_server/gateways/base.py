@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Protocol
 
-from tvist_controller.sink import Topic
+from tvist_controller.reporting.sink import Topic
 from tvist_protocol.commands import Command
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Reply

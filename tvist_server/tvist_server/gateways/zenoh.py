@@ -12,7 +12,7 @@ from functools import partial
 import zenoh
 from zenoh.handlers import Callback
 
-from tvist_controller.sink import Topic
+from tvist_controller.reporting.sink import Topic
 from tvist_protocol import keys
 from tvist_protocol.codec import MAX_BYTES
 from tvist_protocol.replies import Refused, Reply

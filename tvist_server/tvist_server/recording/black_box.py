@@ -8,7 +8,7 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-from tvist_controller.sink import Sink
+from tvist_controller.reporting.sink import Sink
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry

@@ -68,7 +68,7 @@ def replay(
 
 
 def _run_again(file: Path, output: Path | None, shaper: list[str], plant: str | None, *, json: bool) -> None:
-    from tvist_controller.own_plants import OwnPlantError, load_plant
+    from tvist_controller.sources.own_plants import OwnPlantError, load_plant
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read
     from tvist_lab.replay import ReplayError, replay_file

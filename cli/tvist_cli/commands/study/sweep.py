@@ -133,7 +133,7 @@ def _robot(path: Path, spec: "Spec", place: int, named: "str | NamedRobot") -> "
 def _recipe(
     path: Path, spec: "Spec", shaper: str, calibration: str | None, arm: "RobotDescription"
 ) -> "Recipe":
-    from tvist_controller.own_files import is_file
+    from tvist_controller.sources.own_files import is_file
     from tvist_lab.study.recipes import Recipe
 
     # The workers of a cluster have other working folders.

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.commands.refusal import RefusalError, check_joints
+from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.programs import arguments
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import a_list, a_pose, is_pose, numbers
 from tvist_controller.programs.kinematics import ProgramKinematics
-from tvist_controller.refusal import RefusalError, check_joints
 from tvist_urscript import Array, Fault, Pose, costs
 
 

@@ -1,6 +1,6 @@
 """Functions for registers and flags."""
 
-from tvist_controller.peripherals import LEAST, MOST
+from tvist_controller.instruments.peripherals import LEAST, MOST
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number
 from tvist_controller.programs.arm import ProgramArm

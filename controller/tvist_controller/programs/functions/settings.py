@@ -1,11 +1,11 @@
 """Functions that set the tool, the payload and gravity, and the force at the tool to zero."""
 
+from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import number, numbers, pose
 from tvist_controller.programs.arm import DELAY, ProgramArm, Turns
 from tvist_controller.programs.moves import OWN_TOKEN
-from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.io import SetTcp
 from tvist_urscript import Fault, costs

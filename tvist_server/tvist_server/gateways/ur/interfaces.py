@@ -13,7 +13,7 @@ from functools import partial
 from weakref import WeakValueDictionary
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.sink import Topic
+from tvist_controller.reporting.sink import Topic
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.io import Io

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from math import isclose
 
-from tvist_controller.peripherals import analog_share
+from tvist_controller.instruments.peripherals import analog_share
 from tvist_protocol.commands import Command, SetSpeed
 from tvist_protocol.io import Bank, Io, Registers, SetIo, SetRegisters
 from tvist_protocol.replies import Refused, Reply

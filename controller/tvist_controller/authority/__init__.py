@@ -1,0 +1,1 @@
+"""Who may do what: control by lease, the clock, and who is there."""

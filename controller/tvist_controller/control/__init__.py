@@ -1,1 +1,0 @@
-"""Conversion of shaped references into drive commands."""

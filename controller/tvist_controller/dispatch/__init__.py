@@ -1,0 +1,1 @@
+"""Commands on their way: admitted, planned, and handed to what carries them out."""

@@ -1,0 +1,167 @@
+"""Check of the remaining motion: whether it stays clear, and how long it lasts."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
+from tvist_controller.foresight.line_copy import resting_after
+from tvist_controller.foresight.stop_guard import LookAhead
+from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.foresight.stops import StopPlan
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.limits import StreamTorqueRoom
+from tvist_controller.trajectory import JointStop, PlannedMotion, Way
+from tvist_plant.description import Payload
+from tvist_plant.plant import PERIOD
+from tvist_shaping.base import Filter
+
+
+class WayAhead:
+    """Examines the future motion of the control line.
+
+    Args:
+        cycle: The control line.
+        outlook: Forecast of the control line.
+        collisions: Collision model of the arm.
+    """
+
+    def __init__(self, cycle: ControlCycle, outlook: Outlook, collisions: CollisionModel) -> None:
+        self._cycle, self._collisions = cycle, collisions
+        self._outlook = outlook
+        self.coming: Callable[[], Sequence[PlannedMotion]] = tuple
+        """Returns the parts of the present motion that have not begun."""
+        room = StreamTorqueRoom(cycle.description, cycle.line.dynamics)
+        self._guard = LookAhead(collisions, outlook.stops, room)
+        reach = np.array(cycle.description.limits.position)
+        self._guide_guard = LookAhead(collisions, outlook.stops, room, reach=reach)
+
+    def guard_of_stream(self) -> LookAhead:
+        """Return the guard of a stream that begins from rest."""
+        self._guard.begin(self._cycle.line.shaped.newest)
+        return self._guard
+
+    def guard_of_guided(self) -> LookAhead:
+        """Return the guard of a guided motion from the present state of motion, whatever that is.
+
+        Raises:
+            RefusalError: There is no clear stop from here, as on a narrow path; nothing has changed.
+        """
+        cycle, guard, stops = self._cycle, self._guide_guard, self._outlook.stops
+        state = cycle.line.shaped.newest
+        guard.begin(state)
+        if not cycle.mode.at_rest:
+            stop = stops.by_joints(state, None, guard.clear)
+            if stop is None and not guard.clear(stops.stop(state, stops.highest)):
+                why, code = guard.obstacle
+                raise RefusalError(code, "", f"the arm cannot leave its path here: {why}")
+            guard.take(state, stops.stop(state, stops.highest) if stop is None else stop)
+        return guard
+
+    def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
+        """Time until the shaped reference rests [s], and the angle that the joint that turns most still turns [rad].
+
+        Args:
+            plan: A stop that has begun; None for the present motion.
+
+        Returns:
+            None and None if rest is too far ahead to tell.
+        """
+        if plan is not None:
+            return plan.duration, plan.way
+        ahead = self._outlook.foresee()
+        if ahead is None:
+            return None, None
+        last = resting_after(ahead)
+        return max(last - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
+
+    def after_stream(self, end: JointStop) -> Meeting | None:
+        """Return the meeting that would occur while a stream comes to rest through the filter, if any.
+
+        Args:
+            end: Reference of the end of the stream.
+        """
+        if self._tail_is_spacious(end):
+            return None
+        return self._on(self._outlook.foresee(trajectory=end))
+
+    def rest_of_way(self, tvist: Filter | None) -> Meeting | None:
+        """Return the meeting that would occur on the rest of the motion, if any; if that is unknown, in a stop.
+
+        Args:
+            tvist: A new filter; None for the present one.
+        """
+        cycle = self._cycle
+        coming = [part.path.whole for part in self.coming()]
+        if cycle.mode.at_rest:
+            return self._first(coming)
+        trajectory = cycle.trajectory
+        if (forecast := trajectory.forecast) is not None:
+            return self._first([forecast.path.way(cycle.line.shaped.along.position, forecast.end), *coming])
+        if trajectory.foreseeable and (ahead := self._outlook.foresee(tvist)) is not None:
+            return self._on(ahead)
+        guard = self._guide_guard if cycle.guard is self._guide_guard else self._guard
+        stop = self._outlook.stops.by_joints(cycle.line.shaped.newest, None, guard.clear)
+        if stop is None:
+            return guard.met
+        guard.take(cycle.line.shaped.newest, stop)
+        return None
+
+    def _first(self, ways: Sequence[Way]) -> Meeting | None:
+        """Return the first meeting on several ways, one after the other."""
+        return next((found[1] for way in ways if (found := self._collisions.on_way(way))), None)
+
+    def check_payload(self, payload: Payload, tvist: Filter | None) -> None:
+        """Check the rest of the motion with another payload, and put the payload into the collision model.
+
+        Args:
+            payload: New declared payload.
+            tvist: New filter for it; None for the present one.
+
+        Raises:
+            RefusalError: There would be a collision; nothing has changed.
+        """
+        collisions, q = self._collisions, self._cycle.line.shaped.position
+        before = collisions.carried
+        escaping = self._cycle.mode.at_rest or collisions.meeting(q) is not None
+        collisions.carry(payload)
+        met = None if escaping else collisions.meeting(q)
+        met = met or self.rest_of_way(tvist)
+        if met is not None:
+            collisions.carry(before)
+            why = f"{met} on the rest of the path with this payload"
+            raise RefusalError("collision", "com", why, CLEARANCE)
+
+    def check_filter(self, tvist: Filter) -> None:
+        """Check with another filter the rest of a motion that comes to rest through the filter and is not on a path.
+
+        Raises:
+            RefusalError: There would be a collision.
+        """
+        cycle = self._cycle
+        if not (cycle.mode.guarded and cycle.trajectory.foreseeable):
+            return
+        met = self.rest_of_way(tvist)
+        if met is not None:
+            raise RefusalError("collision", "name", f"{met} on the rest of the way", CLEARANCE)
+
+    def _tail_is_spacious(self, end: JointStop) -> bool:
+        """Return whether there is room for any output of a filter from the references that it may still use."""
+        cycle = self._cycle
+        if cycle.line.filter.tvist.peak > 1.0:
+            return False
+        q = cycle.line.shaped.position
+        window = np.abs(cycle.line.filter.window() - q).max(axis=0)
+        _, qd, qdd = end.at(0.0)
+        return self._guard.is_spacious(q, window + self._guard.turned(qd, qdd, end.acceleration, end.jerk))
+
+    def _on(self, ahead: Floats | None) -> Meeting | None:
+        """Return the first pair of bodies that meets along known references, one for each tick, shape (k, n)."""
+        if ahead is None:
+            return None
+        steps = np.abs(np.diff(ahead, axis=0)).max(axis=0)
+        last = len(ahead) - 1
+        found = self._collisions.on_way(Way(lambda share: ahead[round(share * last)], steps * last))
+        return None if found is None else found[1]

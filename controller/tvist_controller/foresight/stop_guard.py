@@ -1,0 +1,185 @@
+"""Check of streams of set-points and of guided motions: a reference is played only if a clear stop exists from it."""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from tvist_controller.foresight.collision import CollisionModel, Meeting
+from tvist_controller.foresight.stops import StopPlanner
+from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.line.guard import Guard, Obstacle
+from tvist_controller.line.limits import GENTLEST_STOP, StreamTorqueRoom
+from tvist_controller.trajectory import JointStop, Way
+
+MARGIN = 0.8
+"""Share of the acceleration that the torque permits at the start of a stop, which the stop uses, since the permitted
+acceleration changes on the way [-].
+"""
+FRESH = 8
+"""Number of ticks for which a computed permitted acceleration is reused; the margin covers its changes."""
+
+
+class LookAhead(Guard):
+    """Checks the stop from the state of motion that a reference would lead to.
+
+    As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the
+    previous state is made. It was checked a tick earlier, so there is always a clear stop.
+
+    If everything is far away, a bound of the stop's travel is enough: no point of the arm travels farther than the
+    turned angles times its reach. The free space around a posture is cached until it is used up.
+
+    Args:
+        collisions: Collision model of the arm.
+        stops: Planner of stops.
+        room: Acceleration that the torque permits.
+        reach: Largest position of each joint in either direction, shape (n,) [rad], which stops must keep; None if
+            the references keep clear of it by themselves, as those of streams do.
+    """
+
+    def __init__(
+        self,
+        collisions: CollisionModel,
+        stops: StopPlanner,
+        room: StreamTorqueRoom,
+        *,
+        reach: Floats | None = None,
+    ) -> None:
+        self._reach = reach
+        self._collisions, self._stops, self._torque = collisions, stops, room
+        self._centre: Floats | None = None
+        self._room = 0.0
+        self._carried = collisions.carried
+        self._before: tuple[Target, Callable[[], JointStop]] | None = None
+        self._acceleration, self._age = GENTLEST_STOP, FRESH
+        self.met: Meeting | None = None
+        """Meeting that the latest refused reference would have led to."""
+        self._outside: str | None = None
+        self._stuck: str | None = None
+
+    def begin(self, state: Target) -> None:
+        """Start from rest."""
+        self._before = state, self._within(state, GENTLEST_STOP)
+        self.met = self._outside = self._stuck = None
+        self._acceleration, self._age = GENTLEST_STOP, FRESH
+
+    def __call__(self, state: Target) -> JointStop | None:
+        """Decide whether a reference that leads to this state may be played; see `Guard`."""
+        found = self._permitted(state)
+        if found is None:
+            return self.fallback()
+        self._before = state, found
+        return None
+
+    def take(self, state: Target, stop: JointStop) -> None:
+        """Set the stop from the state of the newest reference, which is known to be clear."""
+        self._before = state, lambda: stop
+
+    def fallback(self) -> JointStop:
+        """Return the stop from the state of the last reference played, which is known to be clear."""
+        assert self._before is not None, "begin comes first"
+        return self._before[1]()
+
+    def give_up(self, why: str) -> JointStop:
+        """Return the stop as in `fallback`, since no reference follows for this reason."""
+        self._stuck = why
+        return self.fallback()
+
+    @property
+    def obstacle(self) -> Obstacle:
+        """Why the latest reference was refused."""
+        if self._stuck is not None:
+            return Obstacle(self._stuck, "singular")
+        if self._outside is not None:
+            return Obstacle(self._outside, "limit_position")
+        return Obstacle(str(self.met), "collision")
+
+    def clear(self, stop: JointStop) -> bool:
+        """Return whether the whole way of a stop is clear."""
+        q, qd, qdd = stop.at(0.0)
+        turned = self.turned(qd, qdd, stop.acceleration)
+        self._outside = None if self._is_inside(q, turned) else self._beyond(stop)
+        if self._outside is not None:
+            return False
+        if self.is_spacious(q, turned):
+            return True
+        self.met = self.meeting(stop)
+        return self.met is None
+
+    def meeting(self, stop: JointStop) -> Meeting | None:
+        """Return the first pair of bodies that meets on the way of a stop."""
+        _, qd, qdd = stop.at(0.0)
+        turned = _fastest(qd, qdd, stop.jerk) * stop.duration
+        before = None if self._before is None else self._before[0].q
+        way = Way(lambda share: stop.at(share * stop.duration)[0], turned)
+        found = self._collisions.on_way(way, before=before)
+        return None if found is None else found[1]
+
+    def _within(self, state: Target, acceleration: float) -> Callable[[], JointStop]:
+        """Return a function that makes the stop when it is needed."""
+        return partial(self._stops.stop, state, acceleration)
+
+    def _permitted(self, state: Target) -> Callable[[], JointStop] | None:
+        """Return a function that makes a clear stop; None if there is none."""
+        self._age += 1
+        # In free space a bound of the stop's way is enough, and its acceleration may be some ticks old.
+        if self._age <= FRESH and self._is_spacious_for(state):
+            return self._within(state, self._acceleration)
+        allowed = MARGIN * self._torque.acceleration(state.q, state.qd)
+        self._acceleration, self._age = min(max(allowed, GENTLEST_STOP), self._stops.highest), 0
+        if self._is_spacious_for(state):
+            return self._within(state, self._acceleration)
+        stop = self._stops.stop(state, self._acceleration)
+        found = stop if self.clear(stop) else self._stops.by_joints(state, None, self.clear)
+        return None if found is None else lambda: found
+
+    def _is_spacious_for(self, state: Target) -> bool:
+        turned = self.turned(state.qd, state.qdd, self._acceleration)
+        return self._is_inside(state.q, turned) and self.is_spacious(state.q, turned)
+
+    def _is_inside(self, q: Floats, turned: Floats) -> bool:
+        """Return whether the joints can certainly turn by these angles around q inside their range."""
+        return self._reach is None or bool((np.abs(q) + turned <= self._reach).all())
+
+    def _beyond(self, stop: JointStop) -> str | None:
+        """Return which joint leaves its range on the way of a stop, if one does, in words."""
+        assert self._reach is not None, "only a range can be left"
+        beyond = stop.farthest - self._reach
+        joint = int(np.argmax(beyond))
+        if beyond[joint] <= 0.0:
+            return None
+        return f"joint {joint} would pass the end of its range, ±{self._reach[joint]:g} rad"
+
+    def is_spacious(self, q: Floats, turned: Floats) -> bool:
+        """Return whether the joints can certainly turn by these angles around q without a meeting."""
+        collisions = self._collisions
+        if self._carried is not collisions.carried:
+            self._carried, self._centre = collisions.carried, None
+        way = collisions.travel(turned)
+        moved = np.inf if self._centre is None else collisions.travel(q - self._centre)
+        if way + moved < self._room:
+            return True
+        if moved > 0.0:
+            self._centre, self._room = q, collisions.room(q)
+        return way < self._room
+
+    def turned(self, qd: Floats, qdd: Floats, acceleration: float, jerk: float | None = None) -> Floats:
+        """Upper bound of the angle that each joint turns in a stop, shape (n,) [rad].
+
+        Args:
+            qd: Velocities at its start, shape (n,) [rad/s].
+            qdd: Accelerations at its start, shape (n,) [rad/s^2].
+            acceleration: Acceleration limit [rad/s^2].
+            jerk: Jerk limit [rad/s^3]; None for that of the joints.
+        """
+        jerk = self._stops.jerk if jerk is None else jerk
+        fastest = _fastest(qd, qdd, jerk)
+        ramps = (acceleration + np.abs(qdd)) / jerk
+        turned: Floats = fastest * (fastest / (2.0 * acceleration) + ramps + self._stops.period)
+        return turned
+
+
+def _fastest(qd: Floats, qdd: Floats, jerk: float) -> Floats:
+    """Upper bound of each joint's velocity by the time its acceleration has been reduced to zero [rad/s]."""
+    fastest: Floats = np.abs(qd) + qdd * qdd / (2.0 * jerk)
+    return fastest

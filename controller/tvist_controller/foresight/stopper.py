@@ -1,0 +1,162 @@
+"""Forecast of the control line's motion, and the quickest way to end it."""
+
+import math
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from tvist_controller.foresight.line_copy import MAX_AHEAD, Ahead
+from tvist_controller.foresight.stops import StopPlan, StopPlanner
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.line_mode import LineMode
+from tvist_controller.trajectory import Forecast, JointStop, PathStop, StuckError, Trajectory
+from tvist_plant.plant import PERIOD
+from tvist_shaping.base import Filter
+
+EVEN = 1e-12
+"""Differences between steps below this are rounding errors [rad]."""
+
+
+def _anywhere(_: JointStop) -> bool:
+    return True
+
+
+class Outlook:
+    """Looks ahead on a control line, and stops it.
+
+    Args:
+        cycle: The control line.
+    """
+
+    def __init__(self, cycle: ControlCycle) -> None:
+        self._cycle = cycle
+        self.stops = StopPlanner(cycle.description, cycle.line.dynamics, PERIOD)
+        """Planner of stops."""
+        self._wanted = math.inf
+
+    def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
+        """Simulate the future references that follow if no command comes.
+
+        Args:
+            tvist: A filter to change to now; None for no change. Stops bypass every filter.
+            trajectory: A trajectory to follow from now on; None for the present one.
+
+        Returns:
+            The last two shaped references played and the future ones until they come to rest, one for each tick,
+            shape (k, n) [rad]; None if that takes more than `MAX_AHEAD` ticks, or the trajectory cannot go on.
+        """
+        ahead = self._ahead(tvist, trajectory)
+        with suppress(StuckError):
+            ahead.until(MAX_AHEAD)
+        return np.array(ahead.references) if ahead.rests else None
+
+    def _ahead(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Ahead:
+        """Start a simulation as in `foresee`, which the caller runs as far as needed."""
+        cycle, line = self._cycle, self._cycle.line
+        trajectory = (trajectory or cycle.trajectory).fork()
+        line_filter = line.filter.fork() if cycle.mode.shaped else None
+        if tvist is not None and line_filter is not None:
+            line_filter.use(tvist.fork())
+        return Ahead(trajectory, line_filter, line.shaped.fork())
+
+    def stop(self, deceleration: float | None) -> StopPlan | None:
+        """Come to rest as quickly as permitted.
+
+        A motion stays on its path, is at no time ahead of the uninterrupted motion, and comes to rest no later than
+        it. If no stop within the torque limits does that, the motion runs out through the filter. A stream, whose
+        path is its client's, stops clear of all bodies.
+
+        Args:
+            deceleration: Requested limit [rad/s^2]; None for what the torque permits.
+
+        Returns:
+            The stop; None if a stop that is already in progress is as quick, and continues.
+        """
+        cycle, wanted = self._cycle, math.inf if deceleration is None else deceleration
+        if cycle.mode in {LineMode.STOPPING, LineMode.RUNNING_OUT} and wanted <= self._wanted:
+            return None
+        plan = self.plan_stop(deceleration)
+        self._wanted = wanted
+        if plan is None:
+            return None
+        if plan.trajectory is None:
+            cycle.begin(cycle.trajectory, LineMode.RUNNING_OUT)
+        else:
+            cycle.begin(plan.trajectory, LineMode.STOPPING)
+        return plan
+
+    def brake(self, trajectory: Trajectory) -> None:
+        """Follow the arm while its brakes bring it to rest; no stop replaces this."""
+        self._cycle.begin(trajectory, LineMode.STOPPING)
+        self._wanted = math.inf  # as if the hardest stop had been asked for
+
+    def plan_stop(self, deceleration: float | None) -> StopPlan | None:
+        """Return the quickest permitted stop from the present state, without starting it; see `stop`."""
+        forecast = self._cycle.trajectory.forecast
+        return self._by_joints(deceleration) if forecast is None else self._on_path(forecast, deceleration)
+
+    def _by_joints(self, deceleration: float | None) -> StopPlan | None:
+        cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
+        stop = self.stops.by_joints(
+            cycle.line.shaped.newest, deceleration, _anywhere if guard is None else guard.clear
+        )
+        # A stop that goes on is replaced by a harder one only: each new one begins with a ramp of its own.
+        braking = cycle.mode is LineMode.STOPPING or present.acceleration > 0.0
+        if braking and (stop is None or stop.acceleration <= present.acceleration):
+            return None
+        if stop is None:  # no stop is clear and within the torque limits
+            hardest = self.stops.highest
+            stop = self.stops.stop(cycle.line.shaped.newest, hardest) if guard is None else guard.fallback()
+        return self._plan(stop, deceleration, stop.duration, stop.end)
+
+    def _on_path(self, forecast: Forecast, deceleration: float | None) -> StopPlan | None:
+        cycle, forecast = self._cycle, self._shaped(forecast)
+        # Stops on a path are sought in the order of their cost: by bounds alone, then beside the motion simulated for
+        # as long as a stop lasts, then beside the whole of it.
+        state, newest = cycle.line.shaped.along.published, cycle.line.shaped.along.position
+        stop = self.stops.on_path(state, newest, forecast, deceleration)
+        lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
+        ahead = None
+        if stop is None:
+            ahead = self._ahead()
+            # A motion that cannot turn back has to be simulated only for as long as a stop lasts.
+            ahead.until(MAX_AHEAD if forecast.turns else 0)
+            stop = self.stops.under(ahead, state, forecast, deceleration)
+        if stop is None and ahead is not None:
+            ahead.until(MAX_AHEAD)
+            if not ahead.rests:  # it lasts so long that any stop is sooner
+                stop = self.stops.on_path(state, newest, forecast, deceleration, certain=False)
+            else:
+                last, asked = ahead.last, self.stops.asked(np.array(ahead.references))
+                stop = self.stops.under(ahead, state, forecast, deceleration, asked)
+                lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead.references[-1])
+        if stop is not None:
+            return self._plan(stop, deceleration, stop.duration, stop.end)
+        return None if cycle.mode is LineMode.STOPPING else lets_run_out
+
+    def _plan(
+        self, stop: JointStop | PathStop | None, wanted: float | None, duration: float, end: Floats
+    ) -> StopPlan:
+        kept = None if stop is None else stop.acceleration
+        way = float(np.abs(end - self._cycle.line.shaped.position).max())
+        return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
+
+    def _shaped(self, forecast: Forecast) -> Forecast:
+        """Return the forecast of a motion after the filter."""
+        cycle = self._cycle
+        if cycle.mode is LineMode.STOPPING:
+            return forecast
+        peak, direction = cycle.line.filter.peak, forecast.path.direction
+        known = peak == 1.0 and not cycle.line.filter.fading and forecast.steady > 0.0
+        if known:  # the filter's output is delayed, so it still contains earlier decelerations
+            steps = np.diff(cycle.line.filter.window() @ direction)
+            known = bool((np.diff(steps) >= -EVEN * float(direction @ direction)).all())
+        return replace(
+            forecast,
+            braking=peak * forecast.braking,
+            jerk=peak * forecast.jerk,
+            steady=forecast.steady if known else 0.0,
+            turns=peak > 1.0,
+        )

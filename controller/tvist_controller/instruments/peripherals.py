@@ -1,0 +1,320 @@
+"""Terminals, registers and tool centre point of a robot: set by commands, and published as `Io`."""
+
+from collections.abc import Callable, Sequence
+from typing import ClassVar, Protocol, TypeVar
+
+from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.planning.command_row import Call, Row
+from tvist_protocol.io import (
+    BITS,
+    NUMBERS,
+    Bank,
+    Io,
+    Register,
+    Registers,
+    SetIo,
+    SetRegisters,
+    SetTcp,
+    SimulationSetInputs,
+)
+from tvist_protocol.programs import Interpreter, ProgramState
+from tvist_protocol.values import Payload
+
+CURRENT = (0.004, 0.020)
+"""Range of an analogue terminal as a current [A]."""
+VOLTAGE = (0.0, 10.0)
+"""Range of an analogue terminal as a voltage [V]."""
+Number = TypeVar("Number", int, float)
+LEAST, MOST = -(2**31), 2**31 - 1
+"""Range of an integer register."""
+
+
+def analog_value(share: float, *, voltage: bool) -> float:
+    """Value of an analogue terminal at a share of its range [A or V]."""
+    low, high = VOLTAGE if voltage else CURRENT
+    return low + share * (high - low)
+
+
+def analog_share(value: float, *, voltage: bool) -> float:
+    """Share of its range that corresponds to a value of an analogue terminal [-]."""
+    low, high = VOLTAGE if voltage else CURRENT
+    return (value - low) / (high - low)
+
+
+class LoadedProgram(Protocol):
+    """The properties of the program that are published; see `Io`."""
+
+    name: str | None
+    state: ProgramState
+
+    @property
+    def line(self) -> int:
+        """Current line, as in `Io`."""
+
+    @property
+    def interpreter(self) -> Interpreter | None:
+        """Statements for the program, as in `Io`."""
+
+    @property
+    def watched(self) -> list[str]:
+        """Input registers that the program watches, as in `Io`."""
+
+
+class Peripherals:
+    """Everything connected to the control box except the arm. Initially everything is off or zero.
+
+    Args:
+        on_tcp: Called with the tool centre point when it is set.
+    """
+
+    def __init__(self, *on_tcp: Callable[[tuple[float, ...]], None]) -> None:
+        self._on_tcp = on_tcp
+        self._digital_inputs = 0
+        self._digital_outputs = 0
+        self._analog_inputs = [CURRENT[0], CURRENT[0]]
+        self._analog_ratios = [0.0, 0.0]
+        self._analog_types = 0
+        self._tool_analog_inputs = [0.0, 0.0]
+        self._bits: dict[Bank, list[int]] = {bank: [0] * (BITS // 32) for bank in ("input_bit", "output_bit")}
+        self._ints: dict[Bank, list[int]] = {bank: [0] * NUMBERS for bank in ("input_int", "output_int")}
+        self._doubles: dict[Bank, list[float]] = {
+            bank: [0.0] * NUMBERS for bank in ("input_double", "output_double")
+        }
+        self._written: dict[tuple[Bank, int], int] = {}
+        self._tool_voltage = 0
+        self.changed = True
+        """True if `io` has to be published, since something in it has changed; whoever publishes it resets this."""
+        self.wrench_zero: list[float] | None = None
+        """Force and torque at the tool that count as zero, base frame [N, N m]."""
+        self.tcp_offset: tuple[float, ...] = (0.0,) * 6
+        """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
+
+    def set_outputs(self, command: SetIo) -> None:
+        """Set the outputs that the masks select."""
+        self.changed = True
+        mask = command.digital_output_mask
+        self._digital_outputs = self._digital_outputs & ~mask | command.digital_outputs & mask
+        for number, ratio in enumerate((command.standard_analog_output_0, command.standard_analog_output_1)):
+            if command.standard_analog_output_mask >> number & 1:
+                self._analog_ratios[number] = ratio
+                self.choose_output(number, voltage=bool(command.standard_analog_output_type >> number & 1))
+
+    def set_inputs(self, command: SimulationSetInputs) -> None:
+        """Apply signals to inputs."""
+        mask = command.digital_input_mask
+        self._digital_inputs = self._digital_inputs & ~mask | command.digital_inputs & mask
+        if command.standard_analog_input is not None:
+            self._analog_inputs = list(command.standard_analog_input)
+        if command.analog_input_types is not None:
+            self._analog_types = self._analog_types & ~0b11 | command.analog_input_types
+        if command.tool_analog_input is not None:
+            self._tool_analog_inputs = list(command.tool_analog_input)
+
+    def set_tcp(self, offset: tuple[float, ...]) -> None:
+        """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
+        self.tcp_offset, self.changed = offset, True
+        for tell in self._on_tcp:
+            tell(offset)
+
+    # ------------------------------------------------------------------ for programs
+
+    @property
+    def digital_inputs(self) -> int:
+        """Bits of the digital inputs: 0–7 standard, 8–15 configurable, 16–17 tool."""
+        return self._digital_inputs
+
+    @property
+    def digital_outputs(self) -> int:
+        """Bits of the digital outputs, as those of the inputs."""
+        return self._digital_outputs
+
+    @property
+    def analog_inputs(self) -> Sequence[float]:
+        """Analogue inputs of the control box [A or V]."""
+        return self._analog_inputs
+
+    @property
+    def tool_analog_inputs(self) -> Sequence[float]:
+        """Analogue inputs of the tool [V]."""
+        return self._tool_analog_inputs
+
+    def analog_ratio(self, number: int) -> float:
+        """Share of its range that an analogue output has [-]."""
+        return self._analog_ratios[number]
+
+    def output_is_voltage(self, number: int) -> bool:
+        """Return whether an analogue output is a voltage rather than a current."""
+        return bool(self._analog_types >> (2 + number) & 1)
+
+    def choose_output(self, number: int, *, voltage: bool) -> None:
+        """Make an analogue output a voltage or a current; it keeps its share of the range."""
+        self._choose(2 + number, voltage=voltage)
+
+    def choose_input(self, number: int, *, voltage: bool) -> None:
+        """Make an analogue input a voltage or a current; the signal at it keeps its number."""
+        self._choose(number, voltage=voltage)
+
+    def _choose(self, bit: int, *, voltage: bool) -> None:
+        self._analog_types = self._analog_types & ~(1 << bit) | voltage << bit
+        self.changed = True
+
+    def set_tool_voltage(self, voltage: int) -> None:
+        """Set the supply of the tool [V]."""
+        self._tool_voltage, self.changed = voltage, True
+
+    def zero_wrench(self, wrench: list[float]) -> None:
+        """Take a force and torque at the tool as zero, base frame [N, N m]."""
+        self.wrench_zero, self.changed = wrench, True
+
+    def bit(self, bank: Bank, place: int) -> bool:
+        """Return a bit register."""
+        return bool(self._bits[bank][place // 32] >> place % 32 & 1)
+
+    def integers(self, bank: Bank) -> Sequence[int]:
+        """Return the integer registers of a bank."""
+        return self._ints[bank]
+
+    def doubles(self, bank: Bank) -> Sequence[float]:
+        """Return the double registers of a bank."""
+        return self._doubles[bank]
+
+    def write(self, bank: Bank, place: int, value: Register) -> None:
+        """Write a register whose place and value are known to be valid."""
+        if bank in self._bits:
+            word, mask = place // 32, 1 << place % 32
+            before = self._bits[bank][word]
+            self._bits[bank][word] = after = before | mask if value else before & ~mask
+            self.changed |= after != before
+            return
+        if bank in self._ints:
+            integers, integer = self._ints[bank], int(value)
+            self.changed |= integers[place] != integer
+            integers[place] = integer
+        else:
+            doubles = self._doubles[bank]
+            self.changed |= doubles[place] != value
+            doubles[place] = float(value)
+
+    def written(self, bank: Bank, place: int) -> int:
+        """Return the first control period after a client last wrote a register; 0 if none ever did."""
+        return self._written.get((bank, place), 0)
+
+    # ------------------------------------------------------------------ for clients
+
+    def _set_registers(self, call: Call[SetRegisters]) -> None:
+        """Write registers; input registers may be written without control."""
+        command = call.command
+        runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
+        for bank in (run.bank for run in runs if command.token is None and run.bank.startswith("output")):
+            why = f"token is missing: {bank} registers belong to the robot, and writing them needs control"
+            raise RefusalError("missing_field", "token", why)
+        self.set_registers(command)
+        for run in runs:
+            for place in range(run.first, run.first + len(run.values)):
+                self._written[run.bank, place] = call.tick
+
+    def set_registers(self, command: SetRegisters) -> None:
+        """Write registers: all of them, or none.
+
+        Raises:
+            RefusalError: A register does not exist, or a value is invalid for its bank.
+        """
+        bits, ints, doubles = dict(self._bits), dict(self._ints), dict(self._doubles)
+        runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
+        for run in runs:
+            bank, first, values = run.bank, run.first, run.values
+            there = BITS if bank in bits else NUMBERS
+            if first + len(values) > there:
+                why = f"first is {first} with {len(values)} values; {bank} has {there} registers"
+                raise RefusalError("out_of_range", "values", why, there)
+            if bank in bits:
+                bits[bank] = _with_bits(bits[bank], first, values, bank)
+            elif bank in ints:
+                ints[bank] = _with(
+                    ints[bank], first, [_integer(k, one, bank) for k, one in enumerate(values)]
+                )
+            else:
+                numbers = [_double(k, one, bank) for k, one in enumerate(values)]
+                doubles[bank] = _with(doubles[bank], first, numbers)
+        self._bits, self._ints, self._doubles = bits, ints, doubles
+
+    def io(
+        self, tick: int, payload: Payload, speed: float, program: LoadedProgram, wrench: list[float] | None
+    ) -> Io:
+        """Return the message that publishes all this.
+
+        Args:
+            tick: First control period for which the values hold.
+            payload: Declared payload.
+            speed: The speed slider [-].
+            program: Loaded program.
+            wrench: Wrench at the tool centre point in the last tick, base frame [N, N m]; None to leave it out.
+        """
+        return Io(
+            tick=tick,
+            actual_digital_input_bits=self._digital_inputs,
+            actual_digital_output_bits=self._digital_outputs,
+            standard_analog_input=list(self._analog_inputs),
+            standard_analog_output=[self._analog_output(number) for number in range(2)],
+            analog_io_types=self._analog_types,
+            tool_analog_input=list(self._tool_analog_inputs),
+            input_bit_register=list(self._bits["input_bit"]),
+            input_int_register=list(self._ints["input_int"]),
+            input_double_register=list(self._doubles["input_double"]),
+            output_bit_register=list(self._bits["output_bit"]),
+            output_int_register=list(self._ints["output_int"]),
+            output_double_register=list(self._doubles["output_double"]),
+            tcp_offset=list(self.tcp_offset),
+            payload=payload,
+            target_speed_fraction=speed,
+            program=program.name,
+            program_state=program.state,
+            program_line=program.line,
+            interpreter=program.interpreter,
+            watched=program.watched,
+            tool_output_voltage=self._tool_voltage,
+            tcp_force_zero=self.wrench_zero,
+            actual_TCP_force=wrench,
+        )
+
+    def _analog_output(self, number: int) -> float:
+        return analog_value(self._analog_ratios[number], voltage=self.output_is_voltage(number))
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(SetIo, lambda self, call: self.set_outputs(call.command), changes_io=True),
+        Row(SetRegisters, _set_registers, lease="if named", changes_io=True),
+        Row(SetTcp, lambda self, call: self.set_tcp(call.command.offset), changes_io=True),
+        Row(SimulationSetInputs, lambda self, call: self.set_inputs(call.command), changes_io=True),
+    )
+
+
+def _with(values: list[Number], first: int, new: list[Number]) -> list[Number]:
+    return values[:first] + new + values[first + len(new) :]
+
+
+def _with_bits(words: list[int], first: int, values: Sequence[Register], bank: Bank) -> list[int]:
+    new = list(words)
+    for k, value in enumerate(values):
+        if not isinstance(value, bool):
+            raise _wrong(k, value, bank, "true or false")
+        word, bit = divmod(first + k, 32)
+        new[word] = new[word] & ~(1 << bit) | value << bit
+    return new
+
+
+def _integer(k: int, value: Register, bank: Bank) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not LEAST <= value <= MOST:
+        raise _wrong(k, value, bank, f"an integer from {LEAST} to {MOST}")
+    return value
+
+
+def _double(k: int, value: Register, bank: Bank) -> float:
+    if isinstance(value, bool):
+        raise _wrong(k, value, bank, "a number")
+    return float(value)
+
+
+def _wrong(k: int, value: Register, bank: Bank, wanted: str) -> RefusalError:
+    return RefusalError(
+        "out_of_range", f"values[{k}]", f"values[{k}] is {value}; {bank} registers take {wanted}"
+    )

@@ -1,0 +1,143 @@
+"""Choice between the two kinds of feed-forward for the drives, and the transition from one to the other."""
+
+from msgspec import Struct
+
+from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.line.joint_controllers import JointControllers
+from tvist_controller.line.line_tick import Q_R, STATIC, TORQUE
+from tvist_plant.description import RobotDescription
+from tvist_plant.drives import DriveCommand
+
+FADE = 150
+"""Ticks over which one kind of feed-forward fades into the other in motion."""
+
+
+class MotorReference(Struct, frozen=True, eq=False, gc=False):
+    """Motion of the motors that elastic feed-forward asks for."""
+
+    qd: Floats
+    """Velocity q̇* + ẇ, shape (n,) [rad/s]."""
+    qdd: Floats
+    """Acceleration q̈* + ẅ, shape (n,) [rad/s^2]."""
+    torque: Floats
+    """Torque, shape (n,) [N m]."""
+    limited: bool
+    """Whether ẅ was limited to the torque that the drives have left."""
+
+
+class DriveFeedForward:
+    """Feed-forward of the paper's controller, or of an elastic arm's while a shaper wants that.
+
+    Commands of the two kinds belong to different ticks, and they lead by different shares of the wind-up, so in motion
+    one fades into the other; at rest they are equal.
+
+    Args:
+        description: The robot.
+        period: Tick [s].
+        compensate_sag: Whether the motors lead by the twist of the gears under gravity.
+    """
+
+    def __init__(self, description: RobotDescription, period: float, *, compensate_sag: bool = False) -> None:
+        self._joints = JointControllers(description, period, compensate_sag=compensate_sag)
+        self.rows = self._joints.rows
+        """Parameters and state of the paper's joint controllers, see `joint_controllers`."""
+        self.wanted: ElasticFeedForward | None = None
+        """The elastic feed-forward in use, or about to be; None for that of the paper's controller."""
+        self._elastic: ElasticFeedForward | None = None
+        self._share, self._rising = 0, False
+        self._rate = 1.0 / (FADE * period)
+        self.reference: MotorReference | None = None
+        """Motion of the motors in the last command; None without elastic feed-forward."""
+
+    @property
+    def delay(self) -> float:
+        """Time by which commands are later than their targets at rest [s]."""
+        return 0.0 if self.wanted is None else self.wanted.delay
+
+    def use(self, elastic: ElasticFeedForward | None) -> None:
+        """Use elastic feed-forward or, for None, that of the paper's controller, after a transition."""
+        self.wanted = elastic
+
+    def rest(self) -> None:
+        """Complete a transition at once if the motors do not lead either, since the reference rests: both are equal."""
+        if self._elastic is self.wanted and self._share == self._full:
+            return
+        if self._elastic is None or self._share == 0 or self._elastic.settled:
+            self._begin()
+            self._share = self._full
+
+    def reset(self, gravity: Floats) -> None:
+        """Restart at rest.
+
+        Args:
+            gravity: Torque that balances gravity there, shape (n,) [N m].
+        """
+        self._joints.reset(gravity)
+        self._begin()
+        self._share = self._full
+
+    def command(
+        self,
+        target: Target,
+        signals: Floats,
+        carried: Floats,
+        *,
+        may_begin: bool = True,
+        may_go_on: bool = True,
+    ) -> DriveCommand:
+        """Drive command for a target.
+
+        Args:
+            target: Shaped reference and its derivatives.
+            signals: Torques of the rigid arm for it and the command of the paper's joint controllers, see `line_tick`.
+            carried: Inertial parameters of the payload, see `InverseDynamics.carried`.
+            may_begin: Whether the reference is smooth enough to begin with elastic feed-forward.
+            may_go_on: Whether it is smooth enough to go on with it, as a stop is.
+        """
+        self._fade(may_begin if self._share == 0 else may_go_on)
+        elastic, plain = self._elastic, DriveCommand(*signals[Q_R:])
+        if elastic is None or self._share == 0:
+            self.reference = None
+            return plain
+        command = elastic.command(target, signals[TORQUE], carried, self._joints.sag(signals[STATIC]))
+        if self._share < FADE:
+            command = self._blend(plain, command)
+        self.reference = MotorReference(command.qd, elastic.qdd, command.torque, elastic.limited)
+        return command
+
+    @property
+    def _full(self) -> int:
+        """Share of a completed transition."""
+        return 0 if self.wanted is None else FADE
+
+    def _begin(self) -> None:
+        """Begin with what is wanted, with a share of zero."""
+        self._elastic, self._share, self._rising = self.wanted, 0, False
+        if self._elastic is not None:
+            self._elastic.reset()
+
+    def _fade(self, smooth: bool) -> None:
+        """Advance the transition by a tick; one that is under way is completed before it turns back."""
+        if self._share == 0 and self._elastic is not self.wanted:
+            self._begin()
+        rises = smooth and self._elastic is not None and self._elastic is self.wanted
+        if self._share == 0 and rises and self._elastic is not None:
+            self._elastic.reset()  # its lead is a history, which must be that of this motion
+        if self._share in {0, FADE}:
+            self._rising = rises
+        # It never turns back half-way: only a whole rise or fall has the smooth rate that `_blend` adds.
+        self._share = min(max(self._share + (1 if self._rising else -1), 0), FADE)
+
+    def _blend(self, plain: DriveCommand, elastic: DriveCommand) -> DriveCommand:
+        """Mixture of both commands, whose velocity is the derivative of its position."""
+        x = self._share / FADE
+        # A quintic, whose velocity and acceleration are zero at both ends.
+        share = x * x * x * (10.0 - x * (15.0 - 6.0 * x))
+        rate = 30.0 * (x * (1.0 - x)) ** 2 * (self._rate if self._rising else -self._rate)
+        away = elastic.q - plain.q
+        return DriveCommand(
+            q=plain.q + share * away,
+            qd=plain.qd + share * (elastic.qd - plain.qd) + rate * away,
+            torque=plain.torque + share * (elastic.torque - plain.torque),
+        )

@@ -1,0 +1,99 @@
+"""Commands to the drives: set-points with their feed-forward."""
+
+import math
+
+import numpy as np
+
+from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.line.differentiator import Floats, Target
+from tvist_plant.description import RobotDescription
+from tvist_plant.drives import DriveCommand
+
+ROTOR, COMPLIANCE, YIELDING, COULOMB, VISCOUS, WIDTH, PER_SECOND, WINDUP, ROWS = range(9)
+"""Rows of the parameters of each joint: rotor inertia B [kg m^2], c_w/K_g [rad/(N m)], 1/K_g if the sag is compensated
+[rad/(N m)], Coulomb [N m] and viscous friction [N m s/rad], speed over which the former changes its sign [rad/s], 1/h
+[1/s]; the wind-up of the last tick [rad]; and their number.
+"""
+
+
+@compiled_for_ticks
+def command_drives(
+    q: Floats, rates: Floats, torque: Floats, gravity: Floats, joints: Floats, command: Floats
+) -> None:
+    """Compute the drive command for a target.
+
+    Args:
+        q: q*, shape (n,) [rad].
+        rates: q̇* [rad/s] and q̈* [rad/s^2], shape (2, n).
+        torque: τ* of the rigid arm, shape (n,) [N m].
+        gravity: The part of the torque that balances gravity, shape (n,) [N m].
+        joints: Parameters of each joint, shape (8, n); the last row, the wind-up, is changed.
+        command: Position [rad], velocity [rad/s] and feed-forward torque [N m], shape (3, n).
+    """
+    for j in range(q.shape[0]):
+        windup = joints[COMPLIANCE, j] * (torque[j] - gravity[j]) + joints[YIELDING, j] * gravity[j]
+        speed = (windup - joints[WINDUP, j]) * joints[PER_SECOND, j]
+        joints[WINDUP, j] = windup
+        friction = joints[VISCOUS, j] * rates[0, j]
+        if joints[COULOMB, j] > 0.0:
+            friction += joints[COULOMB, j] * math.tanh(rates[0, j] / joints[WIDTH, j])
+        command[0, j] = q[j] + windup
+        command[1, j] = rates[0, j] + speed
+        command[2, j] = torque[j] + joints[ROTOR, j] * rates[1, j] + friction
+
+
+class JointControllers:
+    """Feed-forward for the drives; their feedback control runs in the drives themselves.
+
+    - Torque: τ_ff = τ* + B q̈* + friction; the rotors' inertia and a share of Coulomb friction are added to the
+      torque of the rigid arm.
+    - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g. The motor leads by a share c_w of that, so that the
+      link is closer to its reference.
+    - Sag: the twist by gravity itself, g/K_g, is left, as on the paper's robot, or the motor leads by all of it, so
+      that the link rests on its reference. g(q*) has neither feedback nor a delay, and is as smooth as q*.
+
+    Args:
+        description: The robot.
+        period: Tick [s].
+        compensate_sag: Whether the motors lead by the twist of the gears under gravity.
+    """
+
+    def __init__(self, description: RobotDescription, period: float, *, compensate_sag: bool = False) -> None:
+        drives, n = description.drives, description.joints
+        friction, stiffness = np.array(drives.coulomb_friction), np.array(drives.gear_stiffness)
+        self.rows = rows = np.zeros((ROWS, n))
+        """Parameters of each joint and its wind-up, in the order of `JointRow`, shape (8, n)."""
+        rows[ROTOR] = drives.rotor_inertia
+        rows[COMPLIANCE] = np.array(drives.windup_feedforward) / stiffness
+        if compensate_sag:
+            rows[YIELDING] = 1.0 / stiffness
+        if drives.linear_friction:
+            rows[VISCOUS] = friction / drives.friction_width
+        else:
+            rows[COULOMB] = drives.friction_feedforward * friction
+        rows[WIDTH], rows[PER_SECOND] = drives.friction_feedforward_width, 1.0 / period
+        self._sags = compensate_sag
+
+    def reset(self, gravity: Floats) -> None:
+        """Restart at rest.
+
+        Args:
+            gravity: Torque that balances gravity there, shape (n,) [N m].
+        """
+        self.rows[WINDUP] = self.rows[YIELDING] * gravity
+
+    def sag(self, gravity: Floats) -> Floats | None:
+        """Lead by which the motors compensate the twist under gravity, shape (n,) [rad]; None if they do not."""
+        return np.asarray(self.rows[YIELDING] * gravity) if self._sags else None
+
+    def command(self, target: Target, torque: Floats, gravity: Floats) -> DriveCommand:
+        """Drive command for a target.
+
+        Args:
+            target: Shaped reference and its derivatives.
+            torque: τ* of the rigid arm, shape (n,) [N m].
+            gravity: The part of the torque that balances gravity, shape (n,) [N m].
+        """
+        command = np.empty((3, len(torque)))
+        command_drives(target.q, np.array([target.qd, target.qdd]), torque, gravity, self.rows, command)
+        return DriveCommand(*command)

@@ -1,0 +1,234 @@
+"""Limits of the arm's motion: velocities and torques."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from tvist_controller.line.differentiator import Floats, Target, central_differences
+from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.trajectory import JointStop, MotionLimits, Path, PathStop
+from tvist_plant.description import RobotDescription
+
+TORQUE_SHARE = 0.9
+"""Share of the joints' torque that a stop or a stream may use [-]."""
+REBOUND = 1.0
+"""Overshoot of a flexible arm's torque after a sudden change of the rigid arm's torque, relative to that change [-]:
+1 without damping. A stop bypasses the filter, so its change is sudden.
+"""
+GENTLEST_STOP = 1.0
+"""Lowest deceleration of a stop, whatever the torque permits or a client requests [rad/s^2]."""
+
+MOMENTS = 32
+"""Number of moments of a stop at which its torque is checked."""
+_SHARES = np.arange(1, MOMENTS + 1) / MOMENTS
+_POINTS = np.linspace(0.0, 1.0, 17)[:, np.newaxis]
+"""Shares of a path at which its torque is checked."""
+LOOK_EVERY = 4
+"""Ticks between two checks of the torque along known references."""
+REDUCED_SHARE = 0.25
+"""Share of the joints' velocity that remains while the safety system reduces the speed [-]."""
+
+
+def arm_limits(description: RobotDescription) -> MotionLimits:
+    """Return the limits that suit every joint: the smallest of all."""
+    limits = description.limits
+    return MotionLimits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
+
+
+def rate_of(speed: float, velocity: float, slowest: float | None) -> float:
+    """Rate of a motion's time [-].
+
+    Args:
+        speed: Programmed speed fraction [-].
+        velocity: The motion's velocity limit [rad/s].
+        slowest: Velocity limit of reduced speed [rad/s]; None if the speed is not reduced.
+    """
+    return speed if slowest is None else min(speed, slowest / velocity)
+
+
+class StreamTorqueRoom:
+    """The acceleration of a stream that the joints' torques permit, after gravity and velocities.
+
+    Args:
+        description: The robot.
+        dynamics: Its inverse dynamics with the declared payload.
+    """
+
+    def __init__(self, description: RobotDescription, dynamics: InverseDynamics) -> None:
+        self._most = TORQUE_SHARE * np.array(description.limits.torque)
+        self._dynamics = dynamics
+
+    def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
+        """Return whether a state of motion keeps all torques within their share, or is as gentle as any stop."""
+        if (self._dynamics.effort(q, qd, qdd) <= self._most).all():
+            return True
+        return bool(np.abs(qdd).max() <= GENTLEST_STOP)
+
+    def acceleration(self, q: Floats, qd: Floats) -> float:
+        """Largest a such that every q̈ with |q̈ᵢ| ≤ a keeps the torques within their share [rad/s^2].
+
+        With τ = M q̈ + h, such a q̈ needs at most |hᵢ| + a Σⱼ|Mᵢⱼ| at joint i. The result is at least that of the
+        gentlest stop.
+        """
+        left = self._most - self._dynamics.effort(q, qd, np.zeros_like(q))
+        return max(float((left / np.abs(self._dynamics.inertia(q)).sum(axis=1)).min()), GENTLEST_STOP)
+
+
+class GuidedTorqueRoom(StreamTorqueRoom):
+    """The acceleration of a motion that may change suddenly, since neither its client nor a filter smooths it.
+
+    The flexible arm's torque overshoots after each change, so the torque of the acceleration, and what the arm adds
+    to it, have to stay within the limits as well.
+    """
+
+    def __init__(self, description: RobotDescription, dynamics: InverseDynamics) -> None:
+        super().__init__(description, dynamics)
+        self._limits = np.array(description.limits.torque)
+
+    def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
+        """Return whether a state of motion keeps all torques within their limits, or is as gentle as any stop."""
+        if not super().allows(q, qd, qdd):
+            return False
+        swung = self._dynamics.effort(q, qd, (1.0 + REBOUND) * qdd)
+        return bool((swung <= self._limits).all() or np.abs(qdd).max() <= GENTLEST_STOP)
+
+    def acceleration(self, q: Floats, qd: Floats) -> float:
+        """Largest a such that every q̈ with |q̈ᵢ| ≤ a is allowed [rad/s^2]."""
+        left = self._limits - self._dynamics.effort(q, qd, np.zeros_like(q))
+        most = (1.0 + REBOUND) * np.abs(self._dynamics.inertia(q)).sum(axis=1)
+        return max(min(float((left / most).min()), super().acceleration(q, qd)), GENTLEST_STOP)
+
+
+class StopTorque:
+    """The joint torques that a stop may use.
+
+    All torques of the rigid arm along the stop stay within their share of the limits. If the uninterrupted motion
+    would need more, the stop may use as much.
+
+    Args:
+        dynamics: Inverse dynamics with the declared payload.
+        state: State at which the stop begins.
+        limits: Torque limits of the joints, shape (n,) [N m].
+        asked: Largest torques that the uninterrupted motion would need, shape (n,) [N m]; None for those at the
+            start.
+    """
+
+    def __init__(
+        self, dynamics: InverseDynamics, state: Target, limits: Floats, asked: Floats | None = None
+    ) -> None:
+        self._dynamics = dynamics
+        if asked is None:
+            asked = dynamics.effort(state.q, state.qd, state.qdd)
+        self._share, self._most = np.maximum(TORQUE_SHARE * limits, asked), np.maximum(limits, asked)
+        self._before = dynamics.torque(state.q, state.qd, state.qdd) - dynamics.gravity(state.q)
+        self._failed: int | None = None
+        """Number of the moment at which the last stop that does not hold needed too much."""
+
+    def holds(self, stop: JointStop | PathStop, *, rebound: bool = True) -> bool:
+        """Return whether a stop keeps within these torques.
+
+        The torque at the very start belongs to the motion; only what follows is caused by the stop. Thirty-two
+        moments are checked, since torque peaks where a joint's acceleration ramp ends. Nine in ten of the stops that
+        need too much do so where the whole stop's ramp ends, so that moment is checked first, after the one at which
+        the stop before failed: the next one on the ladder mostly fails there, too.
+
+        Args:
+            stop: The stop.
+            rebound: Whether the overshoot of the flexible arm, at both ends of the stop, must stay within the limits
+                themselves.
+        """
+        ramp = stop.acceleration / stop.jerk
+        ends = min(math.ceil(ramp / stop.duration * MOMENTS), MOMENTS) if stop.duration > 0.0 else MOMENTS
+        times = _SHARES * stop.duration
+        firsts = ends - 1 if self._failed is None else [self._failed, ends - 1]
+        if not self._within(stop, times[firsts].reshape(-1), rebound=rebound).all():
+            return False
+        within = self._within(stop, times, rebound=rebound)
+        if not within.all():
+            self._failed = int(np.argmin(within))
+        return bool(within.all())
+
+    def _within(self, stop: JointStop | PathStop, times: Floats, *, rebound: bool) -> npt.NDArray[np.bool_]:
+        """Return at which of k times a stop keeps within the torques, shape (k,)."""
+        dynamics = self._dynamics
+        q, qd, qdd = stop.states(times)
+        torque = dynamics.torques(q, qd, qdd)
+        effort = np.abs(torque)
+        if dynamics.changing:
+            effort = np.array([dynamics.effort(*state) for state in zip(q, qd, qdd, strict=True)])
+        within = np.asarray((effort <= self._share).all(axis=1))
+        if not rebound or not within.any():
+            return within
+        gravity = dynamics.gravities(q)
+        motion = torque - gravity
+        begun = np.abs(torque + REBOUND * (motion - self._before))
+        ended = np.abs(gravity - REBOUND * motion)
+        within &= (np.maximum(begun, ended) <= self._most).all(axis=1)
+        return within
+
+
+def largest_torque(dynamics: InverseDynamics, path: Path, velocity: float, acceleration: float) -> Floats:
+    """Upper bound of the torques of a motion along a path with any profile, shape (n,) [N m].
+
+    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), so it is largest at a corner of the range of ẋ² and ẍ. Seventeen
+    points of the path are checked.
+
+    Args:
+        dynamics: Inverse dynamics with the declared payload.
+        path: Path of the motion.
+        velocity: Velocity limit of the path's parameter [rad/s].
+        acceleration: Acceleration of the path's parameter [rad/s^2].
+    """
+    way = path.end - path.start
+    resting, pushed = _on_way(dynamics, path, path.start, way, velocity, acceleration)
+    most: Floats = (resting + acceleration * pushed).max(axis=0)
+    return most
+
+
+def acceleration_on_way(
+    dynamics: InverseDynamics, path: Path, start: Floats, way: Floats, velocity: float, limits: Floats
+) -> float:
+    """Largest acceleration of a path's parameter that keeps the torques within their share [rad/s^2].
+
+    Args:
+        dynamics: Inverse dynamics with the declared payload.
+        path: Path of the motion.
+        start: Parameter at the first point to check, shape (m,) [rad].
+        way: Difference from there to the last point to check, shape (m,) [rad].
+        velocity: Largest velocity on this part [rad/s].
+        limits: Torque limits of the joints, shape (n,) [N m].
+    """
+    resting, pushed = _on_way(dynamics, path, start, way, velocity, math.inf)
+    room = float(((TORQUE_SHARE * limits - resting) / np.maximum(pushed, 1e-9)).min())
+    return max(room, 0.0)
+
+
+def _on_way(
+    dynamics: InverseDynamics, path: Path, start: Floats, way: Floats, velocity: float, acceleration: float
+) -> tuple[Floats, Floats]:
+    """Torques at points of a path, shape (k, n): at rest or speed [N m], and per unit of acceleration."""
+    farthest, x = float(np.abs(way).max()), start + _POINTS * way
+    still = np.zeros_like(x)
+    along = still + (way / farthest if farthest > 0.0 else 0.0)
+    speed = min(velocity, math.sqrt(acceleration * farthest)) * along
+    gravity = dynamics.gravities(path.states(x, still, still)[0])
+    resting = np.maximum(np.abs(gravity), np.abs(dynamics.torques(*path.states(x, speed, still))))
+    return resting, np.abs(dynamics.torques(*path.states(x, still, along)) - gravity)
+
+
+def torque_along(dynamics: InverseDynamics, references: Floats, period: float) -> Floats:
+    """Largest torques along known references, by central differences, shape (n,) [N m].
+
+    Every `LOOK_EVERY`th reference is checked, and the last one.
+
+    Args:
+        dynamics: Inverse dynamics with the declared payload.
+        references: References, one for each tick, shape (k, n) [rad], k >= 3.
+        period: Tick [s].
+    """
+    q, qd, qdd = central_differences(references, period)
+    looked = np.append(np.arange(0, len(q) - 1, LOOK_EVERY), len(q) - 1)
+    states = zip(q[looked], qd[looked], qdd[looked], strict=True)
+    most: Floats = np.max([dynamics.effort(*state) for state in states], axis=0)
+    return most

@@ -1,0 +1,140 @@
+"""The filter on the control line, and the transition from one filter to the next."""
+
+import copy
+from typing import Self
+
+import numpy as np
+
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.trajectory import MotionLimits
+from tvist_shaping.base import Filter, Posture
+from tvist_shaping.fade import Fade
+
+
+class LineFilter:
+    """Shapes with the latest chosen filter; during motion, the previous one fades into it.
+
+    Args:
+        tvist: The first filter.
+        arm: Limits that suit every joint of the arm.
+    """
+
+    def __init__(self, tvist: Filter, arm: MotionLimits) -> None:
+        self.tvist = tvist
+        """The latest chosen filter: in use, or about to be."""
+        self._arm = arm
+        self.limits = arm
+        """Limits of the current motion."""
+        self._fade: Fade | None = None
+
+    @property
+    def fading(self) -> bool:
+        """Whether one filter is fading into another."""
+        return self._fade is not None
+
+    @property
+    def settled(self) -> bool:
+        """Whether the filters' future output is constant once the output equals the reference.
+
+        If weights are negative, echoes may cancel each other for a moment.
+        """
+        return self._fade is None and (self.tvist.peak == 1.0 or self.tvist.settled)
+
+    @property
+    def fault(self) -> str | None:
+        """Name of a shaper that could compute no weights at the last tick, with the reason; None if there is none."""
+        fade = self._fade
+        filters = (self.tvist,) if fade is None else (self.tvist, fade.old, fade.new)
+        return next((f"shaper {one.name} {one.fault}" for one in filters if one.fault is not None), None)
+
+    @property
+    def peak(self) -> float:
+        """Factor by which the shaped acceleration may exceed the reference's, see `Filter.peak`."""
+        fade = self._fade
+        return self.tvist.peak if fade is None else max(self.tvist.peak, fade.old.peak, fade.new.peak)
+
+    def spared(self, limits: MotionLimits | None = None) -> MotionLimits:
+        """Return the limits of a reference whose shaped reference keeps these limits and those of the arm.
+
+        Args:
+            limits: The limits; None for those of the arm.
+        """
+        arm, (faster, harder) = self._arm, (1.0 + more for more in self.tvist.surplus)
+        limits = arm if limits is None else limits
+        return MotionLimits(
+            min(limits.velocity, arm.velocity / faster),
+            min(limits.acceleration, arm.acceleration / harder),
+            limits.jerk,
+        )
+
+    def filter(self, reference: Floats) -> Floats:
+        """Return the shaped sample, in a transition between two filters if there is one."""
+        fade = self._fade
+        if fade is None:
+            return self.tvist.filter(reference)
+        shaped = fade.filter(reference)
+        if (
+            fade.new is not self.tvist
+        ):  # it waits for the present transition to end, and must know the references
+            self.tvist.filter(reference)
+        if fade.finished:
+            self._fade = None if fade.new is self.tvist else self._fade_to(fade.new, self.tvist)
+        return shaped
+
+    def use(self, tvist: Filter) -> None:
+        """Change the filter within the limits of the motion.
+
+        If a transition is under way, the new filter waits until that is complete; only the latest waiting filter is
+        kept.
+
+        Args:
+            tvist: New filter, with the joints and the period of the present one. It continues on the present path.
+        """
+        fade = self._fade
+        if fade is None or fade.share == 0.0:
+            self._fade = self._fade_to(self.tvist if fade is None else fade.old, tvist)
+        else:
+            tvist.take_over(self.tvist)
+        self.tvist = tvist
+
+    def cut(self) -> None:
+        """Prepare for a bypass: drop the transition; the next use of the filter begins from rest."""
+        self._fade = None
+
+    def begin(self, tvist: Filter, sample: Floats, posture_of: Posture | None = None) -> None:
+        """Use a filter from rest.
+
+        Args:
+            tvist: The filter.
+            sample: Reference at rest: joint positions, shape (n,), or a path's parameter, shape (m,) [rad].
+            posture_of: Converts a path's parameter to joint positions; None if samples are joint positions.
+        """
+        self.tvist, self._fade = tvist, None
+        tvist.reset(sample, posture_of)
+
+    def fork(self) -> Self:
+        """Return an independent copy of the present state."""
+        other, fade = copy.copy(self), self._fade
+        if fade is None:
+            other.tvist = self.tvist.fork()
+        else:
+            other._fade = fade.fork()  # noqa: SLF001  one of its own kind
+            waits = fade.new is not self.tvist
+            other.tvist = self.tvist.fork() if waits else other._fade.new  # noqa: SLF001  likewise
+        return other
+
+    def rehearse(self, q: Floats) -> None:
+        """Filter a sample through a transition and undo it, since the first time loads compiled code for many ticks."""
+        self._fade = self._fade_to(self.tvist.fork(), self.tvist)
+        for _ in range(3):
+            self.filter(q)
+        self.begin(self.tvist, q)
+
+    def window(self) -> Floats:
+        """Samples that the filters may still use, the oldest first, shape (k, m) [rad]."""
+        filters = [self.tvist] if self._fade is None else [self._fade.old, self._fade.new, self.tvist]
+        return np.concatenate([tvist.window() for tvist in filters])
+
+    def _fade_to(self, old: Filter, new: Filter) -> Fade:
+        limits = self.limits
+        return Fade(old, new, velocity=limits.velocity, acceleration=limits.acceleration, jerk=limits.jerk)

@@ -1,0 +1,39 @@
+"""What the control line computes in a tick."""
+
+from msgspec import Struct
+
+from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.line.drive_feed_forward import MotorReference
+from tvist_controller.line.guard import Obstacle
+from tvist_controller.line.line_mode import LineMode
+from tvist_controller.line.line_tick import TORQUE
+from tvist_plant.plant import Measurement
+
+
+class Sample(Struct, frozen=True, eq=False, gc=False):
+    """Signals along the control line in one tick."""
+
+    mode: LineMode
+    """What the line did."""
+    reference: Floats
+    """q before shaping, shape (n,) [rad]."""
+    window: tuple[Floats, Floats, Floats]
+    """The last three shaped references, the newest last, each of shape (n,) [rad]."""
+    target: Target
+    """q* and its derivatives at the previous tick, since central differences cost one tick of delay."""
+    signals: Floats
+    """All signals before the arm, shape (9, n), see `line_tick`."""
+    fed_forward: Floats
+    """Torque with rotors and friction, as the drives receive it, shape (n,) [N m]."""
+    measured: Measurement
+    """Measurement of the arm."""
+    motors: MotorReference | None = None
+    """Motion of the motors that elastic feed-forward asks for; None without it."""
+    refused: Obstacle | None = None
+    """Why a reference was not played, so that a stop was made instead; None if it was played."""
+
+    @property
+    def torque(self) -> Floats:
+        """τ* of the rigid arm for the target, shape (n,) [N m]."""
+        torque: Floats = self.signals[TORQUE]
+        return torque

@@ -1,0 +1,80 @@
+"""The shaped reference: the filter's samples, the joint positions that they stand for, and their derivatives."""
+
+import copy
+from typing import Self
+
+from tvist_controller.line.differentiator import Differentiator, Floats, Target
+from tvist_shaping.base import Posture
+
+
+class ShapedReference:
+    """Converts samples of the filter into targets.
+
+    Samples are joint positions, or the parameter of a path on which the joints have to stay.
+
+    Args:
+        q: Joint positions at rest to start from, shape (n,) [rad].
+        period: Tick [s].
+    """
+
+    def __init__(self, q: Floats, period: float) -> None:
+        self._period = period
+        self.joints = Differentiator(q, period)
+        """State of motion of the joints."""
+        self.reset(q)
+
+    def reset(self, q: Floats) -> None:
+        """Restart at rest; from now on samples are joint positions."""
+        self.joints.reset(q)
+        self.enter(None, q)
+
+    def enter(self, posture_of: Posture | None, sample: Floats) -> None:
+        """Accept samples of another kind from now on; the joints continue from their present position.
+
+        Args:
+            posture_of: Converts samples to joint positions; None if they are joint positions.
+            sample: Initial value of the samples, at rest, shape (m,) [rad].
+        """
+        self.posture_of = posture_of
+        """Converts samples to joint positions; None if they are joint positions."""
+        self.along = self.joints if posture_of is None else Differentiator(sample, self._period)
+        """State of motion of the samples; without a path it is that of the joints."""
+
+    @property
+    def position(self) -> Floats:
+        """The newest joint positions, shape (n,) [rad]."""
+        return self.joints.position
+
+    @property
+    def newest(self) -> Target:
+        """State of motion of the joints there, see `Differentiator.newest`."""
+        return self.joints.newest
+
+    def posture(self, sample: Floats) -> Floats:
+        """Return the joint positions that a sample stands for, shape (n,) [rad]."""
+        return sample if self.posture_of is None else self.posture_of(sample)
+
+    def push(self, sample: Floats, posture: Floats | None = None) -> None:
+        """Take the sample of this tick.
+
+        Args:
+            sample: Sample, shape (m,) or (n,) [rad].
+            posture: The joint positions that it stands for, if they are known, shape (n,) [rad].
+        """
+        if self.posture_of is None:
+            self.joints.push(sample)
+            return
+        self.along.push(sample)
+        self.joints.push(self.posture_of(sample) if posture is None else posture)
+
+    def update(self, sample: Floats, posture: Floats | None = None) -> Target:
+        """Take the sample of this tick, as `push` does, and return the target of the previous tick."""
+        self.push(sample, posture)
+        return self.joints.published
+
+    def fork(self) -> Self:
+        """Return an independent copy of the present state."""
+        other = copy.copy(self)
+        other.joints = self.joints.fork()
+        other.along = other.joints if self.posture_of is None else self.along.fork()
+        return other

@@ -1,0 +1,131 @@
+"""Whole motions in one go: since nothing on the line depends on the arm, each box computes all its ticks at once.
+
+The boxes are those of `ControlCycle`, and the results are equal to those of its ticks to the last bit.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.line.line_tick import all_to_drives
+from tvist_controller.line.rehearsal import Still
+from tvist_controller.trajectory import Trajectory
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.drives import DriveCommand
+from tvist_plant.plant import PERIOD, Placeable, Playable, Response, played
+from tvist_shaping.base import Filter
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What the drives get in T ticks."""
+
+    rest: DriveCommand
+    """Command under which the arm rests before them."""
+    targets: Floats
+    """q*, q̇* and q̈* of each tick, shape (T, 3, n) [rad, rad/s, rad/s^2]."""
+    commands: Floats
+    """Positions, velocities and torques of each command, shape (T, 3, n)."""
+    delay: float
+    """Time by which commands are later than their targets [s]."""
+
+
+class Player(Trajectory):
+    """A reference that is completely known.
+
+    Args:
+        q: Its samples, shape (T, n) [rad].
+    """
+
+    def __init__(self, q: Floats) -> None:
+        self._q, self._next = q, 0
+
+    def next(self) -> Floats:
+        """Return the next sample; after the last one, return that again."""
+        q: Floats = self._q[min(self._next, len(self._q) - 1)]
+        self._next += 1
+        return q
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last sample was returned."""
+        return self._next >= len(self._q)
+
+
+class DrivenLine:
+    """The control line from the shaped reference to the drives, without an arm.
+
+    Args:
+        description: The controller's model of the arm.
+        passes: Filter that returns its input.
+        start: Joint angles, shape (n,) [rad].
+        declared: Declared payload.
+    """
+
+    def __init__(
+        self, description: RobotDescription, passes: Filter, start: Floats, declared: Payload
+    ) -> None:
+        self._drives = Still(description.joints)
+        self._cycle = ControlCycle(
+            description, passes, q=start, declared=declared, carried=declared, seed=0, plant=self._drives
+        )
+
+    def drive(
+        self,
+        start: Floats,
+        shaped: Floats,
+        ticks: int,
+        resting: int = 0,
+        elastic: ElasticFeedForward | None = None,
+    ) -> Driven:
+        """Compute what the drives get while a shaped reference runs, from rest.
+
+        Args:
+            start: Joint angles at rest, shape (n,) [rad].
+            shaped: Shaped reference, shape (k, n) [rad].
+            ticks: Number of ticks T.
+            resting: Number of ticks before the first sample.
+            elastic: Elastic feed-forward for the drives; None for that of the paper's controller.
+        """
+        cycle = self._cycle
+        cycle.use(cycle.line.filter.tvist, elastic)
+        cycle.reset(start)
+        rest, delay = self._drives.last, cycle.line.drives.delay
+        if elastic is not None:
+            return Driven(rest, *self._tick_by_tick(shaped, ticks, resting), delay)
+        whole = np.empty((ticks, len(start)))
+        whole[:resting], whole[resting:] = start, shaped[-1]
+        moving = min(len(shaped), ticks - resting)
+        whole[resting : resting + moving] = shaped[:moving]
+        targets, commands = np.empty((2, ticks, 3, len(start)))
+        all_to_drives(start, whole, PERIOD, *cycle.line.kernel_parts, targets, commands)
+        return Driven(rest, targets, commands, delay)
+
+    def _tick_by_tick(self, shaped: Floats, ticks: int, resting: int) -> tuple[Floats, Floats]:
+        targets, commands = np.empty((2, ticks, 3, shaped.shape[1]))
+        for tick in range(ticks):
+            if tick == resting:
+                self._cycle.begin(Player(shaped))
+            target, command = self._cycle.step().target, self._drives.last
+            targets[tick] = target.q, target.qd, target.qdd
+            commands[tick] = command.q, command.qd, command.torque
+        return targets, commands
+
+
+def respond(plant: Placeable, driven: Driven, seed: int) -> Response:
+    """Let a plant follow what its drives get, from rest.
+
+    Args:
+        plant: The plant; it must provide the truth.
+        driven: What its drives get.
+        seed: Seed of its random effects.
+
+    Raises:
+        PlantError: The state is no longer finite.
+        ValueError: The plant does not provide the truth.
+    """
+    plant.reset(driven.rest, seed=seed)
+    return plant.play(driven.commands) if isinstance(plant, Playable) else played(plant, driven.commands)

@@ -1,0 +1,321 @@
+"""The robot's activities: motions by number, streams of set-points, stops, power and protective stops.
+
+`tvist_protocol.transitions` defines which trigger leads to which activity; this module carries the transitions out.
+"""
+
+from typing import Unpack
+
+import numpy as np
+
+from tvist_controller.commands.events import Emit, Told
+from tvist_controller.commands.refusal import RefusalError, out_of_turn
+from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.foresight.rest_of_motion import WayAhead
+from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.foresight.stops import StopPlan
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.limits import StreamTorqueRoom
+from tvist_controller.line.line_mode import LineMode
+from tvist_controller.line.sample import Sample
+from tvist_controller.motion.activities import PUT, runtime_of
+from tvist_controller.motion.arm_power import ArmPower
+from tvist_controller.motion.motion_numbers import Motions
+from tvist_controller.motion.safety_system import SafetySystem
+from tvist_controller.motion.streaming import Streaming
+from tvist_controller.planning.basis import FilterBasis, MotionBasis
+from tvist_controller.planning.move_planner import PlannedMove
+from tvist_controller.trajectory import MotionLimits, SetpointStream
+from tvist_plant.plant import PERIOD
+from tvist_protocol.modes import RuntimeState, SafetyMode
+from tvist_protocol.replies import Code
+from tvist_protocol.stream import EventKind
+from tvist_protocol.transitions import Activity, after
+from tvist_protocol.values import ResetMode
+
+
+class MotionControl:
+    """Starts, monitors and ends motion on the control line. Each motion's number ends in either done or stopped.
+
+    Args:
+        cycle: The control line.
+        collisions: Collision model of the arm.
+        emit: Emits events.
+        mode: Initial robot mode.
+    """
+
+    def __init__(
+        self, cycle: ControlCycle, collisions: CollisionModel, emit: Emit, mode: ResetMode = "RUNNING"
+    ) -> None:
+        self.cycle = cycle
+        self.collisions = collisions
+        self.changed = True
+        """Whether the activity may have changed since somebody has set this to False."""
+        self.activity = PUT[mode]
+        self.safety = SafetySystem()
+        """The safety system."""
+        self._emit = emit
+        self.outlook = Outlook(cycle)
+        """Forecast of the control line's motion."""
+        self.ahead = WayAhead(cycle, self.outlook, collisions)
+        """Collision check of that motion."""
+        self.power = ArmPower.of(cycle.line.plant)
+        """Power of an arm that has one."""
+        self.motions = Motions(cycle, self.safety, emit)
+        """Motions by number, and their speed."""
+        self.ahead.coming = lambda: self.motions.coming
+        self.streams = Streaming()
+        """The present stream of set-points, if there is one."""
+        self.tcp: tuple[float, ...] = (0.0,) * 6
+        """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
+
+    @property
+    def activity(self) -> Activity:
+        """Present activity of the robot."""
+        return self._activity
+
+    @activity.setter
+    def activity(self, activity: Activity) -> None:
+        # What every tick asks is looked up once.
+        self._activity, self._moving, self.robot_mode = activity, activity.moving, activity.robot_mode
+        self.may_move = after(activity, "move_j") is not None
+        """Whether a point-to-point motion may begin in the present activity."""
+        self.changed = True
+
+    def set_tcp(self, offset: tuple[float, ...]) -> None:
+        """Set the tool centre point for the motions that begin from now on; see `tcp`."""
+        self.tcp = offset
+
+    @property
+    def streaming(self) -> bool:
+        """Whether the robot follows a stream of set-points."""
+        return self.streams.stream is not None
+
+    def basis(self, on: FilterBasis) -> MotionBasis | None:
+        """What a point-to-point motion from here depends on; None if the arm is busy or without power.
+
+        Args:
+            on: Basis of the present filter.
+        """
+        if not self.may_move:
+            return None
+        cycle = self.cycle
+        return MotionBasis(
+            q=cycle.sample.reference,
+            speed=self.motions.wanted_speed,
+            slowest=self.motions.slowest,
+            excess=cycle.line.filter.tvist.excess,
+            surplus=cycle.line.filter.tvist.surplus,
+            tcp=self.tcp,
+            carried=self.collisions.carried,
+            bodies=cycle.line.dynamics.bodies,
+            filter=on,
+        )
+
+    def move(self, planned: PlannedMove, trigger: str = "move_j") -> int:
+        """Start a motion whose plan holds for the present state; return its number.
+
+        Args:
+            planned: The plan.
+            trigger: `type` of the command that it carries out.
+
+        Raises:
+            RefusalError: See `check`.
+        """
+        self.go(trigger)
+        return self.motions.begin(planned)
+
+    def pause(self) -> None:
+        """Bring the motion to a standstill on its path; one that is about to end continues to its end.
+
+        Raises:
+            RefusalError: No motion is running.
+        """
+        self.go("pause")
+        self.motions.hold()
+
+    def resume(self) -> None:
+        """Resume a paused motion.
+
+        Raises:
+            RefusalError: No motion is paused.
+        """
+        self.go("resume")
+        self.motions.release()
+
+    @property
+    def runtime(self) -> RuntimeState:
+        """Whether something moves."""
+        return runtime_of(self.activity, slowing=self.motions.speed > 0.0 and not self.cycle.mode.at_rest)
+
+    @property
+    def safety_mode(self) -> SafetyMode:
+        """Present safety mode."""
+        return self.safety.mode(self.activity)
+
+    @property
+    def ready(self) -> bool:
+        """Whether the drives hold the arm; simulated arms are always ready."""
+        return self.power is None or self.power.condition.ready
+
+    def protect(self, why: str, code: Code | None = None) -> None:
+        """Make a protective stop; do nothing if the brakes hold the arm or its power is being switched off."""
+        if after(self.activity, "protective_stop") is not None:
+            self.end("protective_stop", why, code, kind="protective_stop")
+
+    def check(self, trigger: str) -> Activity:
+        """Return the activity that a trigger leads to.
+
+        Raises:
+            RefusalError: The trigger is not allowed in the present activity.
+        """
+        target = after(self.activity, trigger)
+        if target is None:
+            raise out_of_turn(trigger, self.activity)
+        self.safety.check(trigger, self.activity)
+        if target.moving and not (self._moving or self.ready):
+            raise RefusalError(
+                "wrong_mode", "", "the drives of the arm are not ready: wait until they hold it"
+            )
+        return target
+
+    def go(self, trigger: str) -> None:
+        """Carry out the transition of a trigger that `check` accepts."""
+        self.activity = self.check(trigger)
+
+    def follow(self, period: float, limits: MotionLimits, now: float) -> None:
+        """Start to follow set-points.
+
+        Raises:
+            RefusalError: The arm is busy, or the velocity limit is above that of reduced speed.
+        """
+        target = self.check("servo_start")
+        if (most := self.motions.slowest) is not None and limits.velocity > most:
+            why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which allows {most:.3g}"
+            raise RefusalError("limit_velocity", "velocity", why, most)
+        self.activity = target
+        self.streams.begin(self._stream(period, limits), now)
+
+    def _stream(self, period: float, limits: MotionLimits) -> SetpointStream:
+        """Let the line follow set-points, which come every `period` seconds, from rest."""
+        cycle, line = self.cycle, self.cycle.line
+        line.filter.tvist.aim(None)
+        stream = SetpointStream(
+            cycle.sample.reference,
+            period,
+            line.filter.spared(limits),
+            PERIOD,
+            reach=np.array(cycle.description.limits.position),
+            torque=StreamTorqueRoom(cycle.description, line.dynamics),
+        )
+        return cycle.begin(stream, LineMode.GUARDED, self.ahead.guard_of_stream())
+
+    def end_stream(self) -> None:
+        """Bring the stream to rest through the filter.
+
+        Raises:
+            RefusalError: No stream is running.
+        """
+        stream = self.streams.stream
+        if stream is None:
+            raise out_of_turn("servo_stop", self.activity)
+        end = stream.end
+        met = self.ahead.after_stream(end)
+        if met is not None:
+            self.interrupt(f"{met} before the stream came to rest through the filter", "collision")
+            return
+        self.go("servo_stop")
+        self.cycle.begin(end, LineMode.GUARDED)
+        self._end_stream("servo_stop")
+
+    def stop(self, deceleration: float | None, why: str, code: Code | None = None) -> None:
+        """Stop without the filter, and report how the present motion ended.
+
+        Args:
+            deceleration: Requested limit [rad/s^2]; None for what the torque permits.
+            why: The reason, for people.
+            code: The reason, for programs.
+        """
+        self.end("stop", why, code, deceleration)
+
+    def interrupt(self, why: str, code: Code | None = None) -> None:
+        """End motion that may not continue, in the same way as `stop`."""
+        self.end("interruption", why, code)
+
+    def end(
+        self,
+        trigger: str,
+        why: str,
+        code: Code | None = None,
+        deceleration: float | None = None,
+        *,
+        kind: EventKind | None = None,
+        category: int = 2,
+    ) -> None:
+        """Carry out a trigger's transition, and stop any motion. Nothing happens if the trigger leads nowhere.
+
+        Args:
+            trigger: Trigger of the table of transitions.
+            why: The reason, for people.
+            code: The reason, for programs.
+            deceleration: Requested limit [rad/s^2]; None for what the torque permits.
+            kind: Kind of the event that reports the stop; None for no event.
+            category: Category of the stop.
+        """
+        target = after(self.activity, trigger)
+        if target is None:
+            return
+        self.activity = target
+        plan = None if self.cycle.mode.at_rest else self.outlook.stop(deceleration)
+        if plan is not None and plan.limited:
+            kept = "the motion's own" if plan.acceleration is None else f"{plan.acceleration:.3g} rad/s²"
+            why = f"{why}; deceleration is {kept}, limited from {deceleration:.3g}"
+        bare = not self.motions.running  # the end of a numbered motion reports the limit itself
+        self.tell_end(plan, why, code, kind, category)
+        if bare and plan is not None and plan.limited:
+            self._emit("warning", code="limit_acceleration", why=why)
+
+    def tell_end(
+        self, plan: StopPlan | None, why: str, code: Code | None, kind: EventKind | None, category: int
+    ) -> None:
+        """Report a stop and what it has ended."""
+        if kind is None and not self.motions.running and not self.streaming:
+            return
+        duration, way = (0.0, 0.0) if self.cycle.mode.at_rest else self.ahead.until_rest(plan)
+        told = Told(category=category, duration=duration, way=way)
+        if kind is not None:
+            self._emit(kind, code=code, why=why, **told)
+        self._end_stream(why, code, **told)
+        self.motions.stopped(why, code, **told)
+
+    def abandon(self, why: str, code: Code | None = None) -> None:
+        """Report that the present motion ended because the arm is placed elsewhere."""
+        self._end_stream(why, code)
+        self.motions.stopped(why, code)
+
+    def watch(self, now: float) -> None:
+        """End a stream that is no longer fed."""
+        silence = self.streams.silence(now)
+        if silence is not None:
+            self.interrupt(silence)
+
+    def step(self) -> Sample:
+        """Compute one tick of the line.
+
+        Raises:
+            PlantError: The arm's state is no longer finite; call `recover`.
+        """
+        if self.power is not None:
+            self.power.follow(self.robot_mode)
+        sample = self.cycle.step()
+        if sample.refused is not None and self.activity is not Activity.STOPPING:
+            self.end("interruption", *sample.refused)
+        if self._moving and self.cycle.mode.at_rest and (target := after(self.activity, "at_rest")):
+            goes_on = self.activity is Activity.MOVING and self.motions.go_on()
+            if not goes_on:
+                self.activity = target
+                self.motions.done()
+        return sample
+
+    def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:
+        if self.streams.end():
+            self._emit("stream_stopped", code=code, why=why, **told)

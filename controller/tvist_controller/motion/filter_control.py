@@ -1,0 +1,147 @@
+"""The control line's filter and the source of its modes: changes and supervision."""
+
+from typing import ClassVar
+
+from tvist_controller.calibrations import fits
+from tvist_controller.commands.events import Emit
+from tvist_controller.line.line_mode import LineMode
+from tvist_controller.line.sample import Sample
+from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.planning.basis import FilterBasis
+from tvist_controller.planning.command_row import Call, Row
+from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
+from tvist_controller.planning.plan import Planning
+from tvist_controller.sources.mode_source import ModeSource
+from tvist_protocol.commands import SetEstimator, SetShaper
+from tvist_protocol.values import Payload
+from tvist_shaping.base import Filter
+
+
+class Filters:
+    """The control line's filter.
+
+    Args:
+        motion: The robot's motion, which a new filter must not spoil; it contains the control line.
+        source: Source of the modes of the line's first filter.
+        declared: Declared payload.
+        emit: Emits events.
+    """
+
+    def __init__(self, motion: MotionControl, source: ModeSource, declared: Payload, emit: Emit) -> None:
+        self._motion, self._cycle, self._emit = motion, motion.cycle, emit
+        self._declared, self._clipped, self._limited = declared, False, False
+        self.source = source
+        """Source of the filter's modes."""
+        self._warn_of_payload()
+        self._warn_of_arm()
+
+    @property
+    def basis(self) -> FilterBasis:
+        """The present state that a new filter depends on."""
+        tvist = self._cycle.line.filter.tvist
+        return FilterBasis(tvist.name, tvist.estimator.modes, self.source, self._declared)
+
+    def use(self, chosen: PlannedFilter) -> None:
+        """Shape with a filter from now on."""
+        before, idle = self.source, self._idle
+        self.source, tvist = chosen.source, chosen.tvist
+        self._cycle.use(tvist, chosen.elastic)
+        self._motion.motions.keep_rate()
+        self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
+        if self.source is not before:
+            self._warn_of_arm()
+        if idle:
+            self._warn_of_payload()
+
+    def _choose(self, call: Call[SetShaper] | Call[SetEstimator]) -> None:
+        chosen: PlannedFilter = call.planned()
+        self._motion.ahead.check_filter(chosen.tvist)
+        self.use(chosen)
+
+    def _estimate(self, call: Call[SetEstimator]) -> None:
+        self._choose(call)
+        self._warn_of_payload()
+
+    def declare(self, payload: Payload, tvist: Filter | None) -> None:
+        """Take another payload into account, which may change the arm's modes.
+
+        Args:
+            payload: Declared payload.
+            tvist: Filter for it; None if its modes are not known to differ.
+        """
+        self._declared = payload
+        if tvist is not None:
+            self._cycle.use(tvist, self._cycle.line.drives.wanted)
+            self._motion.motions.keep_rate()
+        self._warn_of_payload()
+
+    @property
+    def _idle(self) -> bool:
+        """True if there is no shaper, so that the modes do not matter."""
+        return self._cycle.line.filter.tvist.name == "none"
+
+    def _warn_of_payload(self) -> None:
+        """Warn if a shaper uses modes that belong to another payload."""
+        declared = self._declared
+        calibration = self.source.calibration
+        if not self._idle and calibration is not None and not fits(calibration, declared, self.source.name):
+            self._emit(
+                "warning",
+                code="payload_mismatch",
+                why=f"calibration {calibration.name!r} was made with "
+                f"{calibration.payload.mass:g} kg; {declared.mass:g} kg is declared: "
+                "the shaper's frequencies will be wrong. Take a modal calibration, which knows any payload, or "
+                "identify the arm with this one",
+            )
+
+    def _warn_of_arm(self) -> None:
+        """Warn if the modes belong to another arm of the same model."""
+        calibration = self.source.calibration
+        if calibration is not None and self.source.fits_arm is False:
+            why = (
+                f"calibration {calibration.name!r} was measured on a different arm than the one in the robot file: "
+                "the shaper's frequencies will be wrong; measure this arm with tvist identify"
+            )
+            self._emit("warning", why=why)
+
+    def watch(self, sample: Sample) -> None:
+        """Warn when the filter or its feed-forward cannot work as intended; once, until it works again.
+
+        Args:
+            sample: Signals of the latest tick.
+        """
+        clipped = self._cycle.line.filter.tvist.clipped
+        if clipped and not self._clipped:
+            name = self._cycle.line.filter.tvist.name
+            why = (
+                f"{name} cannot meet its specification here: it needs a longer delay line, or leaves more vibration. "
+                "Choose another shaper for these poses, or a pose in which the arm is stiffer"
+            )
+            self._emit("warning", code="out_of_range", why=why)
+        self._clipped = clipped
+        limited = sample.motors is not None and sample.motors.limited
+        if limited and not self._limited and self._cycle.mode not in {LineMode.STOPPING, LineMode.REST}:
+            why = (
+                "the torque limits keep the motors from leading enough: the arm will vibrate more after this motion. "
+                "Move with less acceleration, or choose a shaper without feed-forward, such as auto"
+            )
+            self._emit("warning", code="limit_torque", why=why)
+            self._limited = True
+        self._limited = self._limited and not self._cycle.mode.at_rest
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(
+            SetShaper,
+            _choose,
+            plan=Planning(
+                "filter",
+                FilterPlanner,
+                lambda planner, command, on: planner.choose(
+                    command.name, command.modes, on.source, on.declared, "name"
+                ),
+            ),
+        ),
+        Row(
+            SetEstimator, _estimate, plan=Planning("filter", FilterPlanner, FilterPlanner.estimate), long=True
+        ),
+    )

@@ -1,0 +1,122 @@
+"""A planned motion in progress: its parts, its rate and its pause."""
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.differentiator import STILL
+from tvist_controller.line.limits import acceleration_on_way, rate_of
+from tvist_controller.planning.move_planner import PlannedMove
+from tvist_controller.trajectory import PlannedMotion
+
+PAUSE_SHARE = 0.95
+"""Share of the acceleration permitted by the torque that a pause uses, since the filter may add a little [-]."""
+LEAST_PAUSE = 0.2
+"""Smallest share of a motion's acceleration that the torque must permit for a pause; else the motion runs on [-]."""
+
+
+class RunningMotion(Protocol):
+    """A motion in progress, whose speed can be changed."""
+
+    @property
+    def rate(self) -> float:
+        """Rate of its time [-]."""
+
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Change its speed.
+
+        Args:
+            speed: Programmed speed fraction [-].
+            slowest: Velocity limit of reduced speed [rad/s]; None if the speed is not reduced.
+        """
+
+
+class RunningMove:
+    """One planned motion.
+
+    Args:
+        planned: Its plan, whose first part begins now.
+        cycle: The control line.
+    """
+
+    def __init__(self, planned: PlannedMove, cycle: ControlCycle) -> None:
+        self._velocity, self._cycle = planned.velocity, cycle
+        self._window, self._peak = planned.window, planned.peak
+        self._room, self._surplus = planned.room, planned.surplus
+        self._held = False
+        self._parts = len(planned.parts)
+        self._trajectory, *coming = planned.parts
+        self.coming: tuple[PlannedMotion, ...] = tuple(coming)
+        """Parts that have not begun."""
+        self._begin()
+
+    def go_on(self, speed: float, slowest: float | None) -> None:
+        """Begin the next part; see `RunningMotion` for the arguments."""
+        self._trajectory, *coming = self.coming
+        self.coming, self._held = tuple(coming), False
+        self._trajectory.speed = self._rate(speed, slowest)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._cycle.begin(self._trajectory)
+        self._cycle.line.filter.tvist.aim(self._trajectory.path.end, quiet=self._trajectory.quiet)
+
+    def _rate(self, speed: float, slowest: float | None) -> float:
+        """Rate of its time [-]: lower if it was planned for a shaper that is less slow, peaked or uneven."""
+        tvist = self._cycle.line.filter.tvist
+        room = min(_fitting(self._window, tvist.delay), _fitting(self._peak, tvist.peak))
+        if tvist.surplus != self._surplus:
+            (velocity, acceleration), (more_velocity, more_acceleration) = self._room, tvist.surplus
+            room = min(
+                room, velocity / (1.0 + more_velocity), math.sqrt(acceleration / (1.0 + more_acceleration))
+            )
+        return min(rate_of(speed, self._velocity, slowest), room)
+
+    @property
+    def progress(self) -> tuple[int, float] | None:
+        """Number of its present part, from 0, and the length covered on it [m]; None on a part without length."""
+        if self._trajectory.path.posture_of is None:
+            return None
+        return self._parts - 1 - len(self.coming), float(self._cycle.line.shaped.along.newest.q[0])
+
+    @property
+    def rate(self) -> float:
+        """Rate of its time [-]."""
+        return self._trajectory.rate
+
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Change the rate, unless the motion is paused; see `RunningMotion`."""
+        if not self._held:
+            self._trajectory.speed = self._rate(speed, slowest)
+
+    def hold(self) -> None:
+        """Slow down to a standstill within the torque limits, if that takes less time; see `PlannedMotion.hold`."""
+        if self._held or self._cycle.mode.at_rest:  # at rest, it is between two parts
+            return
+        trajectory, cycle = self._trajectory, self._cycle
+        most = trajectory.agility.acceleration
+        newest = cycle.line.shaped.along.newest
+        speed = max(trajectory.velocity, float(np.abs(newest.qd).max()))
+        left = trajectory.path.end - newest.q
+        farthest = float(np.abs(left).max())
+        way = left * min(speed * speed / (most * max(farthest, STILL)), 1.0)
+        limits = np.array(cycle.description.limits.torque)
+        room = PAUSE_SHARE * acceleration_on_way(
+            cycle.line.dynamics, trajectory.path, newest.q, way, speed, limits
+        )
+        if not trajectory.steady:  # the slider is changing its speed already, and may use all
+            room = most
+        self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))
+
+    def release(self, speed: float, slowest: float | None) -> None:
+        """Resume after a pause; see `RunningMotion`."""
+        if self._held:
+            self._trajectory.release(self._rate(speed, slowest))
+        self._held = False
+
+
+def _fitting(planned: float, present: float) -> float:
+    """Rate at which a property of the shaper is no larger than planned [-]."""
+    return 1.0 if present <= planned else planned / present

@@ -1,0 +1,91 @@
+"""State of the safety system: inputs that restrict motion, and faults that are latched until a restart."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from tvist_controller.commands.refusal import RefusalError
+from tvist_protocol.modes import SafetyMode
+from tvist_protocol.transitions import TRANSITIONS, Activity
+
+Emergency = Literal["robot", "system"]
+Latched = Literal["violation", "fault"]
+
+_EMERGENCIES = {
+    "robot": SafetyMode.ROBOT_EMERGENCY_STOP,
+    "system": SafetyMode.SYSTEM_EMERGENCY_STOP,
+}
+_LATCHED = {"violation": SafetyMode.VIOLATION, "fault": SafetyMode.FAULT}
+_MOTION = frozenset(
+    row.trigger for row in TRANSITIONS if row.target in {Activity.MOVING, Activity.STREAMING, Activity.GUIDED}
+)
+"""Triggers that let the arm move: the table of transitions says where each leads."""
+_LIVE = _MOTION | frozenset(
+    row.trigger
+    for row in TRANSITIONS
+    if row.target in {Activity.IDLE, Activity.REST} and row.trigger != "at_rest"
+)
+"""Triggers after which the arm has power, or moves."""
+
+
+@dataclass
+class SafetySystem:
+    """Inputs and latched faults. Each is independent of the robot's activity."""
+
+    reduced: bool = False
+    """Whether the speed is reduced."""
+    safeguard: bool = False
+    """Whether a safeguard requests a stop."""
+    emergencies: set[Emergency] = field(default_factory=set)
+    """Emergency stops that are pressed."""
+    latched: Latched | None = None
+    """Fault or violation that is latched until a restart."""
+
+    def mode(self, activity: Activity) -> SafetyMode:
+        """Return the most severe of the present conditions, as RTDE's safety mode.
+
+        Args:
+            activity: Present activity of the robot.
+        """
+        if self.latched is not None:
+            return _LATCHED[self.latched]
+        if self.emergencies:
+            return _EMERGENCIES["robot" if "robot" in self.emergencies else "system"]
+        if self.safeguard and not activity.protective:
+            return SafetyMode.SAFEGUARD_STOP
+        return activity.safety_mode(reduced=self.reduced)
+
+    def check(self, trigger: str, activity: Activity) -> None:
+        """Refuse a command that the safety system does not allow.
+
+        Args:
+            trigger: `type` of the command.
+            activity: Present activity of the robot.
+
+        Raises:
+            RefusalError: The command is not allowed.
+        """
+        mode = self.mode(activity)
+        if trigger in _LIVE and self.latched is not None:
+            raise RefusalError("wrong_mode", "", f"safety_mode is {mode.name}: send restart_safety first")
+        if trigger in _LIVE and self.emergencies:
+            why = f"safety_mode is {mode.name}: release the emergency stop first"
+            raise RefusalError("wrong_mode", "", why)
+        if trigger in _MOTION and self.safeguard:
+            why = f"safety_mode is {mode.name}: release the safeguard stop first"
+            raise RefusalError("wrong_mode", "", why)
+
+    def clear(self) -> None:
+        """Release safeguard and emergency stops, and clear the latched fault; reduced speed stays as it is."""
+        self.safeguard, self.latched = False, None
+        self.emergencies.clear()
+
+    def restart(self) -> None:
+        """Clear the latched fault.
+
+        Raises:
+            RefusalError: There is none.
+        """
+        if self.latched is None:
+            why = "the safety system has found no violation or fault: there is no need to restart it"
+            raise RefusalError("wrong_mode", "", why)
+        self.latched = None

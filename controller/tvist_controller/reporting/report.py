@@ -1,0 +1,131 @@
+"""What a tick has computed, as a message that is made, or encoded, when somebody wants it."""
+
+import numpy as np
+from msgspec import Struct
+
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.kinematics import ForwardKinematics
+from tvist_controller.line.line_tick import TORQUE
+from tvist_controller.line.sample import Sample
+from tvist_controller.reporting.state_layout import Layout, width, write_state
+from tvist_plant.plant import PERIOD
+from tvist_protocol.codec import encode
+from tvist_protocol.stream import State
+
+Key = tuple[object, ...]
+NOTHING: Floats = np.empty((0, 0))
+
+
+class Layouts:
+    """The layout of the last state, which is usually that of the next."""
+
+    def __init__(self) -> None:
+        self._known: tuple[Key, Layout] | None = None
+
+    def of(self, key: Key, report: "Report") -> Layout:
+        """Return the layout of a report's state, which depends on nothing but the key."""
+        known = self._known
+        if known is None or known[0] != key:
+            known = self._known = key, Layout.of(report.state)
+        return known[1]
+
+
+class Report(Struct, gc=False):
+    """A tick, of which clients get a state. Threads may share it."""
+
+    tick: int
+    """Number of the tick."""
+    sample: Sample
+    """Signals along the control line."""
+    unshaped: Floats | None
+    """q, q̇ and q̈ without the filter at the tick of the target, shape (3, n); None if the target is that."""
+    modes: tuple[int, int, int]
+    """Robot mode, safety mode and runtime state."""
+    speed: float
+    """Share of the programmed speed [-]."""
+    f_d: Floats
+    """Damped frequencies that the shaper uses, shape (modes,) [Hz]."""
+    zeta: Floats
+    """Damping ratios that it uses, shape (modes,) [-]."""
+    delay: float
+    """Time of the shaper's last impulse, and by which commands for the drives are late [s]."""
+    clipped: bool
+    """Whether the shaper cannot meet its specification."""
+    sequence: int | None
+    """Sequence number of the newest accepted set-point."""
+    missed: int
+    """Number of ticks that began too late."""
+    kinematics: ForwardKinematics
+    """Kinematics of the tool, which must not change."""
+    layouts: Layouts
+    """Layouts of such states."""
+    made: State | None = None
+    written: bytes | None = None
+
+    @property
+    def state(self) -> State:
+        """The state."""
+        if self.made is None:
+            self.made = self._make()
+        return self.made
+
+    @property
+    def encoded(self) -> bytes:
+        """The encoded state, equal to what the codec makes of it."""
+        if self.written is None:
+            self.written = self._write() if self.made is None else encode(self.made)
+        return self.written
+
+    def _write(self) -> bytes:
+        sample, sequence, tick, f_d = self.sample, self.sequence, self.tick, self.f_d
+        motors, measured = sample.motors, sample.measured
+        key = (
+            width(tick), None if sequence is None else width(sequence), self.modes, self.missed, self.clipped,
+            self.unshaped is None, motors is not None and motors.limited, motors is None, len(f_d),
+        )  # fmt: skip
+        template, places, integers = self.layouts.of(key, self)
+        leading = NOTHING if motors is None else np.array([motors.qd, motors.qdd, motors.torque])
+        unshaped = NOTHING if self.unshaped is None else self.unshaped
+        return write_state(
+            template, places, integers, tick, sequence or 0, tick * PERIOD, self.speed, self.delay, sample.signals,
+            unshaped, measured.q, measured.qd, measured.moment, measured.accelerometer,
+            self.kinematics.chain, self.kinematics.offset, f_d, self.zeta, leading,
+        ).tobytes()  # fmt: skip
+
+    def _make(self) -> State:
+        sample, unshaped, motors = self.sample, self.unshaped, self.sample.motors
+        target, measured = sample.target, sample.measured
+        motion = self.kinematics.motion(measured.q, measured.qd).tolist()
+        robot_mode, safety_mode, runtime = self.modes
+        return State(
+            tick=self.tick,
+            timestamp=self.tick * PERIOD,
+            robot_mode=robot_mode,
+            safety_mode=safety_mode,
+            runtime_state=runtime,
+            setpoint_sequence=self.sequence,
+            reference_q=sample.reference.tolist(),
+            target_q=target.q.tolist(),
+            target_qd=target.qd.tolist(),
+            target_qdd=target.qdd.tolist(),
+            target_moment=sample.signals[TORQUE].tolist(),
+            actual_q=measured.q.tolist(),
+            actual_qd=measured.qd.tolist(),
+            actual_moment=measured.moment.tolist(),
+            actual_TCP_pose=motion[:6],
+            actual_TCP_speed=motion[6:],
+            actual_tool_accelerometer=measured.accelerometer.tolist(),
+            speed_scaling=self.speed,
+            estimated_f_d=self.f_d.tolist(),
+            estimated_zeta=self.zeta.tolist(),
+            shaper_delay=self.delay,
+            missed_ticks=self.missed,
+            shaper_clipped=self.clipped,
+            unshaped_q=None if unshaped is None else unshaped[0].tolist(),
+            unshaped_qd=None if unshaped is None else unshaped[1].tolist(),
+            unshaped_qdd=None if unshaped is None else unshaped[2].tolist(),
+            motor_qd=None if motors is None else motors.qd.tolist(),
+            motor_qdd=None if motors is None else motors.qdd.tolist(),
+            motor_moment=None if motors is None else motors.torque.tolist(),
+            motor_limited=motors is not None and motors.limited,
+        )

@@ -1,0 +1,37 @@
+"""Receiver of the messages that a controller produces."""
+
+from typing import Literal
+
+from tvist_controller.reporting.report import Report
+from tvist_protocol.io import Io
+from tvist_protocol.journal import Entry
+from tvist_protocol.stream import Event, State, Truth
+
+Topic = Literal["state", "event", "truth", "telemetry", "io"]
+"""Topic of messages that are published without a request."""
+
+
+class Sink:
+    """Takes messages in the controller's thread. No method may raise, and none may block except in lockstep.
+
+    By default each method ignores its message.
+    """
+
+    def report(self, report: Report) -> None:
+        """Take a tick's report, by default as its state, which takes a while to make."""
+        self.state(report.state)
+
+    def state(self, state: State) -> None:
+        """Take a tick's state."""
+
+    def event(self, event: Event) -> None:
+        """Take an event; it comes before the state of its tick."""
+
+    def truth(self, truth: Truth) -> None:
+        """Take what a real robot cannot measure, if it is published."""
+
+    def io(self, io: Io) -> None:
+        """Take changed inputs, outputs and registers; they precede the state of their tick."""
+
+    def journal(self, entry: Entry) -> None:
+        """Take an input of the controller, which precedes the tick of its number."""

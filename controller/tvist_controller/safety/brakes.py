@@ -1,0 +1,56 @@
+"""Stop of category 0: the power is off, and the brakes bring the arm to rest whatever torque that takes."""
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_controller.line.differentiator import Target
+from tvist_controller.trajectory import Known
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.model import FLANGE, payload_inertia, rigid_model
+
+HOLD = 1.25
+"""Least ratio of a brake's torque to the load by gravity and the other joints, so that it holds what it stops [-]."""
+LONGEST = 5.0
+"""Time after which the arm counts as stopped in any case [s]."""
+
+
+def brake(description: RobotDescription, carried: Payload, state: Target, period: float) -> Known:
+    """Simulate the rigid arm under its brakes.
+
+    Each joint is slowed down by the torque of its brake, which is taken to be as large as its drive's; once at rest,
+    it stays there. The rotors turn along:
+
+        (M(q) + B) q̈ + C(q, q̇) q̇ + g(q) = -τ_b sgn(q̇)    over the joints that still turn.
+
+    Brakes do not follow a path, so the arm leaves the path that it was on.
+
+    Args:
+        description: The robot.
+        carried: Payload of the arm.
+        state: Initial state of motion.
+        period: Tick [s].
+    """
+    model = rigid_model(description, Payload())
+    if carried.mass > 0.0:
+        flange = model.frames[model.getFrameId(FLANGE)]
+        model.inertias[flange.parentJoint] += flange.placement.act(payload_inertia(carried))
+    data = model.createData()
+    rotor, strength = np.array(description.drives.rotor_inertia), np.array(description.limits.torque)
+    q, qd = state.q.copy(), state.qd.copy()
+    positions = [q]
+    turning = np.abs(qd) > 0.0
+    for _ in range(round(LONGEST / period)):
+        if not turning.any():
+            break
+        mass = np.array(pin.crba(model, data, q, pin.Convention.WORLD)) + np.diag(rotor)
+        bias = np.array(pin.nonLinearEffects(model, data, q, qd))
+        torque = np.maximum(strength, HOLD * np.abs(bias)) * np.sign(qd) + bias
+        free = np.flatnonzero(turning)
+        new = np.zeros_like(qd)
+        new[free] = qd[free] - period * np.linalg.solve(mass[np.ix_(free, free)], torque[free])
+        turning &= new * qd > 0.0
+        new[~turning] = 0.0
+        qd = new
+        q = q + period * qd
+        positions.append(q)
+    return Known(positions[1:] or positions, period)

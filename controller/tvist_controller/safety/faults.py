@@ -1,0 +1,151 @@
+"""Deliberate faults: those of `simulation.inject`, applied to the arm or the safety system."""
+
+import heapq
+import math
+from collections.abc import Callable
+from itertools import count
+from typing import ClassVar
+
+import numpy as np
+
+from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.planning.command_row import Row
+from tvist_controller.safety.safety_control import SafetyControl
+from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD, Breakable, Pushable
+from tvist_protocol.faults import FAULTS
+from tvist_protocol.simulation import SimulationInject
+
+
+def _check(command: SimulationInject, description: RobotDescription) -> None:
+    joints = description.joints
+    fault = FAULTS.get(command.fault)
+    if fault is None:
+        why = f"fault is {command.fault!r}: must be one of {', '.join(FAULTS)}"
+        raise RefusalError("unknown_fault", "fault", why)
+    for field in ("joint", "value", "seconds"):
+        given = getattr(command, field) is not None
+        if field in fault.needs and not given:
+            raise RefusalError("missing_field", field, f"{field} is missing: fault {command.fault} needs it")
+        if given and field not in (*fault.needs, *fault.may):
+            why = f"{field} does not belong to fault {command.fault}"
+            raise RefusalError("out_of_range", field, why)
+    if command.joint is not None and command.joint >= joints:
+        why = f"joint is {command.joint}; the arm's joints are 0 to {joints - 1}"
+        raise RefusalError("out_of_range", "joint", why, joints - 1)
+
+
+class Faults:
+    """Starts faults, and ends those with a duration.
+
+    Args:
+        motion: The robot's motion.
+        safety: The robot's safety system.
+    """
+
+    def __init__(self, motion: MotionControl, safety: SafetyControl) -> None:
+        self._motion = motion
+        self._inputs: dict[str, tuple[Callable[[], None], Callable[[], None]]] = {
+            "reduced": (lambda: safety.reduce(reduced=True), lambda: safety.reduce(reduced=False)),
+            "safeguard_stop": (
+                lambda: safety.safeguard(stopped=True),
+                lambda: safety.safeguard(stopped=False),
+            ),
+            "emergency_stop": (lambda: safety.emergency("robot"), lambda: safety.end_emergency("robot")),
+            "system_emergency_stop": (
+                lambda: safety.emergency("system"),
+                lambda: safety.end_emergency("system"),
+            ),
+        }
+        """Functions that start and end each input of the safety system."""
+        self._momentary: dict[str, Callable[[], None]] = {
+            "protective_stop": lambda: motion.protect("a protective stop was injected"),
+            "normal": safety.release,
+            "power_loss": lambda: safety.cut_power("a loss of power was injected"),
+            "violation": lambda: safety.cut_power("the safety system found a violation", "violation"),
+            "fault": lambda: safety.cut_power("the safety system failed", "fault"),
+        }
+        """Functions for the faults that have no duration."""
+        plant = motion.cycle.line.plant
+        self._pushable = plant if isinstance(plant, Pushable) else None
+        if isinstance(plant, Breakable):
+            self._momentary["nan"] = plant.make_nan
+        self._push = np.zeros(motion.cycle.description.joints)
+        self._ends: list[tuple[int, int, str, Callable[[], None]]] = []
+        self._number = count()
+
+    def inject(self, command: SimulationInject, tick: int) -> None:
+        """Start a fault.
+
+        Args:
+            command: Command that causes the fault.
+            tick: Number of the next tick.
+
+        Raises:
+            RefusalError: The plant does not support it.
+        """
+        self._check_plant(command.fault)
+        fault, seconds = command.fault, command.seconds
+        ends = tick + round((seconds or 0.0) / PERIOD)
+        if fault == "torque":
+            joint, value = command.joint or 0, command.value or 0.0
+            self._add(joint, value)
+            self._at(ends, fault, lambda: self._add(joint, -value))
+            return
+        # An input that is set again or released no longer ends at the earlier time.
+        self._forget({*self._inputs} if fault == "normal" else {fault})
+        if fault in self._inputs:
+            begin, end = self._inputs[fault]
+            begin()
+            if seconds is not None:
+                self._at(ends, fault, end)
+        else:
+            self._momentary[fault]()
+
+    @property
+    def next_end(self) -> float:
+        """Number of the tick in which the next fault ends; infinite if none does."""
+        return self._ends[0][0] if self._ends else math.inf
+
+    def end(self, tick: int) -> None:
+        """End the faults whose time is over, before a tick."""
+        while self._ends and self._ends[0][0] <= tick:
+            heapq.heappop(self._ends)[-1]()
+
+    def clear(self) -> None:
+        """End all present faults, and release the arm."""
+        while self._ends:
+            heapq.heappop(self._ends)[-1]()
+        self._push[:] = 0.0
+        if self._pushable is not None:
+            self._pushable.push(self._push)
+
+    def _check_plant(self, fault: str) -> None:
+        """Check that the plant supports a fault of its own."""
+        if (fault == "torque" and self._pushable is None) or (
+            fault == "nan" and fault not in self._momentary
+        ):
+            plant = type(self._motion.cycle.line.plant).__name__
+            missing = "push" if fault == "torque" else "make_nan"
+            why = (
+                f"fault is {fault!r}: the plant {plant} cannot simulate it, since it has no method {missing}"
+            )
+            raise RefusalError("unknown_fault", "fault", why)
+
+    def _forget(self, faults: set[str]) -> None:
+        """Drop the end times of faults; those with a duration then last until something else ends them."""
+        self._ends = [one for one in self._ends if one[2] not in faults]
+        heapq.heapify(self._ends)
+
+    def _at(self, tick: int, fault: str, end: Callable[[], None]) -> None:
+        heapq.heappush(self._ends, (tick, next(self._number), fault, end))
+
+    def _add(self, joint: int, torque: float) -> None:
+        self._push[joint] += torque
+        if self._pushable is not None:
+            self._pushable.push(self._push)
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(SimulationInject, lambda self, call: self.inject(call.command, call.tick), check=_check),
+    )

@@ -1,0 +1,167 @@
+"""Detection of a wrong declared payload, from the torque that the drives' feedback adds to the feed-forward."""
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.line.inverse_dynamics import SLEW
+from tvist_plant.chain import BODY, SCRATCH, chain_of, torques
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.model import FLANGE, carries_weight, rigid_model
+from tvist_plant.plant import GRAVITY, PERIOD
+
+EVERY = 10
+"""Number of ticks that are averaged into one measurement."""
+MEMORY = 2.0
+"""Time in which the weight of a measurement decays to 1/e [s]; many periods of a vibration."""
+ENOUGH = 1.0
+"""Observation time required for a judgement [s]."""
+TOLERATED = 0.5
+"""Error of the declared mass that is tolerated [kg]."""
+FRICTION = 0.4
+"""Share of the Coulomb friction that may be unknown in each joint, with the worst sign [-]."""
+
+
+@compiled_for_ticks
+def add(total: Floats, moment: Floats, expected: Floats) -> None:
+    """Add what a moment has beyond the expected one to a sum, each of shape (n,) [N m]."""
+    for j in range(total.shape[0]):
+        total[j] += moment[j] - expected[j]
+
+
+@compiled_for_ticks
+def correlate(
+    chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Floats, friction: Floats, feedback: Floats
+) -> tuple[float, float, float]:
+    """Compare the feedback of the drives with the torques that a kilogram needs, y.
+
+    Args:
+        chain: Links of which only the kilogram has mass, see `tvist_plant.chain`, shape (n+1, 22).
+        q: Angles, shape (n,) [rad].
+        qd: Velocities, shape (n,) [rad/s].
+        qdd: Accelerations, shape (n,) [rad/s^2].
+        scratch: Scratch, shape (n+1, 28).
+        friction: F of each joint, shape (n,) [N m].
+        feedback: r, shape (n,) [N m].
+
+    Returns:
+        yᵀ W y [1/kg²], yᵀ W r [1/kg] and Σ |y_j| W_j F_j [1/kg].
+    """
+    per_kg = np.empty(q.shape[0])
+    torques(chain, q, qd, qdd, GRAVITY, scratch, per_kg)
+    square = product = bound = 0.0
+    for j in range(q.shape[0]):
+        weighted = per_kg[j] / (friction[j] * friction[j])
+        square += weighted * per_kg[j]
+        product += weighted * feedback[j]
+        bound += abs(weighted) * friction[j]
+    return square, product, bound
+
+
+class PayloadMonitor:
+    """Compares the payload that the drives feel with the declared one, in motion and at rest.
+
+    The torque that a drive's feedback adds to the feed-forward is what the model does not explain. A mass error μ
+    adds y(q, q̇, q̈) μ, with y the torque for 1 kg at the declared payload's centre of mass. Over some time, the
+    estimate is
+
+        μ = Σ yᵀ W r / Σ yᵀ W y,   W = diag(1/F²),      |error of μ| <= Σ_j Σ |y_j| W_j φ F_j / Σ yᵀ W y
+
+    where the bound covers any unknown friction of up to φF in each joint. Vibrations have zero mean and cancel out. A
+    warning requires that μ exceed what friction and the tolerated error of the declaration explain together. In an
+    upright posture, where gravity has no lever arm, there is therefore no warning.
+
+    An arm with only vertical axes is not judged: it feels its payload only while it accelerates, and there a soft joint
+    delays what its drive feels.
+
+    A deviating frequency would show the error too, but only while the arm vibrates, and less clearly: 3 kg instead of
+    5 kg change the frequency by a fifth and the shoulder's torque by half.
+
+    Args:
+        description: The robot.
+        declared: Declared payload.
+    """
+
+    def __init__(self, description: RobotDescription, declared: Payload) -> None:
+        drives = description.drives
+        self._judges = carries_weight(description)
+        model = rigid_model(description, Payload())
+        flange = model.getFrameId(FLANGE)
+        self._placement = model.frames[flange].placement
+        self._chain = chain_of(model, flange)
+        self._chain[:, BODY:] = 0.0  # only the kilogram has mass in this chain
+        self._scratch = np.zeros((description.joints + 1, SCRATCH))
+        self._sum = np.zeros(description.joints)
+        # Without this floor, a joint without friction would dominate the estimate.
+        self._friction = np.maximum(drives.coulomb_friction, 0.01 * np.array(description.limits.torque))
+        self._fade = float(np.exp(-EVERY * PERIOD / MEMORY))
+        self.declare(declared)
+        still = np.zeros_like(self._sum)  # the first calls load compiled code, which takes many ticks
+        add(still, still, still)
+        correlate(self._chain, still, still, still, self._scratch, self._friction, still)
+
+    def declare(self, payload: Payload) -> None:
+        """Set another declared payload: discard past measurements, and wait until it is fully phased in."""
+        self.payload = payload
+        kilogram = pin.Inertia(1.0, np.array(payload.com), np.zeros((3, 3)))
+        self._chain[-2, BODY:] = self._placement.act(kilogram).toDynamicParameters()
+        self.reset()
+        self._wait = SLEW
+
+    def reset(self) -> None:
+        """Discard past measurements, since the arm was placed elsewhere, its power was off, or something pushed it."""
+        self._wait = 0
+        self._ticks, self._sum[:] = 0, 0.0
+        self._time = self._yy = self._yr = self._bound = 0.0
+        self._warned = False
+
+    @property
+    def excess(self) -> tuple[float, float]:
+        """Estimated mass error of the declaration, and its bound from friction, which may be infinite [kg]."""
+        if self._yy <= 0.0:
+            return 0.0, np.inf
+        return self._yr / self._yy, self._bound / self._yy
+
+    def update(self, target: Target, expected: Floats, moment: Floats) -> str | None:
+        """Take one tick in which the drives hold the arm.
+
+        Args:
+            target: Shaped reference at the tick.
+            expected: Feed-forward torque for it, with rotors and friction, shape (n,) [N m].
+            moment: Motor torques measured at the end of the tick, shape (n,) [N m].
+
+        Returns:
+            Once, a sentence saying that the declared payload cannot be right; otherwise None, until another is
+            declared.
+        """
+        if self._wait > 0:
+            self._wait -= 1
+            return None
+        add(self._sum, moment, expected)
+        self._ticks += 1
+        if self._ticks < EVERY:
+            return None
+        square, product, bound = correlate(
+            self._chain, target.q, target.qd, target.qdd, self._scratch, self._friction, self._sum
+        )
+        self._ticks, self._sum[:] = 0, 0.0
+        fade = self._fade
+        self._time = fade * self._time + EVERY * PERIOD
+        self._yy = fade * self._yy + square
+        self._yr = fade * self._yr + product / EVERY
+        self._bound = fade * self._bound + FRICTION * bound
+        return self._judge()
+
+    def _judge(self) -> str | None:
+        if not self._judges or self._warned or self._time < ENOUGH:
+            return None
+        mass, bound = self.excess
+        if not abs(mass) > TOLERATED + bound:
+            return None
+        self._warned = True
+        felt = max(self.payload.mass + mass, 0.0)
+        return (
+            f"{self.payload.mass:g} kg are declared, but the drives hold about {felt:.1f} kg (within {bound:.1f} kg): "
+            "declare the actual payload, or find out what pushes the arm"
+        )

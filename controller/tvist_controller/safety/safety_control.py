@@ -1,0 +1,207 @@
+"""Actions of the safety system: reduced speed, stops of UR's categories 0, 1 and 2, power and protective stops."""
+
+import numpy as np
+
+from tvist_controller.commands.events import Emit
+from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.foresight.stops import StopPlan
+from tvist_controller.line.limits import REDUCED_SHARE
+from tvist_controller.line.sample import Sample
+from tvist_controller.motion.activities import PUT, at_rest
+from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.motion.safety_system import Emergency, Latched
+from tvist_controller.safety.brakes import brake
+from tvist_controller.safety.protection import Protection
+from tvist_plant.plant import PERIOD, Placeable, PlantError
+from tvist_protocol.modes import RobotMode
+from tvist_protocol.transitions import Activity, after
+from tvist_protocol.values import ResetMode
+
+
+class SafetyControl:
+    """Carries out what the safety system's inputs request, what its faults require, and what becomes of the power.
+
+    Args:
+        motion: The robot's motion.
+        emit: Emits events.
+    """
+
+    def __init__(self, motion: MotionControl, emit: Emit) -> None:
+        self._motion, self._emit = motion, emit
+        self._protection = Protection(motion.cycle)
+        self._goes_on = False
+        """Whether the motion that a safeguard has paused resumes by itself when the safeguard is released."""
+
+    def reduce(self, *, reduced: bool) -> None:
+        """Slow motions down, or let them speed up again; stop a stream, since its client determines its timing."""
+        motion, system = self._motion, self._motion.safety
+        if reduced == system.reduced:
+            return
+        system.reduced = reduced
+        motion.motions.keep_rate()
+        stream, most = motion.streams.stream, motion.motions.slowest
+        if stream is not None and most is not None and stream.limits.velocity > most:
+            motion.stop(None, "speed was reduced", "limit_velocity")
+        share = f"{100 * REDUCED_SHARE:g} % of the joints' limits" if reduced else "no longer reduced"
+        self._emit("warning", why=f"safety_mode is {motion.safety_mode.name}: speed is {share}")
+
+    def safeguard(self, *, stopped: bool) -> None:
+        """Stop with category 2, or allow motion again: a motion pauses and later resumes, a stream ends.
+
+        Args:
+            stopped: Whether the safeguard requests the stop.
+        """
+        motion, system = self._motion, self._motion.safety
+        if stopped == system.safeguard:
+            return
+        system.safeguard = stopped
+        if not stopped:
+            if self._goes_on and motion.activity is Activity.PAUSED:
+                motion.resume()
+            self._goes_on = False
+            return
+        why = "a safeguard asked for a stop"
+        if not motion.activity.moving:
+            # Although nothing moves and nothing ends, this now keeps the robot from moving.
+            self._emit("safety_stop", why=why, category=2, duration=0.0, way=0.0)
+            return
+        if after(motion.activity, "pause") is None:
+            motion.end("interruption", why, kind="safety_stop", category=2)
+            return
+        self._goes_on = motion.activity is Activity.MOVING
+        motion.pause()
+        duration, way = motion.ahead.until_rest()
+        self._emit("safety_stop", why=why, category=2, duration=duration, way=way)
+
+    def stay_paused(self) -> None:
+        """Note that a client has paused the motion as well, which then waits for its `resume`."""
+        self._goes_on = False
+
+    def emergency(self, whose: Emergency) -> None:
+        """Stop with category 1: on the path, then without power until it is released."""
+        pressed = self._motion.safety.emergencies
+        if whose not in pressed:
+            pressed.add(whose)
+            why = f"the {whose}'s emergency stop was pressed"
+            self._motion.end("power_off", why, kind="safety_stop", category=1)
+
+    def end_emergency(self, whose: Emergency) -> None:
+        """Release an emergency stop; the power stays off until it is switched on again."""
+        self._motion.safety.emergencies.discard(whose)
+
+    def release(self) -> None:
+        """Release all inputs: speed, safeguard and emergency stops."""
+        self.reduce(reduced=False)
+        self.safeguard(stopped=False)
+        self._motion.safety.emergencies.clear()
+
+    # ------------------------------------------------------------------ power, brakes and protective stops
+
+    def power_on(self, *, release_brakes: bool = True) -> None:
+        """Power the arm and release its brakes.
+
+        Args:
+            release_brakes: False to leave the brakes of an arm without power closed.
+
+        Raises:
+            RefusalError: The arm is moving, is in a protective stop, or does not tell where it stands.
+        """
+        motion, cycle = self._motion, self._motion.cycle
+        trigger, held = "power_on" if release_brakes else "power", motion.robot_mode is RobotMode.RUNNING
+        motion.check(trigger)
+        if not (held or isinstance(cycle.line.plant, Placeable)):
+            # Without power the arm may have been moved, and its brakes stop it where they do.
+            try:
+                cycle.reset(cycle.line.shaped.position)
+            except ValueError as error:
+                raise RefusalError("wrong_mode", "", str(error)) from error
+        motion.go(trigger)
+
+    def cut_power(self, why: str, latched: Latched | None = None) -> None:
+        """Stop with category 0: the power is off, and the brakes close at once.
+
+        Args:
+            why: The reason, for people.
+            latched: Violation or fault that the safety system latches until it is restarted; None if there is none.
+        """
+        motion, cycle, plan = self._motion, self._motion.cycle, None
+        if latched is not None:
+            motion.safety.latched = latched
+        if motion.power is not None:
+            motion.power.stop()
+        target = after(motion.activity, "brakes")
+        motion.activity = target or motion.activity
+        if target is not None and not cycle.mode.at_rest:
+            joints = cycle.line.shaped.joints
+            stop = brake(cycle.description, cycle.line.plant.payload, joints.newest, PERIOD)
+            way = float(np.abs(stop.end - joints.position).max())
+            plan = StopPlan(None, None, limited=False, duration=stop.duration, way=way)
+            motion.outlook.brake(stop)
+        motion.tell_end(plan, why, None, "safety_stop", 0)
+
+    def unlock(self) -> None:
+        """Unlock a protective stop.
+
+        Raises:
+            RefusalError: There is no protective stop, or the arm is still stopping.
+        """
+        self._motion.go("unlock_protective_stop")
+        self._protection.forget()
+
+    def watch(self, sample: Sample) -> None:
+        """Stop the arm if the latest tick has shown a danger, or the arm says that it cannot go on."""
+        motion = self._motion
+        if motion.robot_mode is RobotMode.RUNNING:
+            for danger in self._protection.dangers(sample):
+                motion.protect(danger.why, danger.code)
+        if motion.power is not None:
+            trouble = motion.power.trouble(motion.robot_mode, sample.measured)
+            if trouble is not None and motion.safety.latched is None:
+                self.cut_power(trouble, "fault")
+
+    def recover(self, error: PlantError, seed: int) -> Sample:
+        """Go on after the arm has failed: a simulated one is placed at rest at its reference, in a protective stop.
+
+        One that cannot be placed gets no power until the safety system is restarted.
+
+        Args:
+            error: The plant's error.
+            seed: Seed of the noise and gear errors.
+
+        Returns:
+            Signals with the new state.
+        """
+        motion, cycle = self._motion, self._motion.cycle
+        simulated = isinstance(cycle.line.plant, Placeable)
+        why = f"{error}: the simulation put the arm at rest at its reference" if simulated else str(error)
+        motion.abandon(why, "plant_failure")
+        position = cycle.line.shaped.position
+        try:
+            sample = cycle.reset(position, seed=seed)
+        except ValueError:  # `power_on` asks it again
+            if simulated:
+                raise
+            sample = cycle.reset(position, measured=cycle.sample.measured)
+        self._protection.forget()
+        if not simulated:
+            if motion.power is not None:
+                motion.power.stop()
+            motion.activity = Activity.POWER_OFF
+            if motion.safety.latched is None:  # while an arm does not answer, every tick fails
+                motion.safety.latched = "fault"
+                self._emit("safety_stop", code="plant_failure", why=why, category=0)
+            return sample
+        if after(motion.activity, "plant_failure") is not None:
+            motion.go("plant_failure")
+        self._emit("protective_stop", code="plant_failure", why=why)
+        return cycle.step()
+
+    def put(self, mode: ResetMode | None) -> None:
+        """Set the robot mode of an arm that was placed somewhere at rest; None for the present mode, at rest."""
+        motion = self._motion
+        if mode is not None:
+            motion.activity = PUT[mode]
+            motion.safety.clear()
+        else:
+            motion.activity = at_rest(motion.activity, emergency=bool(motion.safety.emergencies))
+        self._protection.forget()

@@ -1,0 +1,1 @@
+"""Where modes, shapers and plants come from."""

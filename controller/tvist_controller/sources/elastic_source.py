@@ -1,0 +1,49 @@
+"""Elastic feed-forward for a filter, with the springs of a calibration."""
+
+import numpy as np
+
+from tvist_controller.calibrations.modal import drivetrain
+from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.line.elastic_model import ElasticModel
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.model import flexible_model
+from tvist_protocol.calibration import Calibration
+from tvist_shaping.base import Filter
+from tvist_shaping.errors import EstimatorError
+
+
+def elastic_feed_forward(
+    tvist: Filter, description: RobotDescription, calibration: Calibration
+) -> ElasticFeedForward | None:
+    """Create the elastic feed-forward that a filter needs; None if it does without.
+
+    Args:
+        tvist: The filter.
+        description: The robot.
+        calibration: Calibration of this arm, with a modal model.
+
+    Raises:
+        EstimatorError: The calibration has no modal model, belongs to another arm, or lacks a parameter.
+    """
+    if tvist.feed_forward == "rigid":
+        return None
+    model = elastic_model(description, calibration)
+    return ElasticFeedForward(description, model, tvist.period, torques=tvist.feed_forward == "elastic")
+
+
+def elastic_model(description: RobotDescription, calibration: Calibration) -> ElasticModel:
+    """Combine masses, geometry and the places where links bend with the springs of a calibration.
+
+    Springs and gains in the robot file are not used.
+
+    Raises:
+        EstimatorError: See `elastic_feed_forward`.
+    """
+    if calibration.modal is None:
+        wanted = "a model with tvist identify --model modal; this calibration has polynomials alone"
+        raise EstimatorError("modal", None, wanted)
+    if calibration.robot != description.robot.model:
+        raise EstimatorError("robot", calibration.robot, f"{description.robot.model!r}, which this arm is")
+    springs = drivetrain(calibration.modal.parameters, description, flexible_model(description, Payload()))
+    stiffness = np.array(springs.stiffness)
+    return ElasticModel(description, stiffness, np.array(springs.damping) / stiffness)

@@ -1,0 +1,148 @@
+"""Shapers from the user's own files, given as FILE.py:NAME.
+
+Only the command line, a configuration and a state file can name files. A client on the network chooses among the names
+of loaded shapers, and a recording never causes a file to be run.
+"""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from tvist_controller.sources.own_files import OwnFileError, run_file
+from tvist_shaping.errors import ShaperFailureError, ShapingError
+from tvist_shaping.estimators.base import Estimator
+from tvist_shaping.fir_shaper import FirShaper
+from tvist_shaping.named import AnyShaper, Registry
+from tvist_shaping.own import check_range, check_shaper, shaper_of
+from tvist_shaping.shaper import Shaper
+
+_POSTURES, _MARGIN = 64, 1.1
+"""Number of postures in which an arm's modes are looked at, and the factor beyond them that a shaper has to support."""
+
+
+class OwnShaperError(OwnFileError):
+    """A file contains no such shaper; the message gives the file, the name and the reason."""
+
+
+class RecordedShaper(Struct, frozen=True):
+    """Description of a shaper from a file, as a recording contains it."""
+
+    name: str
+    """Name on the wire and in tables."""
+    file: str
+    """Path of the file, as it was given."""
+    attribute: str
+    """Name of the shaper in the file."""
+    sha256: str
+    """SHA-256 of the file, in hexadecimal."""
+
+
+@dataclass(frozen=True)
+class OwnShaper:
+    """A shaper that was loaded from a file."""
+
+    file: str
+    """Path of the file, as it was given."""
+    attribute: str
+    """Name of the shaper in the file."""
+    sha256: str
+    """SHA-256 of the bytes that were run, in hexadecimal; it does not cover what the file imports."""
+    shaper: AnyShaper = field(compare=False)
+    """The shaper, checked for every mode that a client may send."""
+
+    @property
+    def name(self) -> str:
+        """Name on the wire and in tables."""
+        return self.shaper.name
+
+    @property
+    def place(self) -> str:
+        """The shaper as FILE.py:NAME."""
+        return f"{self.file}:{self.attribute}"
+
+    @property
+    def recorded(self) -> RecordedShaper:
+        """Description of the shaper for a recording."""
+        return RecordedShaper(self.name, self.file, self.attribute, self.sha256)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the shaper as the name of its file, since a function cannot be pickled."""
+        return _load_again, (self.place, self.sha256)
+
+
+def load_own(place: str) -> OwnShaper:
+    """Run a file and check the shaper that it contains under a name.
+
+    Args:
+        place: FILE.py:NAME. NAME is a function (f_d [Hz], ζ [-]) -> `Impulses`, a `Shaper` or a `FirShaper`.
+
+    Raises:
+        OwnShaperError: The file or the name does not exist, running the file raises an exception, the name is not a
+            shaper, or the shaper fails for a mode.
+        UserFileError: The file is not text, or is larger than 4 MiB.
+    """
+    own = run_file(place, "shaper", OwnShaperError, _may_be_one)
+    found, attribute = own.found, own.attribute
+    try:
+        shaper = _shaper(found, attribute, place)
+        Registry([shaper])
+    except ShaperFailureError as error:
+        raise OwnShaperError(f"shaper {place} {error.why}") from error
+    except ShapingError as error:
+        raise OwnShaperError(f"shaper {place}: {error}") from error
+    return OwnShaper(own.file, attribute, own.sha256, shaper)
+
+
+def check_for(own: OwnShaper, estimator: Estimator, joints: int) -> None:
+    """Try a shaper with the modes that an arm has anywhere, and a tenth beyond.
+
+    Args:
+        own: The shaper.
+        estimator: The modes as functions of q.
+        joints: Number of joints of the arm.
+
+    Raises:
+        OwnShaperError: It fails for one of them.
+    """
+    looking = estimator.fork()
+    anywhere = np.random.default_rng(0).uniform(-np.pi, np.pi, (_POSTURES, joints))
+    f_d, zeta = np.array([looking.settle(q) for q in anywhere])[:, :, 0].T
+    low, high = max(f_d.min() / _MARGIN, estimator.f_d_min), f_d.max() * _MARGIN
+    damped = zeta.min() / _MARGIN, min(zeta.max() * _MARGIN, max(estimator.zeta_max, zeta.max()))
+    try:
+        check_range(own.shaper, (low, high), damped, "this arm")
+    except ShaperFailureError as error:
+        raise OwnShaperError(f"shaper {own.place} {error.why}") from error
+
+
+def _shaper(found: object, attribute: str, place: str) -> AnyShaper:
+    if isinstance(found, Shaper | FirShaper):
+        check_shaper(found)
+        return found
+    if not callable(found) or isinstance(found, type):
+        kind = "a class" if isinstance(found, type) else f"of type {type(found).__name__}"
+        raise OwnShaperError(
+            f"shaper {place}: {attribute} is {kind}; it must be a function (f_d, zeta) -> Impulses, a Shaper or a "
+            "FirShaper of tvist_shaping"
+        )
+    return shaper_of(found, name=attribute)
+
+
+def _may_be_one(value: object, *, own: bool) -> bool:
+    return (own and callable(value) and not isinstance(value, type)) or isinstance(value, Shaper | FirShaper)
+
+
+@lru_cache(maxsize=8)
+def _load_again(place: str, sha256: str) -> OwnShaper:
+    """Load a shaper again in a worker process.
+
+    Raises:
+        OwnShaperError: The file has changed since it was first loaded, or cannot be loaded.
+    """
+    found = load_own(place)
+    if found.sha256 != sha256:
+        raise OwnShaperError(f"shaper {place}: the file has changed since it was first loaded")
+    return found
