@@ -85,6 +85,24 @@ def sagging(measured):
     return measured
 
 
+def test_what_moves_it_until_its_drives_hold_it_is_no_jump_of_theirs():
+    plant = OwnArm(UR5E, UR5E.payload)
+    robot = Robot(plant=plant)
+    robot.tick(SWITCHES // 2)
+    plant.q = plant.q + 0.1  # it is let go for a moment
+    robot.tick(SWITCHES)
+    assert robot.states[-1].target_q == pytest.approx(STANDS + 0.1)
+    assert np.abs(np.diff(robot.column("actual_q"), axis=0)).max() <= 0.1 + 1e-9
+    assert robot.states[-1].actual_q == pytest.approx(STANDS + 0.1, abs=5e-3)
+
+
+def test_it_is_left_without_power():
+    plant, robot = ready()
+    robot.controller.motion.power.end()
+    assert plant.stops == 1
+    assert plant.calls[-1] == (False, True)
+
+
 def test_a_fault_of_its_own_stops_it_until_the_fault_is_gone_and_safety_is_restarted():
     plant, robot = ready()
     robot.send(c.MoveJ, q=TARGET)

@@ -57,7 +57,7 @@ def test_every_package_that_is_imported_has_a_page():
 
 def test_a_link_to_a_source_file_leads_to_its_page(collected):
     _, others = collected
-    sink = ROOT / "controller" / "tvist_controller" / "sink.py"
+    sink = ROOT / "controller" / "tvist_controller" / "reporting" / "sink.py"
     assert sink in others
     assert sources.page_of(sink).as_posix() == "controller/tvist_controller/reporting/sink.py.md"
     assert sink.read_text(encoding="utf-8").rstrip() in sources.shown(sink)

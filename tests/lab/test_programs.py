@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.controller.robots import NoArm
-from tests.own_arm import OwnArm
+from tests.own_arm import STANDS, OwnArm
 
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.in_process import free_setup
@@ -215,6 +215,15 @@ def test_of_an_arm_without_truth_nobody_knows_how_its_tool_shakes():
 def test_an_arm_that_gives_the_tick_is_not_moved_faster():
     with pytest.raises(ConfigError, match="the plant OwnArm gives the tick"):
         run(MOVES[0], plant=OwnPlant("mine.py:OwnArm", "", OwnArm), truth=False)
+
+
+def test_the_recording_begins_where_an_arm_stands(tmp_path):
+    class Stands(OwnArm):
+        wait = None  # it does not give the tick
+
+    path = tmp_path / "run.mcap"
+    run("sleep(0.1)", plant=OwnPlant("mine.py:Stands", "", Stands), truth=False, record=path)
+    assert read(path).start["q"] == STANDS.tolist()
 
 
 def test_a_plant_that_cannot_be_made_is_an_error_of_the_configuration():

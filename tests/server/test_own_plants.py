@@ -24,6 +24,7 @@ from tvist_lab.replay import ReplayError, replay_file
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ServeConfig
+from tvist_server.ending import SignalExit
 from tvist_server.recording import Recorder
 from tvist_server.schedule import Followed
 from tvist_server.workers import _rehearse
@@ -80,6 +81,17 @@ def test_one_that_cannot_be_made_says_why(place, name, said):
     plant = load_plant(place.replace("Echo", name))
     with pytest.raises(OwnPlantError, match=said):
         plant.make(UR5E, UR5E.payload)
+
+
+@pytest.mark.parametrize("kind", ["import", "make"])
+def test_a_signal_that_ends_the_process_meanwhile_is_no_fault_of_its_file(tmp_path, kind):
+    file = tmp_path / "slow.py"
+    body_of = (
+        "from tvist_server.ending import SignalExit\ndef make(description, payload): raise SignalExit(0)\n"
+    )
+    file.write_text(body_of + ("make(0, 0)\n" if kind == "import" else ""))
+    with pytest.raises(SignalExit):
+        load_plant(f"{file}:make").make(UR5E, UR5E.payload)
 
 
 def test_a_configuration_names_it_and_a_worker_finds_it_again(place):

@@ -66,6 +66,10 @@ def end_with_parent() -> None:
     threading.Thread(target=end, name="tvist-parent", daemon=True).start()
 
 
+class SignalExit(SystemExit):
+    """A signal's exit, which code that takes an exit for a failure can tell from one of somebody's file."""
+
+
 class Ending:
     """A shutdown requested by a signal.
 
@@ -141,4 +145,4 @@ class Ending:
     def _raise(self, number: int) -> None:
         if number == signal.SIGINT:
             raise KeyboardInterrupt
-        raise SystemExit(0)
+        raise SignalExit(0)

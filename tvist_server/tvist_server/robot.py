@@ -181,6 +181,12 @@ class ServedRobot:
         if self._plan_ahead is not None:
             self._plan_ahead.close()
 
+    def leave_arm(self) -> None:
+        """Leave an arm that has power without it; the controller's thread has ended."""
+        power = self.controller.motion.power
+        if power is not None:
+            power.end()
+
     def close(self) -> None:
         """Close its gateways; the controller's thread has ended."""
         if self._plans is not None:

@@ -214,8 +214,10 @@ class Server:
         gc.unfreeze()
 
     def _leave(self) -> None:
-        """Close the network. A client that has stopped reading can delay this for ten seconds."""
+        """Leave the arms, and close the network. A client that has stopped reading can delay this for ten seconds."""
         try:
+            for robot in self.robots:
+                robot.leave_arm()
             for courier in self._couriers:
                 courier.close()
             for robot in self.robots:

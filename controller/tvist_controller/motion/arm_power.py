@@ -24,6 +24,8 @@ class ArmPower:
         self._stoppable = plant if isinstance(plant, Stoppable) else None
         self._told: RobotMode | None = None
         self._was_ready = False
+        self.begun = False
+        """Whether the drives have begun to hold the arm with the last tick."""
         self._measured: float | None = None
         self._same = 0
 
@@ -58,6 +60,13 @@ class ArmPower:
             with suppress(PlantError):  # the robot stops in any case, and says why
                 self._stoppable.stop()
 
+    def end(self) -> None:
+        """Leave the arm without power, since nobody controls it any more."""
+        self.stop()
+        if self._powered is not None:
+            with suppress(PlantError):
+                self._powered.switch(power=False, brakes=True)
+
     def trouble(self, mode: RobotMode, measured: Measurement) -> str | None:
         """Return why the robot cannot go on, in words; None if it can. To be called after every tick.
 
@@ -75,6 +84,7 @@ class ArmPower:
         condition = self.condition
         if condition.fault is not None:
             return f"the arm reports: {condition.fault}"
+        ready = condition.ready and mode is RobotMode.RUNNING
         lost = self._was_ready and not condition.ready and mode is RobotMode.RUNNING
-        self._was_ready = condition.ready and mode is RobotMode.RUNNING
+        self.begun, self._was_ready = ready and not self._was_ready, ready
         return "the arm has switched off its drives" if lost else None

@@ -106,16 +106,28 @@ class SafetyControl:
         Raises:
             RefusalError: The arm is moving, is in a protective stop, or does not tell where it stands.
         """
-        motion, cycle = self._motion, self._motion.cycle
+        motion = self._motion
         trigger, held = "power_on" if release_brakes else "power", motion.robot_mode is RobotMode.RUNNING
         motion.check(trigger)
-        if not (held or isinstance(cycle.line.plant, Placeable)):
-            # Without power the arm may have been moved, and its brakes stop it where they do.
+        if not held:
             try:
-                cycle.reset(cycle.line.shaped.position)
+                self._begin_where_it_stands()
             except ValueError as error:
                 raise RefusalError("wrong_mode", "", str(error)) from error
         motion.go(trigger)
+
+    def _begin_where_it_stands(self) -> None:
+        """Let the line begin where an arm stands that cannot be placed.
+
+        Without power such an arm may have been moved, its brakes stop it where they do, and it sinks until its drives
+        hold it.
+
+        Raises:
+            ValueError: It does not tell where that is.
+        """
+        cycle = self._motion.cycle
+        if not isinstance(cycle.line.plant, Placeable):
+            cycle.reset(cycle.line.shaped.position)
 
     def cut_power(self, why: str, latched: Latched | None = None) -> None:
         """Stop with category 0: the power is off, and the brakes close at once.
@@ -158,6 +170,11 @@ class SafetyControl:
             trouble = motion.power.trouble(motion.robot_mode, sample.measured)
             if trouble is not None and motion.safety.latched is None:
                 self.cut_power(trouble, "fault")
+            elif motion.power.begun and motion.cycle.mode.at_rest:
+                try:
+                    self._begin_where_it_stands()
+                except ValueError as error:
+                    self.cut_power(str(error), "fault")
 
     def recover(self, error: PlantError, seed: int) -> Sample:
         """Go on after the arm has failed: a simulated one is placed at rest at its reference, in a protective stop.

@@ -48,6 +48,11 @@ def is_file(place: str) -> bool:
     return _FILE.fullmatch(place) is not None
 
 
+def ends(failure: BaseException) -> bool:
+    """Whether a signal ends the process while a file's code runs, by an exit of a kind of its own."""
+    return isinstance(failure, SystemExit) and type(failure) is not SystemExit
+
+
 def run_file(place: str, kind: str, error: type[OwnFileError], may_be_one: MayBeOne) -> OwnFile:
     """Run a file, and return what it contains under a name.
 
@@ -94,6 +99,8 @@ def _run(content: bytes, place: str, kind: str, error: type[OwnFileError], sha25
     try:
         exec(compile(content, module.__file__, "exec"), module.__dict__)  # noqa: S102  it is what the user asked for
     except (Exception, SystemExit) as failure:
+        if ends(failure):
+            raise
         frames = [
             frame
             for frame in traceback.extract_tb(failure.__traceback__)

@@ -8,7 +8,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from tvist_controller.sources.own_files import OwnFileError, is_file, run_file
+from tvist_controller.sources.own_files import OwnFileError, ends, is_file, run_file
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import Plant
 
@@ -60,6 +60,8 @@ class OwnPlant:
         try:
             made = self.maker(description, carried)
         except (Exception, SystemExit) as error:
+            if ends(error):
+                raise
             said = " ".join(str(error).split())
             words = f"{type(error).__name__}: {said}" if said else type(error).__name__
             raise OwnPlantError(f"plant {self.place}: making it raises {words}") from error
@@ -109,6 +111,8 @@ def _installed(name: str) -> object:
             try:
                 return one.load()
             except (Exception, SystemExit) as error:
+                if ends(error):
+                    raise
                 raise OwnPlantError(f"plant {name}: loading {one.value} fails: {error}") from error
     known = ", ".join(installed_plants())
     raise OwnPlantError(

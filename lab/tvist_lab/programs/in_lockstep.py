@@ -60,7 +60,7 @@ def run_in_lockstep(
     sinks: list[Sink] = [watch]
     with ExitStack() as ends:
         if record is not None:
-            start_of_it = setup.to_builtins()
+            start_of_it = controller.setup.to_builtins()
             recorder = Recorder(record, info_of(controller), start_of_it, wait=True, on_error=on_record_error)
             sinks.insert(0, ends.enter_context(recorder))
         host = Host(controller, *sinks)
