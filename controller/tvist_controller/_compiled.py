@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from tvist_shaping.compiling import compiled as compile_function
+from tvist_kernels.compiling import compiled as compile_function
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -11,7 +11,7 @@ __all__ = ["compiled", "compiled_for_ticks"]
 
 
 def compiled(function: F) -> F:
-    """Compile `function`, see `tvist_shaping.compiling`; it does not hold the interpreter's lock while it runs."""
+    """Compile `function`, see `tvist_kernels.compiling`; it does not hold the interpreter's lock while it runs."""
     return compile_function(function, nogil=True)
 
 

@@ -12,10 +12,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from tvist_kernels.compiling import compiled
 from tvist_plant.description import Payload, RobotDescription, Tensor
 from tvist_plant.drives import DriveCommand
 from tvist_plant.model import FLANGE, link_frame
-from tvist_shaping.compiling import compiled
 
 Floats = NDArray[np.float64]
 

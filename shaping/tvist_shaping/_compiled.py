@@ -1,5 +1,5 @@
 """Compile the functions of this library."""
 
-from tvist_shaping.compiling import compiled
+from tvist_kernels.compiling import compiled
 
 __all__ = ["compiled"]

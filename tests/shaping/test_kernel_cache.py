@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from numba.core.registry import cpu_target
 
-from tvist_shaping import kernel_cache
-from tvist_shaping.kernel_cache import DistrustWarning, KernelCache
+from tvist_kernels import cache as kernel_cache
+from tvist_kernels.cache import DistrustWarning, KernelCache
 
 CALLEE = """
-from tvist_shaping.compiling import compiled
+from tvist_kernels.compiling import compiled
 from tvist_of_tests.constants import FACTOR
 
 @compiled
@@ -24,7 +24,7 @@ def inner(x):
     return FACTOR * x
 """
 CALLER = """
-from tvist_shaping.compiling import compiled
+from tvist_kernels.compiling import compiled
 from tvist_of_tests.callee import (
     inner,
 )
@@ -37,7 +37,7 @@ CALL = """
 import sys
 import numba
 from tvist_of_tests.caller import outer
-from tvist_shaping.kernel_cache import unkept
+from tvist_kernels.cache import unkept
 said = [outer._cache.holds(), *map(outer, eval(sys.argv[1]))]
 print(*said, sum(outer.stats.cache_misses.values()), int(bool(unkept)))
 """

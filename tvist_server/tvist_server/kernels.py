@@ -10,6 +10,7 @@ from contextlib import suppress
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.loopback import LoopbackHost
+from tvist_kernels.cache import kernels, unkept
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import Command, MoveJ, SetShaper, Stop, TakeControl
 from tvist_protocol.kinematics import ForwardKinematics
@@ -18,7 +19,6 @@ from tvist_protocol.replies import Accepted, Refused, Reply, ToolPose
 from tvist_protocol.simulation import SimulationStep
 from tvist_server.config_file import from_mapping
 from tvist_server.gateways.starting import Tell
-from tvist_shaping.kernel_cache import kernels, unkept
 
 MOVE_TICKS = 1000
 """Longest time of a motion that uses kernels [ticks]."""

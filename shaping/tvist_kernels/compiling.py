@@ -9,7 +9,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 def compiled(function: F, *, nogil: bool = False) -> F:
     """Compile a function at its first call; its Python source remains available as `.py_func`.
 
-    The machine code is kept on disk, see `kernel_cache`.
+    The machine code is kept on disk, see `cache`.
 
     Args:
         function: The function; what it calls must be compiled, too.
@@ -20,7 +20,7 @@ def compiled(function: F, *, nogil: bool = False) -> F:
     except ImportError:
         function.py_func = function  # type: ignore[attr-defined]
         return function
-    from tvist_shaping.kernel_cache import KernelCache
+    from tvist_kernels.cache import KernelCache
 
     dispatcher: Any = njit(nogil=nogil)(function)
     # As njit(cache=True) does, with a cache of our own.

@@ -30,8 +30,8 @@ from numba.core.registry import cpu_target
 from numba.core.serialize import dumps
 from numba.misc.appdirs import AppDirs
 
-from tvist_shaping import trust
-from tvist_shaping.kernel_sources import digest
+from tvist_kernels import trust
+from tvist_kernels.sources import digest
 
 DIGITS = 16
 """Hexadecimal digits of each hash in a file's name."""

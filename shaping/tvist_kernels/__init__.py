@@ -1,0 +1,1 @@
+"""How functions are compiled, and where their machine code is kept; below all other packages."""
