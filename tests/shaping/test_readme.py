@@ -40,13 +40,13 @@ import importlib.abc, sys
 class Refusing(importlib.abc.MetaPathFinder):
     def find_spec(self, name, path=None, target=None):
         top = name.partition(".")[0]
-        if top not in {"numpy", "tvist_shaping"} and top not in sys.stdlib_module_names:
+        if top not in {"numpy", "tvist_kernels", "tvist_shaping"} and top not in sys.stdlib_module_names:
             raise ImportError(f"{name} is not there")
 sys.meta_path.insert(0, Refusing())
 """
 
 
-def test_the_first_example_shapes_a_signal_in_ten_lines_with_numpy_and_this_package_alone(tmp_path):
+def test_the_first_example_shapes_a_signal_in_ten_lines_with_numpy_and_this_distribution_alone(tmp_path):
     example = first_example()
     assert len(example.splitlines()) <= 10
     package = README.parent / "tvist_shaping"
