@@ -64,7 +64,7 @@ def info_of(controller: Controller) -> Info:
         stopping=list(stopping(setup.description)),
         robot_mode=controller.motion.activity.robot_mode,
         safety_mode=controller.motion.safety_mode,
-        stop=controller.stop_reason,
+        stop=controller.modes.stop_reason,
         arm=controller.arm,
         programs=sorted(controller.programs.known),
         poses=setup.description.poses,

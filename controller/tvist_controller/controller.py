@@ -1,6 +1,6 @@
 """The controller: messages in, replies, states and events out. It has no clock, socket, thread or log.
 
-It owns a `Session`, which grants control, and a `ControlCycle`, which moves the arm; neither knows of the other.
+It puts the rooms together: each part knows those below it, and the controller what they need of one another.
 """
 
 import math
@@ -20,11 +20,10 @@ from tvist_controller.dispatch.motion_commands import MotionCommands
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.dispatch.setpoints import Setpoints, Unreadable
 from tvist_controller.dispatch.table import COMMANDS, CommandTable, WholeRobot
-from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
+from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.instruments.peripherals import Peripherals
-from tvist_controller.instruments.wrench import ToolWrench, since_zeroed
+from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.line.cycle import ControlCycle
-from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.filter_control import Filters
@@ -39,18 +38,16 @@ from tvist_controller.reporting.report import Report
 from tvist_controller.reporting.reporter import Reporter, truth_of
 from tvist_controller.safety.declared_payload import DeclaredPayload
 from tvist_controller.safety.faults import Faults
+from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
-from tvist_controller.safety.stop_reasons import StopReasons
 from tvist_controller.setup import Setup, body
 from tvist_plant.fingerprint import fingerprint
 from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError
 from tvist_protocol import commands as c
-from tvist_protocol.info import StopReason
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event, EventKind, State, Truth
-from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
 
@@ -75,13 +72,9 @@ class Controller(WholeRobot):
         self.tick_number = 0
         self.counters = Counters()
         self._events: list[Event] = []
-        self._stop_reasons = StopReasons()
         planner = Planner(setup)
-        self._look_at = -math.inf
-        """Time at which something may time out next; a command may bring it forward."""
-        self._changed = True
-        """Whether a command, an event or a program may have changed the modes since the last tick."""
-        self._modes = 0, 0, 0
+        self._next_timeout = -math.inf
+        """Time at which something may time out next [s]."""
         self.plans = Plans(planner, lambda: self.basis, order)
         """The way to plans."""
         first = planner.filters.first()
@@ -94,9 +87,10 @@ class Controller(WholeRobot):
             truth_of(self.cycle.line.plant)  # raises now, not at the first tick, if the plant has no truth
         self._seed = setup.seed
         self._reporter = Reporter(setup.description)
-        self._wrench = ToolWrench(setup.description)
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
+        self.modes = RobotModes(self.motion)
+        """Robot mode, safety mode and runtime state."""
         self.session = Session(timeouts=setup.clock == "realtime", instance=setup.instance)
         self._authority = Authority(
             self.session, self._interrupt, self._emit, steppable=setup.clock != "realtime"
@@ -106,6 +100,8 @@ class Controller(WholeRobot):
         self._safety = safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
         self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
+        self.forces = ToolForces(setup.description, self.peripherals, lambda: self.latest)
+        """Forces and torques on the arm."""
         guidance = Guidance(self.motion)
         self.programs = ProgramPlayer(self._access(guidance), safety)
         self._told_program = self.programs.progress
@@ -117,7 +113,6 @@ class Controller(WholeRobot):
             self._faults, self.programs, self,
         )  # fmt: skip
         self._commands = CommandTable(parts, setup.description)
-        self._update_modes()
         self.report = self._report(self.cycle.sample)
         """Report of the last tick, or of the arm at rest if it has not ticked yet or was placed somewhere since."""
 
@@ -135,11 +130,6 @@ class Controller(WholeRobot):
     def arm(self) -> str:
         """Fingerprint of the arm that the robot file describes."""
         return fingerprint(self.setup.description)
-
-    @property
-    def stop_reason(self) -> StopReason | None:
-        """The stop that keeps the robot from moving; None if there is none."""
-        return self._stop_reasons.present(self.motion.robot_mode, self.motion.safety_mode)
 
     # ------------------------------------------------------------------ inputs
 
@@ -185,7 +175,7 @@ class Controller(WholeRobot):
         origin: str | None = None,
     ) -> Reply | None:
         """Carry out a command of a client, or of a program; see `CommandTable.carry_out`."""
-        self._attend()
+        self._look_again()
         planned = partial(self.plans.found, command, plan)
         reply = self._commands.carry_out(
             Call(command, self.tick_number + 1, self.now, session, planned, origin)
@@ -210,7 +200,7 @@ class Controller(WholeRobot):
 
     def client_gone(self, client: str, session: str) -> None:
         """Handle the end of a client's session, which ends the rights it held."""
-        self._attend()
+        self._look_again()
         self._authority.client_gone(client, session)
 
     def missed(self, ticks: int) -> None:
@@ -232,10 +222,10 @@ class Controller(WholeRobot):
 
     def begin_tick(self) -> None:
         """Begin a control period: what has timed out ends, and programs have their turn."""
-        if self.now >= self._look_at:
+        if self.now >= self._next_timeout:
             self._watch_time()
         if not self.programs.idle:
-            self._attend()
+            self._look_again()
             self.programs.advance(self.tick_number + 1)
 
     def complete_tick(self) -> tuple[Report, list[Event]]:
@@ -248,11 +238,10 @@ class Controller(WholeRobot):
             sample = self._safety.recover(error, self._seed)
             self._reporter.restart()
             self._payload.begin_anew()
-            self._changed = True
+            self.modes.changed = True
         self._payload.watch(sample)
         self.filters.watch(sample)
-        if self._changed or self.motion.changed:
-            self._update_modes()
+        self.modes.update()
         self.tick_number += 1
         events, self._events = self._events, []
         self.report = self._report(sample)
@@ -266,22 +255,15 @@ class Controller(WholeRobot):
             sample,
             self.cycle.line.filter.tvist,
             self.cycle.line.drives.delay,
-            modes=self._modes,
+            modes=self.modes.now,
             speed=motion.motions.speed,
             setpoint_sequence=motion.streams.sequence,
             missed_ticks=self.counters.missed_ticks,
         )
 
-    def _attend(self) -> None:
-        """Look in the next tick at what may have changed, and at what may have timed out."""
-        self._look_at, self._changed = -math.inf, True
-
-    def _update_modes(self) -> None:
-        motion, robot, safety = self.motion, self.motion.robot_mode, self.motion.safety_mode
-        self._stop_reasons.update(robot, safety)
-        self._modes = int(robot), int(safety), int(motion.runtime)
-        # A paused motion comes to a standstill without any event.
-        self._changed, motion.changed = motion.activity is Activity.PAUSED, False
+    def _look_again(self) -> None:
+        """Let the next tick see what has timed out, and what modes have become: a command may have changed both."""
+        self._next_timeout, self.modes.changed = -math.inf, True
 
     def io(self, *, wrench: bool = True) -> Io:
         """Return inputs, outputs and registers as they are for the next tick.
@@ -294,18 +276,8 @@ class Controller(WholeRobot):
             self.declared,
             self.motion.motions.wanted_speed,
             self.programs,
-            self.wrench() if wrench else None,
+            self.forces.wrench() if wrench else None,
         )
-
-    def wrench(self) -> list[float]:
-        """Return the external force and torque at the tool centre point in the last tick, base frame [N, N m].
-
-        It is computed on request.
-        """
-        return since_zeroed(self._felt(), self.peripherals.wrench_zero)
-
-    def _felt(self) -> list[float]:
-        return self._wrench.of(self.latest, self.peripherals.tcp_offset)
 
     def changed_io(self) -> Io | None:
         """Return inputs, outputs and registers before a tick, if they changed since the last call; else None."""
@@ -327,20 +299,18 @@ class Controller(WholeRobot):
         """Store an event of the tick that is being computed, or of the next one between two ticks."""
         event = Event(tick=self.tick_number + 1, kind=kind, **fields)
         self._events.append(event)
-        self._changed = True
-        if kind in {"protective_stop", "safety_stop"}:
-            self._stop_reasons.note(event, self.motion.safety_mode)
+        self.modes.hear(event)
         self.programs.hear(event)
 
     def _watch_time(self) -> None:
         """End what has timed out or run its course, and note when something will next."""
         self._faults.end(self.tick_number + 1)
         self._authority.watch(self.now)
-        self._look_at = min(PERIOD * (self._faults.next_end - 1), self.session.ends)
+        self._next_timeout = min(PERIOD * (self._faults.next_end - 1), self.session.ends)
         if self.setup.clock == "realtime":
             self.motion.watch(self.now)
-            self._look_at = min(self._look_at, self.motion.streams.silent_at)
-        self._changed = True
+            self._next_timeout = min(self._next_timeout, self.motion.streams.silent_at)
+        self.modes.changed = True
 
     def _interrupt(self, why: str) -> None:
         """End the activities that need control, when no client has control any more."""
@@ -359,9 +329,7 @@ class Controller(WholeRobot):
             plans=self.plans,
             latest=lambda: self.latest,
             declared=lambda: self.declared,
-            torques=lambda: self._wrench.felt(self.latest).tolist(),
-            wrench=self.wrench,
-            zero_wrench=lambda: self.peripherals.zero_wrench(self._felt()),
+            forces=self.forces,
             shape_guided=self.setup.shape_servo,
         )
 
@@ -377,7 +345,10 @@ class Controller(WholeRobot):
             )
         q = self.cycle.line.shaped.position if command.q is None else np.array(command.q, dtype=float)
         carried = None if command.payload is None else body(command.payload)
-        self._check_place(command, q)
+        placed = [] if carried is None else [carried]
+        if command.q is not None:
+            placed = [self.motion.collisions.declared, *(placed or [self.cycle.line.plant.payload])]
+        self.motion.collisions.check_place(q, placed, "payload" if command.q is None else "q")
         self.programs.end("simulation.reset")
         self.motion.abandon("simulation.reset")
         self._faults.clear()
@@ -388,25 +359,15 @@ class Controller(WholeRobot):
         self.cycle.reset(q, carried=carried, seed=self._seed)
         self._safety.put(command.mode)
         if command.mode is not None:
-            self._stop_reasons.forget()
+            self.modes.forget_stops()
         self._reporter.restart()
         self._reporter.forget_modes()
-        self._update_modes()
+        self.modes.changed = True
+        self.modes.update()
         self.report = self._report(self.cycle.sample)
         self._payload.begin_anew()
         self.programs.steadiness.forget()
         return Done(tick=self.tick_number)
-
-    def _check_place(self, command: SimulationReset, q: Floats) -> None:
-        """Refuse to put the arm, or another payload on it, where two bodies would be nearer than permitted."""
-        payloads = [] if command.payload is None else [body(command.payload)]
-        if command.q is not None:
-            payloads = [self.motion.collisions.carried, *(payloads or [self.cycle.line.plant.payload])]
-        met = self.motion.collisions.misplaced(q, *payloads)
-        if met is not None:
-            where = "payload" if command.q is None else "q"
-            why = f"{met}: choose a posture in which the arm and its payload are clear"
-            raise RefusalError("collision", where, why, CLEARANCE)
 
     def check_step(self, call: Call[SimulationStep]) -> Reply:
         """Check that a client may advance time; the host then does so."""

@@ -54,7 +54,7 @@ class Sequence:
         self._random = np.random.default_rng([seed, 15])
         self._free = CollisionModel(description, body(paper_payload(description, 0.0)))
         mass = draws.mass(description, self._random)
-        self._free.carry(body(paper_payload(description, mass)))
+        self._free.declare(body(paper_payload(description, mass)))
         self.robot = Subject(
             description, self._posture(), paper_payload(description, mass),
             shaper=draws.shaper(self.description, self._random), flexible=flexible,

@@ -121,7 +121,7 @@ def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tupl
     collisions = CollisionModel(description, body(paper_payload(description, 0.0)))
     while True:
         mass = draws.mass(description, random)
-        collisions.carry(body(paper_payload(description, mass)))
+        collisions.declare(body(paper_payload(description, mass)))
         start, target = draws.postures(description, random, 2)
         if random.random() < 0.3:  # short moves without a cruise phase
             target = start + random.uniform(0.02, 0.3) * (target - start)

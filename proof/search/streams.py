@@ -85,7 +85,7 @@ def draw(description: RobotDescription, seed: int) -> StreamCase:
     random = np.random.default_rng([seed, 12])
     collisions = CollisionModel(description, body(paper_payload(description, 0.0)))
     mass = draws.mass(description, random)
-    collisions.carry(body(paper_payload(description, mass)))
+    collisions.declare(body(paper_payload(description, mass)))
     while True:
         start, towards = draws.postures(description, random, 2)
         if random.random() < 0.5:  # through the floor

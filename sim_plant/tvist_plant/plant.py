@@ -22,7 +22,7 @@ GRAVITY = 9.81
 
 
 class PlantError(ArithmeticError):
-    """The plant's state is no longer finite, because it was driven beyond the validity of its model."""
+    """A plant has failed: a simulated state is no longer finite, or a real arm does not answer."""
 
 
 @dataclass(slots=True, eq=False)
@@ -113,8 +113,8 @@ class Plant(Protocol):
             Measurements at the end of the period.
 
         Raises:
-            PlantError: A simulated state is no longer finite, or a real arm does not answer. The controller makes a
-                protective stop, and places the plant if it can.
+            PlantError: A simulated state is no longer finite, or a real arm does not answer. A plant that can be placed
+                then is, in a protective stop; any other gets no power until the safety system is restarted.
         """
 
 
@@ -180,7 +180,7 @@ class Powered(Protocol):
 
     @property
     def condition(self) -> Condition:
-        """Its present condition. If it is not ready while the robot runs, the robot stops."""
+        """Its present condition. If it stops being ready while the robot runs, the robot stops."""
 
 
 @runtime_checkable

@@ -279,7 +279,7 @@ def test_a_payload_swapped_in_place_collides_as_one_built_anew():
         (5.0, DISC.com),
     ):
         payload = body(msgspec.structs.replace(paper_payload(UR5E, mass), com=com))
-        swapped.carry(payload)
+        swapped.declare(payload)
         fresh = CollisionModel(UR5E, payload)
         for q in random.uniform(-3.0, 3.0, (300, 6)):
             assert swapped.meeting(q) == fresh.meeting(q)

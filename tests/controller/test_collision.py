@@ -136,13 +136,13 @@ def test_a_way_out_of_a_meeting_brings_no_pair_of_bodies_nearer(model, number):
 
 def test_bodies_that_meet_may_turn_together(model):
     """The distance of the payload from the wrist is the same all along the way, but for rounding."""
-    model.carry(Payload(mass=3.0, com=(0.0, 0.3, 0.0)))
+    model.declare(Payload(mass=3.0, com=(0.0, 0.3, 0.0)))
     start = np.array([0.0, -1.5, 0.0, -1.57, 0.0, 0.0])
     assert model.meeting(start).second == "payload"
     for number in range(20):
         turn = np.append(np.random.default_rng(number).uniform(-0.5, 0.5, 2), np.zeros(4))
         assert model.on_way(JointLine(start, start + turn).whole) is None
-    model.carry(UR5E.payload)
+    model.declare(UR5E.payload)
 
 
 PAYLOADS = {

@@ -72,7 +72,7 @@ def test_one_joint_leads_by_its_inertia_times_acceleration_over_stiffness():
     for k in range(60):
         time = k * H
         target = Target(*(np.array([value]) for value in (time**3, 3.0 * time**2, 6.0 * time)))
-        command = feed.command(target, np.array([inertia * 6.0 * time]), dynamics.carried)
+        command = feed.command(target, np.array([inertia * 6.0 * time]), dynamics.payload_parameters)
     earlier = time - H
     assert command.q[0] - earlier**3 == pytest.approx(inertia * 6.0 * earlier / stiffness, rel=1e-9)
     assert command.qd[0] - 3.0 * earlier**2 == pytest.approx(inertia * 6.0 / stiffness, rel=1e-6)
@@ -97,7 +97,7 @@ def test_nothing_of_springs_and_gains_in_the_robot_file_is_used():
         for k in range(20):
             target = Target(Q3 + 1e-4 * k**2, np.full(6, 0.1 * k), np.full(6, 50.0))
             torque = dynamics.torque(target.q, target.qd, target.qdd)
-            command = feed.command(target, torque, dynamics.carried)
+            command = feed.command(target, torque, dynamics.payload_parameters)
         commands.append(np.concatenate([command.q, command.qd, command.torque]))
     assert commands[0].tobytes() == commands[1].tobytes()
 
@@ -108,7 +108,7 @@ def test_a_payload_counts_like_a_body_of_the_model():
     loads = {}
     for name, dynamics in (("heavy", heavy), ("light", light)):
         springs = stage()._loads
-        springs.carry(dynamics.carried)
+        springs.carry(dynamics.payload_parameters)
         found = springs.of(target)[0][elastic_model(UR5E, MODAL).joints]
         loads[name] = found
     rigid = {
@@ -341,7 +341,7 @@ def test_a_lead_that_the_torque_does_not_permit_is_limited_and_told():
         jerky = 20.0 * np.sign(np.sin(0.3 * k)) * np.ones(6)
         target = Target(Q3, np.zeros(6), jerky)
         torque = dynamics.torque(target.q, target.qd, target.qdd)
-        feed.command(target, torque, dynamics.carried)
+        feed.command(target, torque, dynamics.payload_parameters)
         told.append(feed.limited)
     assert any(told)
 

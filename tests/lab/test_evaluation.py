@@ -130,7 +130,7 @@ class TestDraws:
                 assert np.abs(q[2]) <= 5.0 * np.pi / 6.0
                 assert not q[4:].any()
             assert 1.0 <= move.mass <= 4.0
-            collision.carry(body(paper_payload(ur5e, move.mass)))
+            collision.declare(body(paper_payload(ur5e, move.mass)))
             assert is_free(collision, move)
             for share in np.linspace(0.0, 1.0, 50):
                 assert collision.meeting(start + share * (target - start)) is None

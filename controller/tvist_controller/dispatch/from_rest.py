@@ -46,7 +46,7 @@ def plan_from_rest(
         excess=tvist.excess,
         surplus=tvist.surplus,
         tcp=tuple(tcp),
-        carried=body(setup.payload),
+        declared_body=body(setup.payload),
         bodies=InverseDynamics(setup.description, body(setup.payload)).bodies,
         filter=on,
     )

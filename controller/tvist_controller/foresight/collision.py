@@ -1,6 +1,7 @@
 """Collisions of the arm with itself and the floor: capsules of the robot file, distances by coal."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -8,6 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.trajectory import Way
 from tvist_plant.description import Body, Payload, RobotDescription
@@ -53,7 +55,7 @@ class CollisionModel:
         self._model = rigid_model(description, Payload())
         self._data = self._model.createData()
         self._reach = np.zeros(description.joints)
-        self.carried = payload
+        self.declared = payload
         """Declared payload."""
         self._geometry = pin.GeometryModel()
         self._names: list[str] = []
@@ -70,7 +72,7 @@ class CollisionModel:
             self._with_payload = np.array(
                 [self._payload in (pair.first, pair.second) for pair in self._pairs]
             )
-            self.carry(payload)
+            self.declare(payload)
 
     def meeting(self, q: Floats) -> Meeting | None:
         """Return the nearest pair of bodies at a posture, if it is closer than the clearance.
@@ -87,15 +89,31 @@ class CollisionModel:
             q: Joint positions, shape (n,) [rad].
             payloads: The declared payload, and others that the arm might carry there.
         """
-        before = self.carried
+        before = self.declared
         for payload in payloads:
-            self.carry(payload)
+            self.declare(payload)
             met = self.meeting(q)
-            self.carry(before)
+            self.declare(before)
             if met is not None:
                 posture = ", ".join(f"{angle:.4g}" for angle in q)
                 return f"at q = [{posture}] {met}, and at least {1e3 * CLEARANCE:g} mm are required"
         return None
+
+    def check_place(self, q: Floats, payloads: Sequence[Payload], field: str) -> None:
+        """Refuse to put the arm, or another payload on it, where two bodies would be nearer than permitted.
+
+        Args:
+            q: Joint positions, shape (n,) [rad].
+            payloads: See `misplaced`.
+            field: Field of the command that is to blame.
+
+        Raises:
+            RefusalError: They would be.
+        """
+        met = self.misplaced(q, *payloads)
+        if met is not None:
+            why = f"{met}: choose a posture in which the arm and its payload are clear"
+            raise RefusalError("collision", field, why, CLEARANCE)
 
     def on_way(self, way: Way, *, before: Floats | None = None) -> tuple[float, Meeting] | None:
         """Find the first meeting on a way, in long steps where everything is far apart and short ones elsewhere.
@@ -181,13 +199,13 @@ class CollisionModel:
         nowhere = np.zeros(3)
         self._add_capsule(PAYLOAD, flange.parentJoint, flange.placement, nowhere, nowhere, radius)
 
-    def carry(self, payload: Payload) -> None:
+    def declare(self, payload: Payload) -> None:
         """Change the payload in place, since building a new model takes a good part of a tick.
 
         Args:
             payload: Declared payload.
         """
-        self.carried = payload
+        self.declared = payload
         if not self._names:
             return
         centre = np.array(payload.com)

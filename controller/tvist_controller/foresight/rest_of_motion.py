@@ -124,13 +124,13 @@ class WayAhead:
             RefusalError: There would be a collision; nothing has changed.
         """
         collisions, q = self._collisions, self._cycle.line.shaped.position
-        before = collisions.carried
+        before = collisions.declared
         escaping = self._cycle.mode.at_rest or collisions.meeting(q) is not None
-        collisions.carry(payload)
+        collisions.declare(payload)
         met = None if escaping else collisions.meeting(q)
         met = met or self.rest_of_way(tvist)
         if met is not None:
-            collisions.carry(before)
+            collisions.declare(before)
             why = f"{met} on the rest of the path with this payload"
             raise RefusalError("collision", "com", why, CLEARANCE)
 

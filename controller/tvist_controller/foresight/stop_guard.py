@@ -49,7 +49,7 @@ class LookAhead(Guard):
         self._collisions, self._stops, self._torque = collisions, stops, room
         self._centre: Floats | None = None
         self._room = 0.0
-        self._carried = collisions.carried
+        self._declared = collisions.declared
         self._before: tuple[Target, Callable[[], JointStop]] | None = None
         self._acceleration, self._age = GENTLEST_STOP, FRESH
         self.met: Meeting | None = None
@@ -153,8 +153,8 @@ class LookAhead(Guard):
     def is_spacious(self, q: Floats, turned: Floats) -> bool:
         """Return whether the joints can certainly turn by these angles around q without a meeting."""
         collisions = self._collisions
-        if self._carried is not collisions.carried:
-            self._carried, self._centre = collisions.carried, None
+        if self._declared is not collisions.declared:
+            self._declared, self._centre = collisions.declared, None
         way = collisions.travel(turned)
         moved = np.inf if self._centre is None else collisions.travel(q - self._centre)
         if way + moved < self._room:

@@ -66,7 +66,7 @@ class Boxes(Struct, frozen=True, eq=False):
         return self.to_drives(q)
 
     def enter(self, sample: Floats, posture_of: Posture | None = None) -> None:
-        """Accept samples of another kind from rest on, see `ShapedReference.enter`."""
+        """Change between samples of the joints and of a path's parameter, at rest; see `ShapedReference.enter`."""
         self.shaped.enter(posture_of, sample)
         self.filter.begin(self.filter.tvist, sample, posture_of)
 

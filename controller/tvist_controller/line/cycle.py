@@ -70,13 +70,15 @@ class ControlCycle:
         # Trajectory generator: the reference x is q, or the parameter of a path. Filter: the shaped reference x*.
         x, x_star, refused = self._references()
         reference = line.shaped.posture(x)
-        line.shaped.push(x_star, reference if x_star is x else None)
-        line.dynamics.advance()
+        line.shaped.push(
+            x_star, reference if x_star is x else None
+        )  # unshaped, x* is x, and its posture known
+        line.dynamics.advance()  # a newly declared payload is phased in
         # Differentiator, inverse dynamics and joint controllers: q*, q̇*, q̈* a tick earlier, τ* and the plain command
         signals = line.to_drives(reference)
         target, mode = Target(*signals[Q:TORQUE]), self.mode
         command = line.drives.command(
-            target, signals, line.dynamics.carried,
+            target, signals, line.dynamics.payload_parameters,
             may_begin=mode.shaped and not line.filter.fading, may_go_on=mode is not LineMode.BYPASSED,
         )  # fmt: skip
         measured = line.plant.step(command)
@@ -111,9 +113,8 @@ class ControlCycle:
         """Follow a trajectory from now on.
 
         Args:
-            trajectory: Trajectory that continues the reference or, if the mode is not a shaped one, the shaped
-                reference; the contents of the delay line are then not played. If its path is not the present one, the
-                arm must be at rest.
+            trajectory: In a shaped mode it continues the reference x; in another one it continues the shaped reference
+                x*, and the delay line is discarded. A new path may begin only at rest.
             mode: Mode of the line.
             guard: Check of each shaped reference in a guarded mode; None to keep the present one.
 
@@ -187,7 +188,7 @@ class ControlCycle:
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
         signals = line.rest_at(q)
         target = Target(*signals[Q:TORQUE])
-        command = line.drives.command(target, signals, line.dynamics.carried)
+        command = line.drives.command(target, signals, line.dynamics.payload_parameters)
         if measured is None:
             measured = placed(line.plant, command, payload=carried, seed=seed)
         self.sample = Sample(

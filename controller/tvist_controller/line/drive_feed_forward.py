@@ -91,9 +91,10 @@ class DriveFeedForward:
         Args:
             target: Shaped reference and its derivatives.
             signals: Torques of the rigid arm for it and the command of the paper's joint controllers, see `line_tick`.
-            carried: Inertial parameters of the payload, see `InverseDynamics.carried`.
+            carried: Inertial parameters of the payload, see `InverseDynamics.payload_parameters`.
             may_begin: Whether the reference is smooth enough to begin with elastic feed-forward.
-            may_go_on: Whether it is smooth enough to go on with it, as a stop is.
+            may_go_on: Whether it is smooth enough to go on with it, as a stop is. A guided motion that is not shaped
+                may jump in acceleration, which motors cannot lead.
         """
         self._fade(may_begin if self._share == 0 else may_go_on)
         elastic, plain = self._elastic, DriveCommand(*signals[Q_R:])

@@ -79,7 +79,7 @@ class ElasticFeedForward:
         Args:
             target: Shaped reference and its derivatives.
             torque: τ* of the rigid arm, shape (n,) [N m].
-            carried: Inertial parameters of the payload, see `InverseDynamics.carried`.
+            carried: Inertial parameters of the payload, see `InverseDynamics.payload_parameters`.
             sag: A further lead, by the twist of the gears under gravity, shape (n,) [rad].
         """
         model, wanted, led = self._model, self._wanted, self._led

@@ -46,7 +46,7 @@ class InverseDynamics:
         self._bare = self.chain[-2, BODY:].copy()
         self._before = self._present = self._after = self._bare
         self._ticks_left, self._slew = 0, SLEW
-        self.carried = np.zeros_like(self._bare)
+        self.payload_parameters = np.zeros_like(self._bare)
         """Inertial parameters of the payload in use in the frame of the last joint, in pinocchio's order, shape (10,).
 
         It is a new array whenever they change.
@@ -144,5 +144,5 @@ class InverseDynamics:
     def _load(self, parameters: Floats) -> None:
         """Set the inertial parameters of the last link with its payload in place, since building a model takes long."""
         self._present = parameters
-        self.carried = parameters - self._bare
+        self.payload_parameters = parameters - self._bare
         self.chain[-2, BODY:] = parameters

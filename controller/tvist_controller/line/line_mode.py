@@ -4,7 +4,10 @@ from enum import Enum
 
 
 class LineMode(Enum):
-    """Mode of the control line; a row gives `label`, `shaped`, `guarded` and the modes that may follow."""
+    """Mode of the control line.
+
+    A row has `label`, `shaped`, `guarded`, and the names of the modes that may follow.
+    """
 
     REST = (
         "the shaped reference rests",
@@ -23,7 +26,7 @@ class LineMode(Enum):
         False, True, "REST", "BYPASSED", "STOPPING",
     )  # fmt: skip
     RUNNING_OUT = (
-        "a planned motion that ends by itself, since no stop is quicker",
+        "a planned motion that goes on, since it ends sooner than any stop",
         True, False, "REST", "STOPPING",
     )  # fmt: skip
     STOPPING = (
@@ -39,7 +42,7 @@ class LineMode(Enum):
         self.shaped = shaped
         """Whether references go through the filter; else they are the shaped ones, and its delay line is dropped."""
         self.guarded = guarded
-        """Whether a shaped reference is played only if a stop leads on from it that meets nothing."""
+        """Whether each shaped reference is played only if the arm could still stop from it without a collision."""
         self.followed_by = followed_by
         """Names of the modes that may begin while it lasts."""
 

@@ -1,4 +1,4 @@
-"""The robot's activities: motions by number, streams of set-points, stops, power and protective stops.
+"""The robot's activities: motions by number, streams of set-points and stops.
 
 `tvist_protocol.transitions` defines which trigger leads to which activity; this module carries the transitions out.
 """
@@ -106,7 +106,7 @@ class MotionControl:
             excess=cycle.line.filter.tvist.excess,
             surplus=cycle.line.filter.tvist.surplus,
             tcp=self.tcp,
-            carried=self.collisions.carried,
+            declared_body=self.collisions.declared,
             bodies=cycle.line.dynamics.bodies,
             filter=on,
         )

@@ -40,7 +40,7 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
     """Shares by which it may exceed velocity and acceleration at the arm's limits, see `Filter.surplus` [-]."""
     tcp: tuple[float, ...]
     """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
-    carried: Body
+    declared_body: Body
     """Payload in the collision model."""
     bodies: tuple[Floats, ...]
     """Possible inertial parameters of the last link, see `InverseDynamics.bodies`."""
@@ -53,7 +53,7 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
             and (self.speed, self.slowest, self.excess, self.surplus)
             == (other.speed, other.slowest, other.excess, other.surplus)
             and self.tcp == other.tcp
-            and self.carried is other.carried
+            and self.declared_body is other.declared_body
             and len(self.bodies) == len(other.bodies)
             and all(own is another for own, another in zip(self.bodies, other.bodies, strict=True))
             and self.filter == other.filter

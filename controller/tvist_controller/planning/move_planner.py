@@ -174,8 +174,8 @@ class MovePlanner:
 
     def meeting(self, motion: PlannedMotion, basis: MotionBasis) -> tuple[float, Meeting] | None:
         """Return the share of a motion's way after which two bodies would meet, and which; None if it is clear."""
-        if self._collisions.carried is not basis.carried:
-            self._collisions.carry(basis.carried)
+        if self._collisions.declared is not basis.declared_body:
+            self._collisions.declare(basis.declared_body)
         return self._collisions.on_way(motion.path.whole)
 
 

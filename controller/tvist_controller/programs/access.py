@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from tvist_controller.commands.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
+from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.planning.plan import Plan
@@ -34,12 +35,8 @@ class Access:
     """State of the last tick."""
     declared: Callable[[], Payload]
     """Declared payload."""
-    torques: Callable[[], list[float]]
-    """External torques on the joints in the last tick [N m]."""
-    wrench: Callable[[], list[float]]
-    """External force and torque at the tool centre point in the last tick, base frame [N, N m]."""
-    zero_wrench: Callable[[], None]
-    """Takes the present force and torque at the tool as zero."""
+    forces: ToolForces
+    """Forces and torques on the arm in the last tick."""
     shape_guided: bool = False
     """Whether guided motions of programs that begin at rest are shaped."""
     steadiness: Steadiness = field(default_factory=Steadiness)

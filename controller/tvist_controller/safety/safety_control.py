@@ -29,7 +29,7 @@ class SafetyControl:
     def __init__(self, motion: MotionControl, emit: Emit) -> None:
         self._motion, self._emit = motion, emit
         self._protection = Protection(motion.cycle)
-        self._goes_on = False
+        self._resumes_by_itself = False
         """Whether the motion that a safeguard has paused resumes by itself when the safeguard is released."""
 
     def reduce(self, *, reduced: bool) -> None:
@@ -56,9 +56,9 @@ class SafetyControl:
             return
         system.safeguard = stopped
         if not stopped:
-            if self._goes_on and motion.activity is Activity.PAUSED:
+            if self._resumes_by_itself and motion.activity is Activity.PAUSED:
                 motion.resume()
-            self._goes_on = False
+            self._resumes_by_itself = False
             return
         why = "a safeguard asked for a stop"
         if not motion.activity.moving:
@@ -68,14 +68,14 @@ class SafetyControl:
         if after(motion.activity, "pause") is None:
             motion.end("interruption", why, kind="safety_stop", category=2)
             return
-        self._goes_on = motion.activity is Activity.MOVING
+        self._resumes_by_itself = motion.activity is Activity.MOVING
         motion.pause()
         duration, way = motion.ahead.until_rest()
         self._emit("safety_stop", why=why, category=2, duration=duration, way=way)
 
     def stay_paused(self) -> None:
         """Note that a client has paused the motion as well, which then waits for its `resume`."""
-        self._goes_on = False
+        self._resumes_by_itself = False
 
     def emergency(self, whose: Emergency) -> None:
         """Stop with category 1: on the path, then without power until it is released."""

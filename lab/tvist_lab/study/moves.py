@@ -148,7 +148,7 @@ def draw_moves(
     moves: list[Move] = []
     draws = 0
     for draws, move in enumerate(_draws(random, region, description.joints, masses, stroke), 1):
-        collision.carry(body(paper_payload(description, move.mass)))
+        collision.declare(body(paper_payload(description, move.mass)))
         if is_free(collision, move):
             moves.append(move)
             progress()
@@ -226,7 +226,7 @@ def collisions(description: RobotDescription, moves: Sequence[Move]) -> list[str
     collision = CollisionModel(description, body(paper_payload(description, 0.0)))
     found = []
     for move in moves:
-        collision.carry(body(paper_payload(description, move.mass)))
+        collision.declare(body(paper_payload(description, move.mass)))
         nearest = collision.meeting(np.array(move.start))
         words = None if nearest is None else f"{nearest.first} meets {nearest.second} at the start"
         found.append(words or meeting(collision, move))

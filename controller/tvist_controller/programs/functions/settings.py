@@ -79,7 +79,7 @@ class SettingFunctions:
     @costs(80)
     def zero_ftsensor(self) -> None:
         """Take the present force and torque at the tool as zero."""
-        self._access.zero_wrench()
+        self._access.forces.zero()
 
     def _declare(
         self, mass: float, com: tuple[float, ...], inertia: tuple[float, ...], seconds: float = 0.0

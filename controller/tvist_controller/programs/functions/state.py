@@ -124,17 +124,17 @@ class StateFunctions:
     @costs(80)
     def get_joint_torques(self) -> Array:
         """Return the external torques on the joints: without what the arm itself needs [N m]."""
-        return a_list(self._access.torques())
+        return a_list(self._access.forces.torques())
 
     @costs(80)
     def get_tcp_force(self) -> Array:
         """Return the external force and torque at the tool in the base frame [N, N m]."""
-        return a_list(self._access.wrench())
+        return a_list(self._access.forces.wrench())
 
     @costs(80)
     def force(self) -> float:
         """Return the size of the external force at the tool [N]."""
-        return math.hypot(*self._access.wrench()[:3])
+        return math.hypot(*self._access.forces.wrench()[:3])
 
     def is_steady(self) -> bool:
         """Return whether the target has been at rest for 500 ms."""
