@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from struct import pack
-from types import CodeType, FrameType
+from types import FrameType
 from typing import Any
 
 from numba.core.dispatcher import Dispatcher
@@ -65,7 +65,7 @@ def travelled(way: Callable[[], object]) -> Trip:
         module = str(Path(file).relative_to(HOUSE))
         if module == "tools/trips.py":
             return
-        if frame.f_code in kernels:
+        if (file, frame.f_code.co_name) in kernels:
             module = COMPILED
         if event == "call":
             trip.modules[module] = None
@@ -82,10 +82,11 @@ def travelled(way: Callable[[], object]) -> Trip:
     return trip
 
 
-def _kernels() -> set[CodeType]:
-    """Code of all functions that are compiled: numba lets a profile see them as if they were not."""
+def _kernels() -> set[tuple[str, str]]:
+    """Files and names of all functions that are compiled: numba lets a profile see them as if they were not."""
     found = (vars(module).values() for name, module in sys.modules.items() if name.startswith("tvist"))
-    return {one.py_func.__code__ for values in found for one in values if isinstance(one, Dispatcher)}
+    codes = [one.py_func.__code__ for values in found for one in values if isinstance(one, Dispatcher)]
+    return {(code.co_filename, code.co_name) for code in codes}
 
 
 class Window(Gateway):
@@ -116,7 +117,7 @@ class Bench:
     """A robot whose ticks are made here."""
 
     def __init__(self) -> None:
-        setup = ServeConfig(profile="ursim", floor=False).setup()
+        setup = ServeConfig(profile="ursim", floor=False, clock="lockstep").setup()
         self.robot = ServedRobot(setup, None, Path("/tmp"))  # noqa: S108  nothing fails
         self.window = Window()
         self.robot.open([self.window])
