@@ -96,6 +96,21 @@ def test_what_moves_it_until_its_drives_hold_it_is_no_jump_of_theirs():
     assert robot.states[-1].actual_q == pytest.approx(STANDS + 0.1, abs=5e-3)
 
 
+def test_a_fault_right_after_its_drives_hold_it_lets_the_line_begin_anew_once():
+    plant = OwnArm(UR5E, UR5E.payload)
+    robot = Robot(plant=plant)
+    begun, reset = [], robot.controller.cycle.reset
+    robot.controller.cycle.reset = lambda *q, **options: (
+        begun.append(len(robot.states)) or reset(*q, **options)
+    )
+    while not begun:
+        robot.tick()
+    plant.fault = "joint 3 is too warm"
+    robot.tick(20)
+    assert len(begun) == 1
+    assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
+
+
 def test_it_is_left_without_power():
     plant, robot = ready()
     robot.controller.motion.power.end()

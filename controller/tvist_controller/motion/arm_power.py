@@ -74,6 +74,7 @@ class ArmPower:
             mode: Present robot mode.
             measured: The plant's measurement.
         """
+        self.begun = False
         if not (np.isfinite(measured.q).all() and np.isfinite(measured.moment).all()):
             return "the arm has measured what is no number"
         timestamp = measured.timestamp
