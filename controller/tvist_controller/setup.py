@@ -14,7 +14,7 @@ from tvist_controller.sources.own_plants import OwnPlant
 from tvist_controller.sources.own_shapers import OwnShaper
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
-from tvist_plant.plant import Placeable, Plant, posture_of
+from tvist_plant.plant import Placeable, Plant, measured_standing
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
@@ -117,11 +117,11 @@ class Setup:
         """Return the setup for a plant, which begins where it stands if it cannot be placed.
 
         Raises:
-            ValueError: It has another number of joints.
+            ValueError: See `measured_standing`.
         """
         if plant is None or isinstance(plant, Placeable):
             return self
-        return replace(self, q=tuple(posture_of(plant, np.array(self.q)).tolist()))
+        return replace(self, q=tuple(measured_standing(plant, len(self.q)).q.tolist()))
 
     def to_builtins(self) -> dict[str, Any]:
         """Convert the setup to maps and lists for a recording."""

@@ -213,36 +213,28 @@ def check_unpaced(plant: Plant) -> None:
         )
 
 
-def posture_of(plant: Plant, q: Floats) -> Floats:
-    """Return where a controller begins with a plant, shape (n,) [rad]: at q if it can be placed, else where it stands.
+def measured_standing(plant: Plant, joints: int) -> Measurement:
+    """Return what a plant that cannot be placed measures where it stands.
+
+    Args:
+        plant: The plant.
+        joints: Number of joints in the robot's description.
 
     Raises:
         ValueError: The plant does not answer, its measurement has the wrong shape or is not finite, or it can
             neither be placed nor measured.
     """
-    if isinstance(plant, Placeable):
-        return q
+    name = type(plant).__name__
+    if not isinstance(plant, Standing):
+        raise ValueError(f"the plant {name} has neither reset nor measure: it needs one of them")  # noqa: TRY004  it is a value of the user's
     try:
-        measured = _standing(plant).measure()
+        measured = plant.measure()
     except PlantError as error:
-        raise ValueError(f"plant {type(plant).__name__}: where it stands is unknown: {error}") from error
-    check_measurement(measured, len(q), plant)
+        raise ValueError(f"plant {name}: where it stands is unknown: {error}") from error
+    check_measurement(measured, joints, plant)
     if not np.isfinite(measured.q).all():
-        raise ValueError(f"plant {type(plant).__name__}: measured q is {measured.q.tolist()}: must be finite")
-    return measured.q.copy()
-
-
-def placed(plant: Plant, command: DriveCommand, *, payload: Payload | None, seed: int) -> Measurement:
-    """Place a plant under a command if that is possible, and return its measurements; see `Placeable.reset`."""
-    if isinstance(plant, Placeable):
-        return plant.reset(command, payload=payload, seed=seed)
-    return _standing(plant).measure()
-
-
-def _standing(plant: Plant) -> Standing:
-    if isinstance(plant, Standing):
-        return plant
-    raise ValueError(f"the plant {type(plant).__name__} has neither reset nor measure: it needs one of them")
+        raise ValueError(f"plant {name}: measured q is {measured.q.tolist()}: must be finite")
+    return measured
 
 
 @runtime_checkable

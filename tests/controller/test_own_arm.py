@@ -111,6 +111,14 @@ def test_a_fault_right_after_its_drives_hold_it_lets_the_line_begin_anew_once():
     assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
 
 
+def test_it_is_asked_once_where_it_stands_when_the_line_begins():
+    plant = OwnArm(UR5E, UR5E.payload)
+    cycle, asked, measure = Controller(setup(), plant).cycle, [], plant.measure
+    plant.measure = lambda: asked.append(1) or measure()
+    cycle.reset(STANDS)
+    assert len(asked) == 1
+
+
 def test_it_is_left_without_power():
     plant, robot = ready()
     robot.controller.motion.power.end()

@@ -12,7 +12,7 @@ from tvist_controller.line.sample import Sample
 from tvist_controller.trajectory import Rest, StuckError, Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import PERIOD, Measurement, Plant, check_measurement, placed, posture_of
+from tvist_plant.plant import PERIOD, Measurement, Placeable, Plant, check_measurement, measured_standing
 from tvist_shaping.base import Filter
 
 T = TypeVar("T", bound=Trajectory)
@@ -184,13 +184,17 @@ class ControlCycle:
         Raises:
             ValueError: An arm that cannot be placed does not tell where it stands. Nothing has changed.
         """
-        line, q = self.line, posture_of(self.line.plant, q) if measured is None else q
+        line, plant = self.line, self.line.plant
+        if measured is None and not isinstance(plant, Placeable):
+            measured = measured_standing(plant, len(q))
+            q = measured.q.copy()
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
         signals = line.rest_at(q)
         target = Target(*signals[Q:TORQUE])
         command = line.drives.command(target, signals, line.dynamics.payload_parameters)
-        if measured is None:
-            measured = placed(line.plant, command, payload=carried, seed=seed)
+        if isinstance(plant, Placeable):
+            measured = plant.reset(command, payload=carried, seed=seed)
+        assert measured is not None, "what cannot be placed is measured"
         self.sample = Sample(
             self.mode, q, line.shaped.joints.window, target, signals, command.torque, measured
         )
