@@ -80,7 +80,7 @@ def gathered(
 
 @dataclass(frozen=True, kw_only=True)
 class Places:
-    """Where a command writes its result; None where it is not wanted."""
+    """The files and folders that a command writes its result to, each None if it was not asked for."""
 
     output: Path | None = None
     """JSON file."""

@@ -362,7 +362,6 @@ class Controller(WholeRobot):
             self.modes.forget_stops()
         self._reporter.restart()
         self._reporter.forget_modes()
-        self.modes.changed = True
         self.modes.update()
         self.report = self._report(self.cycle.sample)
         self._payload.begin_anew()

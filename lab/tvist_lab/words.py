@@ -9,9 +9,3 @@ def counted(count: int, what: str) -> str:
         what: Singular of a word with a regular plural.
     """
     return f"{count} {what}{'' if count == 1 else 's'}"
-
-
-def named(error: BaseException) -> str:
-    """Return an exception in one line: its type, and its message if it has one."""
-    said = " ".join(str(error).split())
-    return f"{type(error).__name__}: {said}" if said else type(error).__name__

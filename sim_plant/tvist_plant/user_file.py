@@ -25,6 +25,17 @@ LONGEST_NAME: Final = 100
 Content = TypeVar("Content")
 
 
+def named(error: BaseException, said: str | None = None) -> str:
+    """Return an exception in one line: its type, and its message if it has one.
+
+    Args:
+        error: The exception.
+        said: What to say instead of its message.
+    """
+    words = " ".join((str(error) if said is None else said).split())
+    return f"{type(error).__name__}: {words}" if words else type(error).__name__
+
+
 class UserFileError(ValueError):
     """A file exists but has the wrong content; the message names it and says what was expected."""
 

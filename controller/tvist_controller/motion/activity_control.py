@@ -77,8 +77,6 @@ class MotionControl:
     def activity(self, activity: Activity) -> None:
         # What every tick asks is looked up once.
         self._activity, self._moving, self.robot_mode = activity, activity.moving, activity.robot_mode
-        self.may_move = after(activity, "move_j") is not None
-        """Whether a point-to-point motion may begin in the present activity."""
         self.changed = True
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
@@ -96,7 +94,7 @@ class MotionControl:
         Args:
             on: Basis of the present filter.
         """
-        if not self.may_move:
+        if after(self.activity, "move_j") is None:
             return None
         cycle = self.cycle
         return MotionBasis(

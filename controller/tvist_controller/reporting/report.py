@@ -5,7 +5,6 @@ from msgspec import Struct
 
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.kinematics import ForwardKinematics
-from tvist_controller.line.line_tick import TORQUE
 from tvist_controller.line.sample import Sample
 from tvist_controller.reporting.state_layout import Layout, width, write_state
 from tvist_plant.plant import PERIOD
@@ -108,7 +107,7 @@ class Report(Struct, gc=False):
             target_q=target.q.tolist(),
             target_qd=target.qd.tolist(),
             target_qdd=target.qdd.tolist(),
-            target_moment=sample.signals[TORQUE].tolist(),
+            target_moment=sample.torque.tolist(),
             actual_q=measured.q.tolist(),
             actual_qd=measured.qd.tolist(),
             actual_moment=measured.moment.tolist(),

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Protocol
 
-from tvist_plant.user_file import read_bytes
+from tvist_plant.user_file import named, read_bytes
 
 _FILE = re.compile(r"(?P<file>.*\.py)(?::(?P<attribute>.*))?", re.DOTALL)
 
@@ -108,7 +108,6 @@ def _run(content: bytes, place: str, kind: str, error: type[OwnFileError], sha25
         ]
         line = failure.lineno if isinstance(failure, SyntaxError) else frames[-1].lineno if frames else None
         where = "" if line is None else f" in line {line}"
-        said = " ".join(str(failure.msg if isinstance(failure, SyntaxError) else failure).split())
-        words = f"{type(failure).__name__}: {said}" if said else type(failure).__name__
+        words = named(failure, failure.msg if isinstance(failure, SyntaxError) else None)
         raise error(f"{kind} {place}: running {file} raises {words}{where}") from failure
     return module

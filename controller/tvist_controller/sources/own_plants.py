@@ -11,6 +11,7 @@ from msgspec import Struct
 from tvist_controller.sources.own_files import OwnFileError, ends, is_file, run_file
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import Plant
+from tvist_plant.user_file import named
 
 GROUP = "tvist.plants"
 """Group of the entry points by which installed packages offer plants."""
@@ -62,9 +63,7 @@ class OwnPlant:
         except (Exception, SystemExit) as error:
             if ends(error):
                 raise
-            said = " ".join(str(error).split())
-            words = f"{type(error).__name__}: {said}" if said else type(error).__name__
-            raise OwnPlantError(f"plant {self.place}: making it raises {words}") from error
+            raise OwnPlantError(f"plant {self.place}: making it raises {named(error)}") from error
         if not isinstance(made, Plant):
             raise OwnPlantError(
                 f"plant {self.place}: it makes a {type(made).__name__}, which is no plant: that has payload and step"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from tvist_lab.runners.interface import Failed, Result, Task, TaskError
-from tvist_lab.words import named
+from tvist_plant.user_file import named
 
 UNPICKLABLE = (pickle.PicklingError, TypeError, AttributeError, ValueError, RecursionError)
 """What `pickle.dumps` raises for what it cannot pickle."""

@@ -17,8 +17,8 @@ from tvist_lab.study.line import PAPER
 from tvist_lab.study.method import Stepping, Task
 from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.shaping import ShaperFaultError
-from tvist_lab.words import named
 from tvist_plant.plant import PERIOD
+from tvist_plant.user_file import named
 from tvist_protocol.values import Payload
 from tvist_shaping.estimators.base import Estimator
 

@@ -15,9 +15,9 @@ from tvist_lab.study.line import ControlLine
 from tvist_lab.study.measures import OF_PEAKS, Motion, measured
 from tvist_lab.study.method import Method, Task, Waiting
 from tvist_lab.study.shaping import Shaped, ShaperFaultError
-from tvist_lab.words import named
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD, Placeable
+from tvist_plant.user_file import named
 
 MEASURED, TOO_WEAK, FAILED = "measured", "too weak", "failed"
 """What became of a row."""
