@@ -5,10 +5,12 @@ client.pem       the client's certificate, and
 client.key       its private key
 """
 
+import contextlib
 import os
 import re
 import socket
 import ssl
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -117,11 +119,15 @@ def _handshake(address: str, security: Folder | None) -> tuple[bool, OSError | N
         context.load_cert_chain(Path(security) / CERTIFICATE, Path(security) / KEY)
     where, encrypted = urlsplit(f"//{address}"), False
     with socket.create_connection((where.hostname or "", where.port or 0), PROBE_S) as plain:
+        # Not `wrap_socket`: it leaves the socket open if the peer has reset the connection already.
+        received, to_send = ssl.MemoryBIO(), ssl.MemoryBIO()
+        link = context.wrap_bio(received, to_send, server_hostname=where.hostname)
         try:
-            with context.wrap_socket(plain, server_hostname=where.hostname) as link:
-                encrypted = True
-                # In TLS 1.3 a server judges the client's certificate after the handshake: read its verdict.
-                link.recv(1)
+            _carry(link.do_handshake, plain, received, to_send)
+            encrypted = True
+            # In TLS 1.3 a server judges the client's certificate after the handshake: read its verdict.
+            with contextlib.suppress(ssl.SSLEOFError, ssl.SSLZeroReturnError):
+                _carry(lambda: link.read(1), plain, received, to_send)
         except TimeoutError:
             if not encrypted:
                 raise
@@ -129,3 +135,19 @@ def _handshake(address: str, security: Folder | None) -> tuple[bool, OSError | N
             alert = "ALERT" in (getattr(error, "reason", None) or "")  # only who speaks TLS sends one
             return encrypted or alert or isinstance(error, ssl.SSLCertVerificationError), error
     return encrypted, None
+
+
+def _carry(
+    step: Callable[[], object], plain: socket.socket, received: ssl.MemoryBIO, to_send: ssl.MemoryBIO
+) -> None:
+    """Carry bytes between a socket and TLS until a step of it is done."""
+    while True:
+        try:
+            step()
+            return
+        except ssl.SSLWantReadError:
+            plain.sendall(to_send.read())
+            heard = plain.recv(65536)
+            received.write(heard)
+            if not heard:
+                received.write_eof()
