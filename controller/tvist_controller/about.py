@@ -66,7 +66,7 @@ def info_of(controller: Controller) -> Info:
         safety_mode=controller.motion.safety_mode,
         stop=controller.modes.stop_reason,
         arm=controller.arm,
-        programs=sorted(controller.programs.known),
+        programs=controller.programs.kept.names,
         poses=setup.description.poses,
         geometry=None if setup.description.kinematics.placement else geometry_of(setup.description),
     )

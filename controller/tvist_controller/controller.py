@@ -18,6 +18,7 @@ from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.dispatch.guided_commands import GuidedCommands
 from tvist_controller.dispatch.motion_commands import MotionCommands
 from tvist_controller.dispatch.planner import Planner
+from tvist_controller.dispatch.program_commands import ProgramCommands
 from tvist_controller.dispatch.setpoints import Setpoints, Unreadable
 from tvist_controller.dispatch.table import COMMANDS, CommandTable, WholeRobot
 from tvist_controller.foresight.collision import CollisionModel
@@ -110,7 +111,7 @@ class Controller(WholeRobot):
         parts = (
             self._authority, MotionCommands(self.motion, safety, self.programs),
             GuidedCommands(guidance, self.programs), self.filters, self._payload, self.peripherals,
-            self._faults, self.programs, self,
+            self._faults, ProgramCommands(self.programs, self.motion), self,
         )  # fmt: skip
         self._commands = CommandTable(parts, setup.description)
         self.report = self._report(self.cycle.sample)

@@ -142,12 +142,11 @@ def _carry(
 ) -> None:
     """Carry bytes between a socket and TLS until a step of it is done."""
     while True:
-        try:
+        with contextlib.suppress(ssl.SSLWantReadError):
             step()
             return
-        except ssl.SSLWantReadError:
-            plain.sendall(to_send.read())
-            heard = plain.recv(65536)
-            received.write(heard)
-            if not heard:
-                received.write_eof()
+        plain.sendall(to_send.read())
+        heard = plain.recv(65536)
+        received.write(heard)
+        if not heard:
+            received.write_eof()

@@ -11,13 +11,13 @@ from tvist_controller.authority.rights import Authority
 from tvist_controller.commands.refusal import check_body, check_joints
 from tvist_controller.dispatch.guided_commands import GuidedCommands
 from tvist_controller.dispatch.motion_commands import MotionCommands
+from tvist_controller.dispatch.program_commands import ProgramCommands
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.motion.filter_control import Filters
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import Planning
 from tvist_controller.planning.reachable import Reachable
-from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.safety.declared_payload import DeclaredPayload
 from tvist_controller.safety.faults import Faults
 from tvist_plant.description import RobotDescription
@@ -69,7 +69,7 @@ class WholeRobot(ABC):
 
 
 _PARTS: tuple[type[Part], ...] = (
-    Authority, MotionCommands, GuidedCommands, Filters, DeclaredPayload, Peripherals, Faults, ProgramPlayer,
+    Authority, MotionCommands, GuidedCommands, Filters, DeclaredPayload, Peripherals, Faults, ProgramCommands,
     WholeRobot,
 )  # fmt: skip
 COMMANDS: dict[type[Command], Row] = {row.message: row for part in _PARTS for row in part.rows}

@@ -2,15 +2,14 @@
 
 from collections import deque
 from collections.abc import Callable
+from typing import Literal
 
 from tvist_controller.commands.events import Emit
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.planning.basis import StatementBasis
-from tvist_controller.planning.command_row import Call
 from tvist_controller.programs.arm import ProgramArm, Turns
-from tvist_protocol.programs import MAX_SCRIPT, Interpreter, ProgramInterpret, ProgramSkip
-from tvist_protocol.replies import Accepted
+from tvist_protocol.programs import MAX_SCRIPT, Interpreter
 from tvist_urscript import Fault, Machine, Script
 
 MOST = 1000
@@ -159,9 +158,12 @@ class StatementQueue:
 
     # ------------------------------------------------------------------ for clients
 
-    def interpret(self, call: Call[ProgramInterpret]) -> Accepted:
-        """Add a statement; `call` is the command with its text."""
-        script: Script = call.planned()
+    def interpret(self, script: Script) -> int:
+        """Add a statement, and return its number.
+
+        Raises:
+            RefusalError: The program has taken too many.
+        """
         assert self._program is not None, "the statement was compiled after a program"
         clears = CLEAR in script.used
         self._check_room(len(script.text), clears=clears)
@@ -173,7 +175,7 @@ class StatementQueue:
         self._last = script
         if clears:
             self._restart(self._program)
-        return Accepted(id=self._interpreted)
+        return self._interpreted
 
     def _check_room(self, length: int, *, clears: bool) -> None:
         """Refuse a statement that makes the program too large, unless it makes room for later ones.
@@ -186,9 +188,9 @@ class StatementQueue:
             why = f"the program has taken {MOST} statements or {MAX_SCRIPT} characters: clear them with {CLEAR}()"
             raise RefusalError("busy", "text", why, MOST)
 
-    def skip(self, call: Call[ProgramSkip]) -> None:
-        """Leave out statements that wait, or the move that the program makes; `call` is the command."""
-        if call.command.what == "statements":
+    def skip(self, what: Literal["statements", "move"]) -> None:
+        """Leave out the statements that wait, or the move that the program makes."""
+        if what == "statements":
             self._queue.clear()
         else:
             self._arm.abort()

@@ -1,17 +1,14 @@
 """The loaded program and its progress, and the programs that run beside it."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
-from tvist_controller.commands.refusal import RefusalError, out_of_turn
-from tvist_controller.planning.command_row import Call, Row
-from tvist_controller.planning.plan import Planning
+from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.built_in import built_in
-from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.programs.interpreter import StatementQueue
+from tvist_controller.programs.kept import Kept, KeptPrograms
 from tvist_controller.programs.library import MOVING, functions
 from tvist_controller.programs.popups import Popups
 from tvist_controller.programs.sockets import Sockets
@@ -21,15 +18,7 @@ from tvist_controller.safety.safety_control import SafetyControl
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.programs import (
     Interpreter,
-    ProgramClosePopup,
-    ProgramInterpret,
-    ProgramLoad,
-    ProgramPause,
-    ProgramPlay,
-    ProgramRun,
-    ProgramSkip,
     ProgramState,
-    ProgramStop,
 )
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
@@ -41,17 +30,6 @@ GUIDED = 100
 """Evaluations that the step of a guided motion of the program takes from the budget of its tick."""
 MAX_BESIDE = 8
 """Number of secondary programs that may run at once."""
-
-
-MAX_KEPT = 100
-"""Number of programs that are kept under their names."""
-
-_COMPILED = Planning("script", ScriptCompiler, lambda compiler, command, _: compiler.compile(command))
-_COMPILED_AFTER = Planning(
-    "statement",
-    ScriptCompiler,
-    lambda compiler, command, on: compiler.compile_statement(command.text, on.after),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,22 +56,19 @@ class ProgramPlayer:
     def __init__(self, access: Access, safety: SafetyControl) -> None:
         self._access, self._motion, self._safety, self._emit = access, access.motion, safety, access.emit
         self.arm = ProgramArm(access, self._thread, lambda work: self._machine().charge(work))
-        self._popups = Popups(access.emit, self._machine)
+        self.popups = Popups(access.emit, self._machine)
         self._watchdogs = Watchdogs(access.peripherals)
         self.sockets = Sockets(access.emit, self._machine, lambda: self._now.origin if self._now else None)
         self.statements = StatementQueue(self._machine, self.arm, access.peripherals, access.emit)
         self._functions = functions(
-            access, self.arm, self._popups, self._watchdogs, self.sockets, self.statements
+            access, self.arm, self.popups, self._watchdogs, self.sockets, self.statements
         )
-        self._built_in = frozenset(built_in(access.description))
-        self._kept: dict[str, tuple[Script, str | None]] = {}
-        """Programs that were loaded with their text, by name, and the address of the machine that sent it."""
-        self._sender: str | None = None
-        """Address of the machine that sent the loaded program; None if it is unknown."""
+        self.kept = KeptPrograms(built_in(access.description))
+        """The programs that can be loaded."""
         self.name: str | None = None
         """Name of the loaded program; None if there is none."""
         self.state: ProgramState = "STOPPED"
-        self._loaded: Script | None = None
+        self.loaded: Kept | None = None
         self._main: _Running | None = None
         self._all: list[_Running] = []
         """Programs in order of age."""
@@ -105,11 +80,6 @@ class ProgramPlayer:
         """The one whose turn it is."""
         self.line = 0
         """Present line, or the one with which playing would resume, counted from 1; 0 if there is none."""
-
-    @property
-    def known(self) -> list[str]:
-        """Names of the programs that can be loaded."""
-        return sorted(self._built_in | set(self._kept))
 
     @property
     def watched(self) -> list[str]:
@@ -206,7 +176,7 @@ class ProgramPlayer:
 
     def stop_moving(self, why: str) -> None:
         """End a program that may move the arm, so that no motion begins after a stop; `why` as for `end`."""
-        if self.state == "PLAYING" and self._loaded is not None and self._loaded.used & MOVING:
+        if self.state == "PLAYING" and self.loaded is not None and self.loaded.script.used & MOVING:
             self.end(why)
 
     def _watch(self, tick: int) -> None:
@@ -221,7 +191,7 @@ class ProgramPlayer:
             self.end(why)
             self._motion.stop(None, "a watchdog of the program stopped it")
         elif self.state == "PLAYING":
-            self._hold()
+            self.hold()
 
     def _fail(self, running: _Running, error: ScriptError) -> None:
         self._emit(
@@ -247,7 +217,7 @@ class ProgramPlayer:
             running.machine.end()
         except ScriptError as error:
             self._fail(running, error)
-        self._popups.close(running.machine)
+        self.popups.close(running.machine)
         self.sockets.close(running.machine)
         secondary = running.script.secondary or None
         self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
@@ -272,64 +242,52 @@ class ProgramPlayer:
             (running.machine, number) == thread for running in self._all for number in running.machine.living
         )
 
-    # ------------------------------------------------------------------ commands
+    # ------------------------------------------------------------------ for commands
 
-    def _load(self, call: Call[ProgramLoad]) -> None:
-        name, script, sender = call.command.name, call.planned(), call.origin
-        if call.command.text is not None:
-            if name not in self._kept and len(self._kept) >= MAX_KEPT:
-                why = f"{MAX_KEPT} programs are kept already: send this one with program.run"
-                raise RefusalError("busy", "name", why, MAX_KEPT)
-            self._kept[name] = script, sender
-        elif script is None:
-            script, sender = self._kept.get(name, (None, None))
-        if script is None:
-            why = f"name is {name!r}: must be one of {', '.join(self.known)}"
-            raise RefusalError("out_of_range", "name", why)
-        self._replace("another program was loaded")
-        self.name, self._loaded, self._sender = name, script, sender
+    def load(self, name: str, program: Kept, why: str) -> None:
+        """Make a program the one that is played next; one that is running ends, and the arm stops.
 
-    def _run(self, call: Call[ProgramRun]) -> None:
-        script: Script = call.planned()
-        self._check_running("program.run")
-        if script.secondary:
-            if sum(running is not self._main for running in self._all) >= MAX_BESIDE:
-                why = f"{MAX_BESIDE} secondary programs are running: wait until one of them has ended"
-                raise RefusalError("busy", "", why, MAX_BESIDE)
-            self._begin(script, script.name, call.origin)
-            return
-        self._replace("another program was started")
-        self.name, self._loaded, self._sender = script.name, script, call.origin
-        self._start(script, call.origin)
+        Args:
+            name: Its name.
+            program: The program.
+            why: Why a running one ends, for people.
+        """
+        if self._main is not None:
+            self._close(self._main, why)
+            self._motion.stop(None, why)
+        self.name, self.loaded = name, program
 
-    def _play(self, call: Call[ProgramPlay]) -> None:
-        if self._loaded is None:
-            raise RefusalError("wrong_mode", "", "no program is loaded: send program.load first")
-        if self.state == "PLAYING":
-            raise RefusalError("busy", "", f"program {self.name} is playing")
-        if self._main is None:
-            self._motion.check("move_j")
-            # Whoever plays a program does not lend it what only their own programs may reach.
-            self._start(self._loaded, call.origin if call.origin == self._sender else None)
-            return
-        if self._motion.activity is Activity.PAUSED:
-            self._motion.resume()
-        else:
-            self._motion.check("move_j")
-        self._watchdogs.begin_anew(call.tick)
+    def play(self, origin: str | None) -> None:
+        """Begin the loaded program; `origin` is the address of the machine that both sent and plays it, if known."""
+        assert self.loaded is not None, "a program is loaded before it is played"
+        self._main = self._begin(self.loaded.script, self.name or self.loaded.script.name, origin)
+        self.state, self.line = "PLAYING", 1
+        self.statements.open(self._main.machine)
+
+    def play_beside(self, script: Script, origin: str | None) -> None:
+        """Begin a secondary program; `origin` as for `play`.
+
+        Raises:
+            RefusalError: Too many are running.
+        """
+        if sum(running is not self._main for running in self._all) >= MAX_BESIDE:
+            why = f"{MAX_BESIDE} secondary programs are running: wait until one of them has ended"
+            raise RefusalError("busy", "", why, MAX_BESIDE)
+        self._begin(script, script.name, origin)
+
+    def _begin(self, script: Script, name: str, origin: str | None) -> _Running:
+        machine = Machine(script, self._functions, finish=self.arm.finish)
+        running = _Running(name, script, machine, origin)
+        self._all.append(running)
+        self._emit("program_started", program=name, secondary=script.secondary or None)
+        return running
+
+    def go_on(self, tick: int) -> None:
+        """Let the paused program go on from this tick."""
+        self._watchdogs.begin_anew(tick)
         self.state = "PLAYING"
 
-    def _pause(self, _: Call[ProgramPause]) -> None:
-        if self.state != "PLAYING":
-            raise RefusalError("wrong_mode", "", "no program is playing: there is nothing to pause")
-        self._hold()
-
-    def _stop(self, _: Call[ProgramStop]) -> None:
-        why = "the program was stopped"
-        self.end(why)
-        self._motion.stop(None, why)
-
-    def _hold(self) -> None:
+    def hold(self) -> None:
         """Pause the program. A planned motion pauses on its path, a guided one is stopped."""
         self._safety.stay_paused()
         if self._motion.activity is Activity.MOVING and self.arm.moves:
@@ -344,45 +302,3 @@ class ProgramPlayer:
         if self._main is not None:
             self.line = self._main.machine.line
             self._main.machine.left = 0
-
-    def _check_running(self, command: str) -> None:
-        """Refuse to start a program where the arm has no power or is in a protective stop."""
-        activity = self._motion.activity
-        if activity.robot_mode is not RobotMode.RUNNING or activity.protective:
-            raise out_of_turn(command, activity)
-        self._motion.safety.check("move_j", activity)
-
-    def _replace(self, why: str) -> None:
-        """End the program that is running, and stop the arm."""
-        if self._main is not None:
-            self._close(self._main, why)
-            self._motion.stop(None, why)
-
-    def _start(self, script: Script, origin: str | None) -> None:
-        self._main = self._begin(script, self.name or script.name, origin)
-        self.state, self.line = "PLAYING", 1
-        self.statements.open(self._main.machine)
-
-    def _begin(self, script: Script, name: str, origin: str | None) -> _Running:
-        machine = Machine(script, self._functions, finish=self.arm.finish)
-        running = _Running(name, script, machine, origin)
-        self._all.append(running)
-        self._emit("program_started", program=name, secondary=script.secondary or None)
-        return running
-
-    rows: ClassVar[tuple[Row, ...]] = (
-        Row(ProgramLoad, _load, lease="if named", changes_io=True, plan=_COMPILED, long=True),
-        Row(ProgramRun, _run, changes_io=True, plan=_COMPILED, long=True),
-        Row(ProgramPlay, _play, changes_io=True),
-        Row(ProgramPause, _pause, changes_io=True),
-        Row(ProgramStop, _stop, lease="if named", changes_io=True, stops=True),
-        Row(ProgramClosePopup, lambda self, _: self._popups.dismiss(), lease="none"),
-        Row(
-            ProgramInterpret,
-            lambda self, call: self.statements.interpret(call),
-            changes_io=True,
-            plan=_COMPILED_AFTER,
-            long=True,
-        ),
-        Row(ProgramSkip, lambda self, call: self.statements.skip(call), changes_io=True),
-    )
