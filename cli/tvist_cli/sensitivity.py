@@ -36,7 +36,7 @@ def print_sensitivity(
 
     from tvist_lab.frequency_error import residual_over_error
     from tvist_shaping import ShapingError
-    from tvist_shaping.impulses import check_mode
+    from tvist_shaping.impulse_train import check_mode
 
     low, high = errors
     if not -90.0 <= low < high <= 900.0:

@@ -32,7 +32,8 @@ from tvist_shaping.fade import Fade
 from tvist_shaping.filter import TvistFilter
 from tvist_shaping.fir import FirDesign
 from tvist_shaping.fir_shaper import FirShaper
-from tvist_shaping.impulses import Impulses, ei, ei2, ei3, mzv, none, product, zv, zvd, zvdd, zvddd
+from tvist_shaping.impulse_train import Impulses, product
+from tvist_shaping.impulses import ei, ei2, ei3, mzv, none, zv, zvd, zvdd, zvddd
 from tvist_shaping.makers import custom, ei_of, mzv_of, si_of
 from tvist_shaping.named import BUILT_IN, DESIGNS, Registry, make_filter
 from tvist_shaping.own import check_shaper, shaper_of

@@ -23,7 +23,8 @@ import numpy as np
 from tvist_shaping._types import Floats
 from tvist_shaping.amplitudes import ripple, widening
 from tvist_shaping.errors import ConvergenceError
-from tvist_shaping.impulses import Impulses, V
+from tvist_shaping.impulse_train import Impulses
+from tvist_shaping.impulses import V
 from tvist_shaping.newton import solve
 from tvist_shaping.tabulated import Tabulated
 

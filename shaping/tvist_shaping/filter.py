@@ -12,7 +12,7 @@ from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.failures import FAILURES, ROUNDING, failure
 from tvist_shaping.filter_kernels import eased, shape, shape_all
-from tvist_shaping.impulses import UNSHAPED, Impulses, product
+from tvist_shaping.impulse_train import UNSHAPED, Impulses, product
 from tvist_shaping.own import longest as longest_of
 from tvist_shaping.shaper import Shaper
 

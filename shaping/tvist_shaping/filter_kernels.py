@@ -7,7 +7,8 @@ from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.delay_line import gather
 from tvist_shaping.estimators.polynomial import evaluate
-from tvist_shaping.impulses import F_D_RANGE, decay
+from tvist_shaping.impulse_train import F_D_RANGE
+from tvist_shaping.impulses import decay
 
 Integers = npt.NDArray[np.int64]
 LOWEST, HIGHEST = F_D_RANGE

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import DesignError, ShaperFailureError
 from tvist_shaping.failures import ROUNDING
-from tvist_shaping.impulses import Impulses
+from tvist_shaping.impulse_train import Impulses
 from tvist_shaping.steady import Design
 
 MAX_TAPS = 500

@@ -9,7 +9,8 @@ import numpy.typing as npt
 from tvist_shaping.amplitudes import modified, ripple
 from tvist_shaping.errors import DesignError
 from tvist_shaping.exact import exact as exact_humps
-from tvist_shaping.impulses import Impulses, Train, V, check_mode
+from tvist_shaping.impulse_train import Impulses, check_mode
+from tvist_shaping.impulses import Train, V
 from tvist_shaping.sensitivity import residual
 from tvist_shaping.shaper import Shaper
 from tvist_shaping.specified import specified

@@ -9,7 +9,7 @@ from tvist_shaping._types import Floats
 from tvist_shaping.errors import DesignError, ShaperFailureError
 from tvist_shaping.failures import FAILURES, ROUNDING, failure
 from tvist_shaping.fir_shaper import FirShaper
-from tvist_shaping.impulses import Impulses
+from tvist_shaping.impulse_train import Impulses
 from tvist_shaping.shaper import Shaper
 
 TRIED_F_D = (0.1, 200.0)

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import ShaperRangeError, ShapingError
-from tvist_shaping.impulses import Impulses
+from tvist_shaping.impulse_train import Impulses
 
 
 def residual(f: npt.ArrayLike, zeta: float, impulses: Impulses) -> Floats:

@@ -4,7 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tvist_shaping.errors import ShaperFailureError
-from tvist_shaping.impulses import Impulses, Train
+from tvist_shaping.impulse_train import Impulses
+from tvist_shaping.impulses import Train
 from tvist_shaping.sensitivity import band
 
 

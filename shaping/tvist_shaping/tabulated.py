@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tvist_shaping._types import Floats
-from tvist_shaping.impulses import Impulses, check_mode
+from tvist_shaping.impulse_train import Impulses, check_mode
 
 NODES = 32
 """Number of nodes, which is the degree of the polynomials in ζ plus 1; twice as many where the equations end at a

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from tvist_shaping._types import Floats
-from tvist_shaping.impulses import Impulses
+from tvist_shaping.impulse_train import Impulses
 from tvist_shaping.newton import solve
 from tvist_shaping.tabulated import Tabulated
 

@@ -7,7 +7,7 @@ import pytest
 from tests.system.test_command_line import tvist
 
 from tvist_shaping import SHAPERS, residual
-from tvist_shaping.impulses import Impulses
+from tvist_shaping.impulse_train import Impulses
 
 MOVES = [
     {"start": [0.0, -2.2, 1.9, -1.3, 0.0, 0.0], "target": [1.2, -1.4, 1.5, -1.6, 0.0, 0.0]},

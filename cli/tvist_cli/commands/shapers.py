@@ -132,7 +132,7 @@ def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:
     """Return the properties of a shaper, or why it does not support this mode."""
     from tvist_shaping import ShapingError
     from tvist_shaping.failures import FAILURES, words
-    from tvist_shaping.impulses import check_mode
+    from tvist_shaping.impulse_train import check_mode
 
     said: dict[str, Any] = {
         "name": shaper.name,

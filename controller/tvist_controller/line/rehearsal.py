@@ -43,10 +43,10 @@ def rehearse(cycle: ControlCycle) -> None:
     """Make some ticks with a line like this one, whose arm is not touched."""
     description, line, q = cycle.description, cycle.line, cycle.sample.reference
     carried = line.plant.payload
-    simulated = isinstance(line.plant, FlexibleArm)
+    flexible = isinstance(line.plant, FlexibleArm)
     other = ControlCycle(
         description, line.filter.tvist.fork(), q=q, declared=line.dynamics.payload, carried=carried, seed=0,
-        plant=FlexibleArm(description, carried) if simulated else Still(description.joints),
+        plant=FlexibleArm(description, carried) if flexible else Still(description.joints),
     )  # fmt: skip
     other.line.filter.rehearse(q)  # a transition between filters has kernels of its own
     for _ in range(3):

@@ -32,8 +32,8 @@ class ArmPower:
     @classmethod
     def of(cls, plant: Plant) -> Self | None:
         """Return the power of a plant; None if it has none, and no clock, as simulated arms."""
-        simulated = isinstance(plant, Placeable) and not isinstance(plant, Powered | Stoppable)
-        return None if simulated else cls(plant)
+        needs_nothing = isinstance(plant, Placeable) and not isinstance(plant, Powered | Stoppable)
+        return None if needs_nothing else cls(plant)
 
     @property
     def condition(self) -> Condition:

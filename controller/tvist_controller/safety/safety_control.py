@@ -189,18 +189,18 @@ class SafetyControl:
             Signals with the new state.
         """
         motion, cycle = self._motion, self._motion.cycle
-        simulated = isinstance(cycle.line.plant, Placeable)
-        why = f"{error}: the simulation put the arm at rest at its reference" if simulated else str(error)
+        placeable = isinstance(cycle.line.plant, Placeable)
+        why = f"{error}: the simulation put the arm at rest at its reference" if placeable else str(error)
         motion.abandon(why, "plant_failure")
         position = cycle.line.shaped.position
         try:
             sample = cycle.reset(position, seed=seed)
         except ValueError:  # `power_on` asks it again
-            if simulated:
+            if placeable:
                 raise
             sample = cycle.reset(position, measured=cycle.sample.measured)
         self._protection.forget()
-        if not simulated:
+        if not placeable:
             if motion.power is not None:
                 motion.power.stop()
             motion.activity = Activity.POWER_OFF

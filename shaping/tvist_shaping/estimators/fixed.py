@@ -8,7 +8,7 @@ import numpy as np
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.base import Estimator
-from tvist_shaping.impulses import F_D_RANGE
+from tvist_shaping.impulse_train import F_D_RANGE
 
 
 class Fixed(Estimator):

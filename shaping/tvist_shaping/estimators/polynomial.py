@@ -12,7 +12,7 @@ from tvist_shaping._types import Floats
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.basis import BasisFunctions, Kind
-from tvist_shaping.impulses import F_D_RANGE
+from tvist_shaping.impulse_train import F_D_RANGE
 
 MARGIN = 0.1
 """Share of a range, at both ends, in which the saturation is curved [-]."""
