@@ -25,7 +25,7 @@ WRITABLE: Mapping[str, int] = MappingProxyType(
 """Registers that can be written, and their largest values."""
 
 Meet = Callable[[float, float], float | None]
-"""Returns the opening at which closing fingers meet a part on their way between two openings; None if they do not [m]."""
+"""Returns the opening at which closing fingers meet a part on their way between two openings, or None [m]."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Gripper:
 
     @property
     def _fault(self) -> int:
-        """Number of the fault: automatic release in progress 11 or over 15, a request before or in the activation 7, 5."""
+        """Fault: automatic release in progress 11 or over 15; a request before the activation 7, or during it 5."""
         if self._written["ATR"]:
             return 15 if self._released else 11
         if self._written["GTO"] and not self._active:

@@ -12,7 +12,7 @@ from tvist_controller.cell.gripper import WRITABLE, Gripper
 PORT: Final = 63352
 """TCP port on which the URCap listens."""
 SLAVES = ("9", "1")
-"""Numbers by which the only gripper is selected, SID: the first on a wrist connector, or the number that clients use."""
+"""Numbers by which clients select the only gripper, SID."""
 UNKNOWN: Final = b"?"
 """Answer to what is not understood."""
 LONGEST: Final = 1024
