@@ -1,8 +1,7 @@
 """The content of a cell file: wires, tools, a gripper and parts."""
 
-import re
-from collections.abc import Iterable, Sequence
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from typing import Annotated, Literal, get_args
 
 from msgspec import Meta, Struct
 
@@ -10,9 +9,14 @@ from tvist_plant.description import is_real_body
 from tvist_plant.plant import PERIOD
 from tvist_protocol.values import Inertia6, Mass, Payload, Pose, Vec3
 
-_TERMINALS = {"standard": (0, 8), "configurable": (8, 8), "tool": (16, 2)}
-"""First bit and number of the digital terminals of each kind."""
-_TERMINAL = re.compile(r"(standard|configurable|tool) (\d)")
+Terminal = Literal[
+    "standard 0", "standard 1", "standard 2", "standard 3",
+    "standard 4", "standard 5", "standard 6", "standard 7",
+    "configurable 0", "configurable 1", "configurable 2", "configurable 3",
+    "configurable 4", "configurable 5", "configurable 6", "configurable 7",
+    "tool 0", "tool 1",
+]  # fmt: skip
+"""Name of a digital terminal, in the order of the bits of inputs and outputs."""
 MOST = 100
 """Largest number of wires, tools and parts, each."""
 STROKES = {"2F-85": 0.085, "2F-140": 0.14}
@@ -34,9 +38,9 @@ class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
 class Wire(_Table, frozen=True, kw_only=True):
     """A wire from a digital output to a digital input, or something that acts like one: a valve, a relay, a sensor."""
 
-    output: str
+    output: Terminal
     """Output: `standard 0` to `7`, `configurable 0` to `7`, or `tool 0` or `1`."""
-    input: str
+    input: Terminal
     """Input, named in the same way. It has one wire."""
     after: Annotated[float, Meta(ge=0, le=3600)] = 0.0
     """Time after which the input follows, rounded to ticks of 2 ms, but at least one [s]."""
@@ -62,7 +66,7 @@ class Tool(_Table, frozen=True, kw_only=True):
     """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
     inertia: Inertia6 = (0.0,) * 6
     """Moments of inertia xx xy xz yy yz zz about the centre of gravity, flange axes [kg m²]."""
-    while_on: str | None = None
+    while_on: Terminal | None = None
     """Digital output of a tool changer, as in `output` of a wire: while it is on, this tool replaces the first one."""
 
 
@@ -165,10 +169,9 @@ class Cell(_Table, frozen=True, kw_only=True):
                 )
 
     def _check_wires(self) -> None:
-        wired: dict[int, int] = {}
+        wired: dict[str, int] = {}
         for number, wire in enumerate(self.wires):
-            bit_of(f"wires[{number}].output", wire.output)
-            first = wired.setdefault(bit_of(f"wires[{number}].input", wire.input), number)
+            first = wired.setdefault(wire.input, number)
             if first != number:
                 raise CellError(
                     f"wires[{number}].input is {wire.input!r}, which has a wire: that of wires[{first}]"
@@ -186,30 +189,14 @@ class Cell(_Table, frozen=True, kw_only=True):
                     if number == 0
                     else f"tools[{number}].while_on is missing: only the first tool is on the flange without an output"
                 )
-            if tool.while_on is not None:
-                bit_of(f"tools[{number}].while_on", tool.while_on)
 
 
-def bit_of(key: str, terminal: str) -> int:
-    """Return the bit of a digital terminal among inputs or outputs.
-
-    Args:
-        key: Key of the file, for the message.
-        terminal: Its name, such as `configurable 3`.
-
-    Raises:
-        CellError: There is no such terminal.
-    """
-    found = _TERMINAL.fullmatch(terminal.strip().lower())
-    first, count = _TERMINALS[found[1]] if found else (0, 0)
-    if found is None or int(found[2]) >= count:
-        raise CellError(
-            f"{key} is {terminal[:40]!r}: must be standard 0 to 7, configurable 0 to 7, or tool 0 or 1"
-        )
-    return first + int(found[2])
+def bit_of(terminal: Terminal) -> int:
+    """Return a digital terminal as a bit among inputs or outputs."""
+    return 1 << get_args(Terminal).index(terminal)
 
 
-def _check_names(key: str, names: Sequence[str] | Iterable[str]) -> None:
+def _check_names(key: str, names: Sequence[str]) -> None:
     seen: dict[str, int] = {}
     for number, name in enumerate(names):
         first = seen.setdefault(name, number)

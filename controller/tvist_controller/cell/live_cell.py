@@ -53,9 +53,7 @@ class LiveCell:
         """The gripper; None if there is none."""
         tool = cell.gripping_tool
         self._tcp = placement(None if tool is None else tool.tcp)
-        self._changers = [
-            (1 << bit_of("while_on", tool.while_on), tool) for tool in cell.tools[1:] if tool.while_on
-        ]
+        self._changers = [(bit_of(tool.while_on), tool) for tool in cell.tools[1:] if tool.while_on]
         self.begin(load)
 
     @property

@@ -14,10 +14,7 @@ class Wires:
     """
 
     def __init__(self, wires: Sequence[Wire]) -> None:
-        self._wires = [
-            (1 << bit_of("output", one.output), 1 << bit_of("input", one.input), one.ticks, one.inverted)
-            for one in wires
-        ]
+        self._wires = [(bit_of(one.output), bit_of(one.input), one.ticks, one.inverted) for one in wires]
         self._outputs: int | None = None
         """Outputs of the last tick; None before the first."""
         # Those of one wire are in order of time, as its delay is always the same.

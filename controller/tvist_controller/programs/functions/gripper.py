@@ -130,6 +130,17 @@ class GripperFunctions:
         """Set the position to which `rq_go_to` moves the fingers, 0 to 100."""
         self.rq_set_pos(_from_percent("pos_norm", pos_norm), gripper_socket)
 
+    def rq_set_pos_spd_for(
+        self,
+        pos: object,
+        speed: object,
+        force: object,
+        gripper_socket: object = _ONE,  # noqa: ARG002
+    ) -> None:
+        """Set position, speed and force, each 0 to 255, for `rq_go_to`."""
+        ranged = {"POS": ("pos", pos), "SPE": ("speed", speed), "FOR": ("force", force)}
+        self._write(**{name: integer(*given, 0, 255) for name, given in ranged.items()})
+
     def rq_set_speed(self, speed: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
         """Set the speed of the fingers, 0 to 255."""
         self._write(SPE=integer("speed", speed, 0, 255))
