@@ -33,10 +33,15 @@ class Requests:
         self._received = b""
 
     def cut(self, data: bytes) -> list[bytes]:
-        """Return the requests that are complete with what has arrived now."""
+        """Return the requests that are complete with what has arrived now.
+
+        A request without a line feed is one that has arrived by itself: else its line feed may be under way.
+        """
+        if not self._received and _BARE_GET.fullmatch(data):
+            return [data]
         *lines, rest = (self._received + data).split(b"\n")
         requests = [line + b"\n" for line in lines if line.strip()]
-        if len(rest) > LONGEST or _BARE_GET.fullmatch(rest):
+        if len(rest) > LONGEST:
             requests.append(rest[:LONGEST])
             rest = b""
         self._received = rest
