@@ -1,13 +1,16 @@
 """A wrong cell file is refused with its key, the value, and what is allowed; a right one gives tool and payload."""
 
+import re
 from pathlib import Path
 
 import pytest
 
+from tvist_controller.cell.description import GripperModel, Part, Tool, Wire
 from tvist_controller.setup import Setup
 from tvist_server.config import ConfigError, ServeConfig
 
 EXAMPLE = Path(__file__).parents[2] / "clients" / "examples" / "cell.toml"
+PAGE = (EXAMPLE.parents[2] / "docs" / "how-to" / "serve-a-cell.md").read_text(encoding="utf-8")
 GOOD = EXAMPLE.read_text(encoding="utf-8")
 
 
@@ -56,3 +59,12 @@ def test_a_recording_has_the_whole_cell():
     setup = ServeConfig(cell=str(EXAMPLE), clock="lockstep").setup()
     assert Setup.from_builtins(setup.to_builtins()).cell == setup.cell
     assert "cell" not in ServeConfig().setup().to_builtins()
+
+
+def test_the_page_has_a_valid_file_and_all_keys(tmp_path):
+    file = tmp_path / "cell.toml"
+    file.write_text(re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)[1], encoding="utf-8")
+    assert ServeConfig(cell=str(file)).setup().cell.gripper is not None
+    rows = [line.split("|")[1] for line in PAGE.splitlines() if line.startswith("| `")]
+    keys = [kind.__struct_fields__ for kind in (Wire, Tool, GripperModel, Part)]
+    assert set(re.findall(r"`(\w+)`", " ".join(rows))) == {key for some in keys for key in some}
