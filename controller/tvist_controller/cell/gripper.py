@@ -83,7 +83,9 @@ class Gripper:
             self._active, self._activating, self._released = False, 0, False
         elif not before:
             self._activating, self._active = ACTIVATION, False
-        if self._target is not None and self._target != self._position and not self._stopped:
+        if self._target is None:
+            self._object = self._object or ARRIVED  # fingers that were moving have stopped
+        elif self._target != self._position and not self._stopped:
             self._object = MOVING
 
     def read(self, name: str) -> int | None:

@@ -47,6 +47,7 @@ class LiveCell:
     def __init__(self, cell: Cell, description: RobotDescription, emit: Emit, load: Payload) -> None:
         self._cell, self._emit = cell, emit
         self._kinematics = ToolKinematics(description)
+        self._kinematics.pose(np.zeros(description.joints))  # its kernel is loaded before the first tick
         self.gripper = (
             None if cell.gripper is None else Gripper(cell.gripper.stroke, activated=cell.gripper.activated)
         )
@@ -110,7 +111,7 @@ class LiveCell:
         if self._changers:
             first = self._cell.tools[0]
             self._mount(next((tool for bit, tool in self._changers if outputs & bit), first), q)
-        if self.gripper is not None and self._tool is self._cell.gripping_tool:
+        if self.gripper is not None:
             self._move_fingers(self.gripper, q)
         if self._held is not None:
             self._share = min(self._share + 1, TRANSFER)
@@ -144,22 +145,15 @@ class LiveCell:
 
     def _between(self, wide: float, narrow: float, q: Floats) -> float | None:
         """Return the width of the part that fingers meet on their way between two openings [m]; see `Meet`."""
-        self._met = None
-        fitting = [k for k, part in enumerate(self._cell.parts) if narrow <= part.size[1] <= wide + 1e-9]
-        reached = [
-            (distance, k)
-            for k in fitting
-            for distance, angle in [self._away(k, q)]
-            if self._reaches(distance, angle)
-        ]
-        if not reached:
+        self._met, limits, nearest = None, self._cell.gripper, np.inf
+        if limits is None or self._tool is not self._cell.gripping_tool:  # the fingers are not on the arm
             return None
-        self._met = min(reached)[1]
-        return self._cell.parts[self._met].size[1]
-
-    def _reaches(self, distance: float, angle: float) -> bool:
-        limits = self._cell.gripper
-        return limits is not None and distance <= limits.tolerance and angle <= limits.angle_tolerance
+        for number, part in enumerate(self._cell.parts):
+            if narrow <= part.size[1] <= wide + 1e-9:
+                distance, angle = self._away(number, q)
+                if distance <= min(limits.tolerance, nearest) and angle <= limits.angle_tolerance:
+                    self._met, nearest = number, distance
+        return None if self._met is None else self._cell.parts[self._met].size[1]
 
     def _flange(self, q: Floats) -> Placement:
         return Placement(*self._kinematics.pose(q))
@@ -185,12 +179,11 @@ class LiveCell:
 
     def _tell_missed(self, q: Floats) -> None:
         """Warn of a part that was nearly gripped."""
-        assert self._cell.gripper is not None
+        limits = self._cell.gripper
         away = [(*self._away(number, q), part.name) for number, part in enumerate(self._cell.parts)]
-        if not away or min(away)[0] > NEAR:
+        if limits is None or self._tool is not self._cell.gripping_tool or not away or min(away)[0] > NEAR:
             return
         distance, angle, name = min(away)
-        limits = self._cell.gripper
         self._emit(
             "warning",
             why=f"the gripper closed on nothing: {name} lies {1e3 * distance:.1f} mm and {angle:.2f} rad from the tool "

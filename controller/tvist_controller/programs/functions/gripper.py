@@ -9,7 +9,7 @@ from math import ceil, floor
 
 from tvist_controller.cell.gripper import CLOSED, MOVING, OPEN, Gripper
 from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import flag, integer, number
+from tvist_controller.programs.arguments import integer, number
 from tvist_controller.programs.arm import ProgramArm
 from tvist_urscript import Fault
 
@@ -44,13 +44,6 @@ class GripperFunctions:
         while self._gripper.read("STA") != 3:
             yield
 
-    def rq_activate_all_grippers(self, reset: object = False) -> Turns:
-        """Activate the gripper and wait until it is active; with `reset` even if it was."""
-        yield from self._arm.finish()
-        if flag("reset", reset):
-            self.rq_reset()
-        yield from self.rq_activate_and_wait()
-
     def rq_reset(self, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
         """Deactivate the gripper; its fingers stay where they are."""
         self._write(ACT=0, ATR=0)
@@ -80,14 +73,6 @@ class GripperFunctions:
     def rq_move(self, pos: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
         """Begin to move the fingers to a position: 0 is open, 255 closed."""
         self._write(POS=integer("pos", pos, 0, 255), GTO=1)
-
-    def rq_move_norm(self, pos_norm: object, gripper_socket: object = _ONE) -> None:
-        """Begin to move the fingers to a position: 0 is open, 100 closed."""
-        self.rq_move(_from_percent("pos_norm", pos_norm), gripper_socket)
-
-    def rq_move_mm(self, pos_in_mm: object, gripper_socket: object = _ONE) -> None:
-        """Begin to move the fingers until they are so many millimetres apart."""
-        self.rq_move(self._counts(pos_in_mm), gripper_socket)
 
     def rq_move_and_wait(self, pos: object, gripper_socket: object = _ONE) -> Turns:
         """Move the fingers to a position, 0 to 255, or until they meet a part."""
@@ -125,21 +110,6 @@ class GripperFunctions:
     def rq_set_pos(self, pos: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
         """Set the position to which `rq_go_to` moves the fingers, 0 to 255."""
         self._write(GTO=0, POS=integer("pos", pos, 0, 255))
-
-    def rq_set_pos_norm(self, pos_norm: object, gripper_socket: object = _ONE) -> None:
-        """Set the position to which `rq_go_to` moves the fingers, 0 to 100."""
-        self.rq_set_pos(_from_percent("pos_norm", pos_norm), gripper_socket)
-
-    def rq_set_pos_spd_for(
-        self,
-        pos: object,
-        speed: object,
-        force: object,
-        gripper_socket: object = _ONE,  # noqa: ARG002
-    ) -> None:
-        """Set position, speed and force, each 0 to 255, for `rq_go_to`."""
-        ranged = {"POS": ("pos", pos), "SPE": ("speed", speed), "FOR": ("force", force)}
-        self._write(**{name: integer(*given, 0, 255) for name, given in ranged.items()})
 
     def rq_set_speed(self, speed: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
         """Set the speed of the fingers, 0 to 255."""
