@@ -52,8 +52,9 @@ class Gripper:
     """
 
     def __init__(self, stroke: float, *, activated: bool) -> None:
-        self.stroke, self._activated = stroke, activated
+        self.stroke = stroke
         """Opening [m]."""
+        self._activated = activated
         self.begin()
 
     def begin(self) -> None:
@@ -178,7 +179,8 @@ class Gripper:
 
     def _arrive(self) -> None:
         self._object = ARRIVED
-        self._released = bool(self._written["ATR"])
+        if self._written["ATR"]:
+            self._released, self._active = True, False
 
     def _opening(self, position: float) -> float:
         return (CLOSED - position) / (CLOSED - OPEN) * self.stroke
