@@ -7,13 +7,10 @@ from tvist_controller.paths.poses import Placement
 from tvist_plant.description import Payload
 from tvist_plant.model import payload_inertia
 
-NOTHING = Payload()
-"""A flange with nothing on it."""
 
-
-def tool_body(tool: Tool | None) -> Payload:
+def tool_body(tool: Tool) -> Payload:
     """Return a tool as a payload."""
-    return NOTHING if tool is None else Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
+    return Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
 
 
 def part_body(part: Part, place: Placement) -> Payload:
