@@ -10,6 +10,7 @@ from tvist_controller.about import info_of
 from tvist_controller.authority.session import is_holders
 from tvist_controller.authority.standing import Standing
 from tvist_controller.authority.stepping import may_step
+from tvist_controller.cell.urcap import changes
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
 from tvist_controller.dispatch.setpoints import Unreadable
@@ -145,6 +146,18 @@ class Host:
         number, change, data = news
         self._note(Entry(tick=self._next, kind="socket", socket=number, change=change, data=data or None))
         self.controller.programs.sockets.hear(news)
+
+    def ask_gripper(self, request: bytes) -> bytes:
+        """Carry out a request of a client to the cell's gripper; return the answer.
+
+        Raises:
+            ValueError: The cell has no gripper.
+        """
+        if self.controller.cell is None:
+            raise ValueError("there is no cell")
+        if changes(request):
+            self._note(Entry(tick=self._next, kind="gripper", data=request))
+        return self.controller.cell.answer(request)
 
     def warn(self, why: str) -> None:
         """Send clients a warning about something outside the controller, which is not part of its replay."""

@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from tvist_controller.cell.description import Cell
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.sources.mode_source import ModeSource, first_source
 from tvist_controller.sources.own_plants import OwnPlant
@@ -58,6 +59,8 @@ class Setup:
     """Plant that is not part of the package; None for the flexible arm of the description."""
     shape_servo: bool = False
     """Whether `servoj`, `speedj` and `speedl` of programs are shaped where they begin at rest."""
+    cell: Cell | None = None
+    """What stands around the robot; None for nothing."""
     instance: str = ""
     """Part of every lease's token that tells this run from earlier ones; empty where equal runs must be equal."""
 
@@ -92,6 +95,8 @@ class Setup:
         if met is not None:
             raise ValueError(f"start: {met}: choose a posture in which the arm and its payload are clear")
         self.registry.check(self.shaper)
+        if self.cell is not None:
+            self.cell.check()
 
     def source(self) -> ModeSource:
         """Return the initial source of the vibration modes."""
@@ -140,6 +145,7 @@ class Setup:
             "own_shapers": [msgspec.to_builtins(own.recorded) for own in self.own_shapers],
             "compensate_sag": self.compensate_sag,
             "shape_servo": self.shape_servo,
+            **({} if self.cell is None else {"cell": msgspec.to_builtins(self.cell)}),
             **({} if self.plant is None else {"plant": msgspec.to_builtins(self.plant.recorded)}),
             **({"instance": self.instance} if self.instance else {}),
         }
@@ -170,6 +176,7 @@ class Setup:
                     calibration=None if calibration is None else calibration_of(calibration),
                     own_shapers=tuple(own_shapers),
                     plant=plant,
+                    cell=checked(content["cell"], Cell) if "cell" in content else None,
                 ),
                 **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
                 # Recordings from before these options existed do not have them.

@@ -199,6 +199,12 @@ def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
             controller.missed(entry.count or 0)
         case "socket":
             controller.programs.sockets.hear(SocketNews.of(entry))
+        case "gripper":
+            if controller.cell is None:
+                raise ReplayError(
+                    "the journal has requests for a gripper, but the recorded robot has no cell"
+                )
+            controller.cell.answer(entry.data or b"")
         case "setpoint_refused":
             controller.refuse_setpoint(entry.why or "")
         case _:

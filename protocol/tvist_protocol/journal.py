@@ -13,7 +13,7 @@ from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import explain_content
 
 EntryKind = Literal[
-    "command", "setpoint", "setpoint_refused", "client_seen", "client_gone", "missed", "socket"
+    "command", "setpoint", "setpoint_refused", "client_seen", "client_gone", "missed", "socket", "gripper"
 ]
 SocketChange = Literal["opened", "failed", "received", "closed", "expired"]
 """What happened to a program's socket: it was opened or could not be, has received bytes, or was closed from outside;
@@ -28,8 +28,9 @@ class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
     """Number of the first control period computed after it."""
     kind: EntryKind
     """Kind of entry: a message, an unreadable set-point of the lease's holder, the end of the session that had
-    control or the clock, ticks that began too late, or what happened to a program's socket. Recordings made before
-    sessions were distinguished contain every liveliness token that came or went."""
+    control or the clock, ticks that began too late, what happened to a program's socket, or what a client has
+    asked of the cell's gripper, except to be told something. Recordings made before sessions were distinguished contain
+    every liveliness token that came or went."""
     client: str | None = None
     """Client that it came from or concerns, if known."""
     session: str | None = None
@@ -45,7 +46,7 @@ class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
     change: SocketChange | None = None
     """What happened to the socket."""
     data: bytes | None = None
-    """Bytes that the socket has received."""
+    """Bytes that the socket or the gripper has received."""
 
 
 def entry_of(tick: int, message: Command | Setpoint, client: str | None = None) -> Entry:

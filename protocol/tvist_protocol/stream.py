@@ -42,7 +42,7 @@ EVENT_MEANINGS: dict[EventKind, str] = {
     "program_started": "the program `program` begins",
     "program_stopped": "the program `program` has ended; `why` gives the reason if it was ended, a `warning` with a "
     "`line` came before if an error of its own ended it",
-    "text": "a program has written `why` to the log",
+    "text": "a program has written `why` to the log, or the cell says what it did",
     "popup": "a program shows the message `why` with the title `title`, and may wait until it is closed",
 }
 

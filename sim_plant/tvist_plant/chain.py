@@ -56,15 +56,21 @@ def chain_of(model: pin.Model, frame: int) -> Floats:
             )
         turned = pin.SE3(AXES[kind], np.zeros(3))
         placement = aligned.inverse() * model.jointPlacements[number] * turned
-        body = turned.inverse().act(model.inertias[number])
         _place(chain[number - 1], placement)
-        chain[number - 1, BODY:] = body.toDynamicParameters()
+        chain[number - 1, BODY:] = body_of(model, number)
         aligned = turned
     end = model.frames[frame]
     if end.parentJoint != links:
         raise ValueError(f"frame {end.name} is not on the last joint")
     _place(chain[links], aligned.inverse() * end.placement)
     return chain
+
+
+def body_of(model: pin.Model, number: int) -> Floats:
+    """Return the ten inertial parameters of a joint's body, as `chain_of` does in a row."""
+    turned = pin.SE3(AXES[model.joints[number].shortname()], np.zeros(3))
+    parameters: Floats = turned.inverse().act(model.inertias[number]).toDynamicParameters()
+    return parameters
 
 
 def _place(row: Floats, placement: pin.SE3) -> None:

@@ -9,7 +9,7 @@ import pinocchio as pin
 from tvist_plant.arm_memory import ENCODER_STEP, GRAVITY, LAST, NOW, SUBSTEPS, memory_for, parts
 from tvist_plant.arm_memory import PERIOD as PERIOD_AT
 from tvist_plant.arm_tick import evaluate, move, play, tick
-from tvist_plant.chain import chain_of
+from tvist_plant.chain import BODY, body_of, chain_of
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand, LinearPart, Nonlinear
 from tvist_plant.imperfections import GearLaw, Imperfections, on_base
@@ -28,7 +28,7 @@ SUBSTEPS_OF_A_PERIOD = 4
 
 
 class FlexibleArm:
-    """A flexible arm and its drives: a `Plant` that also supports external pushes, a failure, and its modes.
+    """A flexible arm and its drives: a `Plant` that also supports pushes, other payloads, a failure, and its modes.
 
     Args:
         description: The robot.
@@ -177,6 +177,17 @@ class FlexibleArm:
         if T:
             self._specific_force = force[-1]
         return Response(measured, force, flange[:, 9:], flange[:, :9].reshape(T, 3, 3))
+
+    def load(self, payload: Payload) -> None:
+        """Carry another payload from now on; see `Loadable`."""
+        self._payload, model = payload, self._flexible.model
+        self._flexible.carry(payload)
+        self._arm.chain[model.nv - 1, BODY:] = body_of(model, model.nv)
+        self._arm.pushed[:] = 0.0 if self._outside.rests else self._outside.generalized_force(self._q)
+        evaluate(self.memory, np.empty(self._width))
+        self._arm.pushed[:] = 0.0
+        # The integrator extrapolates from the last two ticks: the jump between them is no trend.
+        self._arm.dynamics[LAST] = self._arm.dynamics[NOW]
 
     def push(self, torque: Floats) -> None:
         """Apply external torques to the joints, until they are changed or the arm is reset.

@@ -150,6 +150,7 @@ def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
         flex_stiffness=np.concatenate([[base.stiffness] * 2, arm.flex_stiffness]),
         flex_damping=np.concatenate([[base.stiffness * base.damping_time] * 2, arm.flex_damping]),
         flange=whole.getFrameId(FLANGE),
+        bare=arm.bare,
     )
 
 

@@ -41,6 +41,15 @@ class FlexibleModel:
     """Damping of each virtual joint [N m s/rad]."""
     flange: int
     """Frame index of the flange."""
+    bare: pin.Inertia
+    """Body of the last joint without a payload."""
+
+    def carry(self, payload: Payload) -> None:
+        """Change the payload in place, since a new model takes half a tick; it equals one up to rounding."""
+        place = self.model.frames[self.flange].placement
+        self.model.inertias[self.model.njoints - 1] = (
+            self.bare + place.act(payload_inertia(payload)) if payload.mass > 0.0 else self.bare
+        )
 
 
 def rigid_model(description: RobotDescription, payload: Payload) -> pin.Model:
@@ -81,6 +90,7 @@ def flexible_model(description: RobotDescription, payload: Payload) -> FlexibleM
         stiffness += [stiffness_of[number]] * 2
         placement = middle.inverse() * frame
         model.appendBodyToJoint(parent, far, placement)
+    bare = pin.Inertia(model.inertias[parent])
     _add_flange(model, parent, placement, payload)
     return FlexibleModel(
         model=model,
@@ -89,6 +99,7 @@ def flexible_model(description: RobotDescription, payload: Payload) -> FlexibleM
         flex_stiffness=np.array(stiffness),
         flex_damping=np.array(stiffness) * flexibility.damping_time,
         flange=model.getFrameId(FLANGE),
+        bare=bare,
     )
 
 

@@ -238,6 +238,18 @@ def measured_standing(plant: Plant, joints: int) -> Measurement:
 
 
 @runtime_checkable
+class Loadable(Protocol):
+    """A plant whose carried payload can change while it moves, for the parts and tools of a cell."""
+
+    def load(self, payload: Payload) -> None:
+        """Carry another payload from now on. Positions and velocities stay, only forces change.
+
+        Args:
+            payload: New carried payload.
+        """
+
+
+@runtime_checkable
 class Pushable(Protocol):
     """A plant that supports external torques on its joints, for the fault `torque`."""
 

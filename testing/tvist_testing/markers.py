@@ -40,6 +40,11 @@ def plant(plant: str) -> Part:
     return {"plant": _text("tvist_plant", plant)}
 
 
+def cell(cell: str) -> Part:
+    """What stands around the robot, a TOML file with wires, tools, a gripper and parts; see `tvist serve --cell`."""
+    return {"cell": _text("tvist_cell", cell)}
+
+
 def state(
     start: str | None = None,
     *,
@@ -107,6 +112,7 @@ MARKERS: dict[str, Callable[..., Part]] = {
     "tvist_payload": payload,
     "tvist_shaper": shaper,
     "tvist_plant": plant,
+    "tvist_cell": cell,
     "tvist_state": state,
     "tvist_faults": faults,
     "tvist_program": program,

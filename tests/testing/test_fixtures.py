@@ -47,6 +47,16 @@ def test_an_arm_of_one_s_own_need_not_know_the_truth(tvist_robot):
     assert_settles_within(tvist_robot, seconds=0.1)
 
 
+@pytest.mark.tvist_cell("clients/examples/cell.toml")
+def test_a_cell_stands_around_a_robot(tvist_robot):
+    assert tvist_robot.io().tcp_offset[2] == 0.163
+    assert tvist_robot.io().payload.mass == 0.92
+    with tvist_robot.control("me") as arm:
+        arm.set_digital_output(1, True)
+        tvist_robot.advance(250)
+    assert tvist_robot.io().actual_digital_input_bits == 8
+
+
 class TestReady:
     def test_the_first_state_is_that_of_the_arm_at_rest(self, tvist_robot):
         state = tvist_robot.state()

@@ -78,6 +78,7 @@ def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> UrInt
         address,
         ports,
         lockstep=lockstep,
+        gripper=robot.ask_gripper if setup.cell is not None and setup.cell.gripper is not None else None,
         programs=config.program_folder(setup.name),
     )
 

@@ -9,14 +9,16 @@ from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from tvist_controller import calibrations
+from tvist_controller.cell.description import Cell, as_declared
 from tvist_controller.setup import Setup, check_rating, paper_payload
 from tvist_controller.sources.own_plants import load_plant
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.info import Clock
-from tvist_protocol.values import Namespace, RobotName, Seed
+from tvist_protocol.values import Namespace, Payload, RobotName, Seed
 from tvist_server.allowed_hosts import AllowedHosts
+from tvist_server.cell_file import read_cell
 from tvist_server.durations import ticks_of
 from tvist_server.fleet import MOST, members
 from tvist_server.initial import read_state, shaped_by
@@ -65,6 +67,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     --connect, the folder of a robot, made by tvist keys --member; the router checks clients."""
     insecure: bool = False
     """Accept remote connections without TLS and do not authenticate clients; anyone can move the robot."""
+    cell: str | None = None
+    """TOML file with what stands around the robot: wires, tools, a gripper, parts. Its first tool is carried, and
+    declared unless --payload says otherwise. Programs reach the gripper; with --ur clients do, too, on port 63352."""
     profile: ProfileName | None = None
     """Set of defaults. ursim is like UR's simulator: it starts an arm of UR's kind in URSim's posture, with a payload
     of 0 kg, shaper none, --quiet, --no-floor and --compensate-sag. real starts in the same posture and is otherwise
@@ -135,7 +140,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """IP address on which UR's interfaces listen; each further robot uses the next address."""
     ur_ports: UrPorts = UrPorts()
     """Change the port of one UR interface, repeatable: rtde=31004, or dashboard=off to close it. The others are
-    primary, secondary, realtime, interpreter, primary_read_only, secondary_read_only and realtime_read_only."""
+    primary, secondary, realtime, interpreter, primary_read_only, secondary_read_only and realtime_read_only, and for
+    a cell gripper."""
     ur_allow: tuple[str, ...] = ()
     """Let programs open sockets to this machine too, repeatable: an IP address, a network such as 192.168.1.0/24, or a
     name as programs write it [only the machine that sent the program]."""
@@ -214,7 +220,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             raise ConfigError(str(error)) from error
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
-        """Return the address of a robot's UR interfaces, and the port of each.
+        """Return the address of a robot's UR interfaces, and the port of each, also of a cell's gripper.
 
         Args:
             number: Index of the robot, 0 for the first.
@@ -231,7 +237,10 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             ) from error
         if number and first.is_unspecified:
             raise ConfigError(f"ur_address is {self.ur_address}: several robots need one address each")
-        return str(address), self.ur_ports.open()
+        ports = self.ur_ports.open()
+        if self.cell is not None and self.ur_ports.gripper:
+            ports["gripper"] = self.ur_ports.gripper
+        return str(address), ports
 
     @property
     def endpoints(self) -> tuple[str, ...]:
@@ -274,10 +283,13 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 self.ur_ports.check_joints(description.robot.name, description.joints)
             profile = PLAIN if chosen is None else PROFILES[chosen]
             calibration = self._calibration(description.robot.model)
+            cell = None if self.cell is None else read_cell(self.cell)
             setup = Setup(
                 description=self._described(description, profile),
                 q=self._start(description, profile),
-                payload=paper_payload(description, _either(self.payload, profile.payload)),
+                payload=self._declared(description, profile, cell),
+                carried=None if cell is None or not cell.tools else as_declared(cell.tools[0]),
+                cell=cell,
                 calibration=calibration,
                 name=self.name,
                 seed=self.seed,
@@ -317,6 +329,12 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         if _either(self.quiet, profile.quiet):
             description = description.quiet()
         return description if _either(self.floor, profile.floor) else description.without_floor()
+
+    def _declared(self, description: RobotDescription, profile: Profile, cell: Cell | None) -> Payload:
+        """Return the declared payload: the tool of the cell, unless another mass is given."""
+        if self.payload is None and cell is not None and cell.tools:
+            return as_declared(cell.tools[0])
+        return paper_payload(description, _either(self.payload, profile.payload))
 
     def _calibration(self, model: str) -> Calibration | None:
         """Load the calibration that is named or, if none is, the one that comes with the package for this model."""

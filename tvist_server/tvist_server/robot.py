@@ -262,6 +262,15 @@ class ServedRobot:
 
         self.driven.post(hear)
 
+    def ask_gripper(self, request: bytes, answer: Callable[[bytes], None]) -> None:
+        """Have a request to the cell's gripper carried out before the next tick; callable from any thread.
+
+        Args:
+            request: The request.
+            answer: Takes the answer, in the controller's thread.
+        """
+        self.driven.post(lambda: answer(self._host.ask_gripper(request)))
+
     def warn(self, why: str) -> None:
         """Publish a warning to clients and the console."""
         self.driven.post(lambda: self._host.warn(why))

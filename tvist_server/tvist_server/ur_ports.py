@@ -5,11 +5,13 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct
 
+from tvist_controller.cell.urcap import PORT
+
 InterfaceName = Literal[
     "dashboard", "primary", "secondary", "realtime", "rtde", "interpreter",
-    "primary_read_only", "secondary_read_only", "realtime_read_only",
+    "primary_read_only", "secondary_read_only", "realtime_read_only", "gripper",
 ]  # fmt: skip
-"""Name of one of UR's interfaces."""
+"""Name of one of UR's interfaces, or of that of a cell's gripper."""
 MOST_JOINTS = 6
 """Joints that a package of UR's interfaces has room for; those that an arm does not have are 0 in it."""
 WITHOUT_JOINTS: frozenset[InterfaceName] = frozenset({"dashboard", "interpreter"})
@@ -29,10 +31,13 @@ class UrPorts(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     primary_read_only: Port = 30011
     secondary_read_only: Port = 30012
     realtime_read_only: Port = 30013
+    gripper: Port = PORT
+    """Port of the gripper, which only a robot with a cell has."""
 
     def open(self) -> dict[InterfaceName, int]:
-        """Return the port of each interface that is open."""
-        return {interface: port for interface, port in msgspec.structs.asdict(self).items() if port}  # type: ignore[misc]
+        """Return the port of each of UR's interfaces that is open."""
+        named = msgspec.structs.asdict(self)
+        return {interface: port for interface, port in named.items() if port and interface != "gripper"}  # type: ignore[misc]
 
     def check_joints(self, robot: str, joints: int) -> None:
         """Check that the open interfaces can send the values of all joints of a robot.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 OPTIONS = {
     "robot", "profile", "payload", "overload", "shaper", "shape_servo", "plant", "start", "seed", "record", "truth",
-    "listen", "ur", "ur_allow",
+    "listen", "ur", "ur_allow", "cell",
 }  # fmt: skip
 """Options of `tvist serve` that one robot which ends with its program can do with."""
 
@@ -62,7 +62,8 @@ def run(
         check: Look for errors without running anything: each is a line FILE:LINE:COLUMN: text. Exit code 0: there is
             none. Exit code 1: there is at least one. Exit code 2: a file cannot be read.
         lockstep: Run as fast as this machine computes, without network; the arm moves exactly as in real time. A
-            program that waits for a client then waits for ever: see --input and --timeout. It cannot open sockets.
+            program that waits for a client then waits for ever: see --input and --timeout. It can open sockets only to
+            the gripper of a cell.
         inputs: Input to set before the start as NAME=VALUE, repeatable. NAME is digital_input_N, input_bit_register_N,
             input_int_register_N or input_double_register_N.
         timeout: End the run after this time in s as the robot counts it, with exit code 1 [the program may run for

@@ -99,10 +99,13 @@ class Peripherals:
                 self._analog_ratios[number] = ratio
                 self.choose_output(number, voltage=bool(command.standard_analog_output_type >> number & 1))
 
+    def set_digital_inputs(self, mask: int, values: int) -> None:
+        """Apply signals to the digital inputs that the mask selects."""
+        self._digital_inputs, self.changed = self._digital_inputs & ~mask | values & mask, True
+
     def set_inputs(self, command: SimulationSetInputs) -> None:
         """Apply signals to inputs."""
-        mask = command.digital_input_mask
-        self._digital_inputs = self._digital_inputs & ~mask | command.digital_inputs & mask
+        self.set_digital_inputs(command.digital_input_mask, command.digital_inputs)
         if command.standard_analog_input is not None:
             self._analog_inputs = list(command.standard_analog_input)
         if command.analog_input_types is not None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from tvist_controller.cell.live_cell import LiveCell
 from tvist_controller.commands.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.tool_forces import ToolForces
@@ -39,4 +40,6 @@ class Access:
     """Forces and torques on the arm in the last tick."""
     shape_guided: bool = False
     """Whether guided motions of programs that begin at rest are shaped."""
+    cell: LiveCell | None = None
+    """What stands around the robot; None for nothing."""
     steadiness: Steadiness = field(default_factory=Steadiness)

@@ -5,6 +5,7 @@ from typing import Any
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.functions.gripper import GripperFunctions
 from tvist_controller.programs.functions.messages import MessageFunctions
 from tvist_controller.programs.functions.motions import MotionFunctions
 from tvist_controller.programs.functions.poses import PoseFunctions
@@ -34,6 +35,7 @@ FAMILIES: Mapping[type, str] = {
     SocketFunctions: "Sockets",
     StatementFunctions: "Statements from clients",
     SafetyFunctions: "Safety",
+    GripperFunctions: "Gripper",
 }
 """What the functions of each class are about, in the order of the documentation."""
 
@@ -69,6 +71,7 @@ def functions(
         SocketFunctions(connections, arm),
         StatementFunctions(arm, queue),
         SafetyFunctions(access, arm, watchdogs),
+        GripperFunctions(access, arm),
         IdleFunctions(),
     )
     return MISSING | {name: getattr(family, name) for family in families for name in signatures(type(family))}

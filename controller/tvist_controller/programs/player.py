@@ -58,7 +58,9 @@ class ProgramPlayer:
         self.arm = ProgramArm(access, self._thread, lambda work: self._machine().charge(work))
         self.popups = Popups(access.emit, self._machine)
         self._watchdogs = Watchdogs(access.peripherals)
-        self.sockets = Sockets(access.emit, self._machine, lambda: self._now.origin if self._now else None)
+        self.sockets = Sockets(
+            access.emit, self._machine, lambda: self._now.origin if self._now else None, access.cell
+        )
         self.statements = StatementQueue(self._machine, self.arm, access.peripherals, access.emit)
         self._functions = functions(
             access, self.arm, self.popups, self._watchdogs, self.sockets, self.statements
@@ -116,6 +118,7 @@ class ProgramPlayer:
         """
         # Evaluations are counted rather than timed, so that a run is the same live, in lockstep and in a replay
         # (decision 26). What a tick takes beyond them, the next ticks pay.
+        self.sockets.answer()
         left = self._left = min(self._left, 0) + EVALUATIONS
         if not self._all:
             return

@@ -1,7 +1,8 @@
 """Sockets of programs: what they have received, and what waits for more.
 
 The network is the host's: it connects, sends and receives, and reports what happened as `SocketNews`, which the journal
-contains. So a replay gets the same bytes at the same ticks.
+contains. So a replay gets the same bytes at the same ticks. The gripper of a cell needs no network: it is part of the
+simulation, and answers a tick later.
 """
 
 from collections.abc import Callable, Generator
@@ -9,6 +10,8 @@ from dataclasses import dataclass, field
 from math import ceil
 from typing import Any, TypeVar
 
+from tvist_controller.cell.live_cell import LiveCell
+from tvist_controller.cell.urcap import Requests
 from tvist_controller.commands.events import Emit
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.socket_traffic import (
@@ -43,6 +46,8 @@ class _Socket:
     connected: bool = False
     """True once it was open; the other side may have closed it since."""
     open: bool = False
+    requests: Requests | None = None
+    """What the program has sent to the gripper of the cell; None for a socket of the network."""
 
 
 class Sockets:
@@ -52,15 +57,24 @@ class Sockets:
         emit: Emits events.
         owner: Returns the program that runs now.
         origin: Returns the address of the machine that sent and started that program; None if it is unknown.
+        cell: The cell, whose gripper programs reach; None if there is none.
     """
 
-    def __init__(self, emit: Emit, owner: Callable[[], Machine], origin: Callable[[], str | None]) -> None:
-        self._emit, self._owner, self._origin = emit, owner, origin
+    def __init__(
+        self,
+        emit: Emit,
+        owner: Callable[[], Machine],
+        origin: Callable[[], str | None],
+        cell: LiveCell | None = None,
+    ) -> None:
+        self._emit, self._owner, self._origin, self._cell = emit, owner, origin, cell
         self.orders: list[SocketOrder] = []
         """Orders for the network, in their order, which the host takes away."""
         self._named: dict[tuple[Machine, str], _Socket] = {}
         self._numbered: dict[int, _Socket] = {}
         self._last = self._last_wait = 0
+        self._answers: list[tuple[_Socket, bytes]] = []
+        """Answers of the gripper that programs get in the next tick."""
         self._waits: dict[int, bool] = {}
         """Present waits, and whether the time of each is over on the wall, too."""
 
@@ -80,6 +94,12 @@ class Sockets:
                 socket.received += news.data
             case _:
                 socket.opening = socket.open = False
+
+    def answer(self) -> None:
+        """Pass on what the gripper has answered in the last tick."""
+        for socket, data in self._answers:
+            socket.received += data
+        self._answers.clear()
 
     # ------------------------------------------------------------------ what programs call
 
@@ -103,13 +123,18 @@ class Sockets:
             raise Fault(f"the program has {MAX_SOCKETS} open sockets: close one first")
         self._last += 1
         socket = self._named[owner, name] = self._numbered[self._last] = _Socket(self._last)
+        if self._cell is not None and self._cell.reaches(address, port):
+            socket.requests = Requests()
+            socket.opening, socket.connected, socket.open = False, True, True
+            yield
+            return True
         self.orders.append(Open(socket.number, self._origin(), address, port))
         wait = self._begin(socket)
         try:
             while socket.opening:
                 yield
         finally:
-            self._end(wait)
+            self._end(wait, socket)
             if not socket.connected and self._named.get((owner, name)) is socket:
                 self._drop(owner, name)
         if not socket.connected:
@@ -132,7 +157,10 @@ class Sockets:
         socket = self._named.get((self._owner(), name))
         if socket is None or not socket.open:
             return False
-        self.orders.append(Send(socket.number, data))
+        if socket.requests is not None and self._cell is not None:
+            for request in socket.requests.cut(data):
+                self._answers.append((socket, self._cell.answer(request)))
+        self._order(socket, Send(socket.number, data))
         return True
 
     def read(
@@ -172,10 +200,12 @@ class Sockets:
                 if not socket.open or self._waits[wait]:
                     return None
                 if waited == last:
+                    if socket.requests is not None:
+                        return None
                     self.orders.append(Expire(wait, socket.number, timeout))
                 yield from meanwhile(waited)
         finally:
-            self._end(wait)
+            self._end(wait, socket)
 
     def close(self, owner: Machine) -> None:
         """Close all sockets of a program, which has ended."""
@@ -192,21 +222,26 @@ class Sockets:
             del socket.received[: found[1]]
             self._owner().progress()
             if socket.number in self._numbered:  # another thread may have closed it
-                self.orders.append(Taken(socket.number, found[1]))
+                self._order(socket, Taken(socket.number, found[1]))
         return found
 
     def _begin(self, socket: _Socket) -> int:
         self._last_wait += 1
         self._waits[self._last_wait] = False
-        self.orders.append(Wait(self._last_wait, socket.number))
+        self._order(socket, Wait(self._last_wait, socket.number))
         return self._last_wait
 
-    def _end(self, wait: int) -> None:
+    def _end(self, wait: int, socket: _Socket) -> None:
         del self._waits[wait]
-        self.orders.append(Waited(wait))
+        self._order(socket, Waited(wait))
+
+    def _order(self, socket: _Socket, order: SocketOrder) -> None:
+        """Give an order to the network, unless the socket is one of the gripper."""
+        if socket.requests is None:
+            self.orders.append(order)
 
     def _drop(self, owner: Machine, name: str) -> None:
         socket = self._named.pop((owner, name))
         del self._numbered[socket.number]
         socket.opening = socket.open = False
-        self.orders.append(Close(socket.number))
+        self._order(socket, Close(socket.number))

@@ -43,7 +43,8 @@ class SocketFunctions:
     ) -> Generator[None, None, bool]:
         """Connect to a machine; return whether this has succeeded within 2 s.
 
-        Programs may connect to the machine that sent them, and to those that the server allows (`--ur-allow`).
+        Programs may connect to the machine that sent them, to those that the server allows (`--ur-allow`), and to the
+        gripper of a cell at `127.0.0.1` port 63352.
         """
         machine, at = text("address", address), integer("port", port, 1, 65535)
         name = text("socket_name", socket_name)

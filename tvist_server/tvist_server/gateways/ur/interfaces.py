@@ -23,6 +23,7 @@ from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.connection import Connection
 from tvist_server.gateways.ur.dashboard.session import DashboardSession
 from tvist_server.gateways.ur.external_control import ExternalControl
+from tvist_server.gateways.ur.gripper import AskGripper, GripperSession
 from tvist_server.gateways.ur.interpreter import InterpreterSession
 from tvist_server.gateways.ur.lease import ALIVE, ConnectionControl, HostLease
 from tvist_server.gateways.ur.notices import Notices
@@ -63,6 +64,7 @@ class UrInterfaces(Gateway):
         address: IP address to listen on.
         ports: Port of each interface; an interface without a port stays closed.
         lockstep: Whether a client advances time, so that no state may be lost.
+        gripper: Has a request to the cell's gripper carried out; None without one, so that its port is closed.
         programs: Folder with programs that clients load by their names.
 
     Raises:
@@ -78,11 +80,12 @@ class UrInterfaces(Gateway):
         ports: Mapping[InterfaceName, int],
         *,
         lockstep: bool = False,
+        gripper: AskGripper | None = None,
         programs: ProgramFolder | None = None,
     ) -> None:
         self.setpoints_refused = 0
         self.address = address
-        self._desk = desk
+        self._desk, self._gripper = desk, gripper
         self._scripts, self._refusals, self._coming_and_going = (
             Notices(lambda line: log.warning("robot %s: %s", name, line)) for _ in range(3)
         )
@@ -109,6 +112,8 @@ class UrInterfaces(Gateway):
         self._sockets: dict[InterfaceName, socket.socket] = {}
         try:
             for interface, port in ports.items():
+                if interface == "gripper" and gripper is None:
+                    continue
                 self._sockets[interface] = _listen(address, port, interface)
         except BaseException:
             self._close_sockets()
@@ -148,7 +153,7 @@ class UrInterfaces(Gateway):
                 await self._loop.create_server(
                     partial(
                         Connection,
-                        partial(_session, interface, self.robot),
+                        partial(self._session, interface),
                         self._lease,
                         places,
                         self._coming_and_going,
@@ -248,6 +253,13 @@ class UrInterfaces(Gateway):
         """
         self._adopted = self._lease(host)
         self._adopted.adopt(token, self)
+
+    def _session(self, interface: InterfaceName, control: ConnectionControl, send: Send) -> PortSession:
+        if interface == "gripper" and self._gripper is not None:
+            return GripperSession(
+                self._gripper, send, lambda answer: self._soon(lambda: control.hear(answer))
+            )
+        return _session(interface, self.robot, control, send)
 
     def _lease(self, host: str) -> HostLease:
         lease = self._leases.get(host)

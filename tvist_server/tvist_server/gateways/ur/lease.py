@@ -137,7 +137,8 @@ class ConnectionControl(ControllerAccess):
     ) -> None:
         self.peer, self.host = peer or lease.client, lease.host
         self._lease = lease
-        self._hear = hear or _at_once
+        self.hear = hear or _at_once
+        """Has an answer handled, which is a function to call."""
         self.unanswered = 0
         """Number of commands that are not yet answered."""
 
@@ -152,7 +153,7 @@ class ConnectionControl(ControllerAccess):
 
         def counted(reply: Reply) -> None:
             self.unanswered -= 1
-            self._hear(lambda: then(reply))
+            self.hear(lambda: then(reply))
 
         return counted
 
@@ -162,7 +163,7 @@ class ConnectionControl(ControllerAccess):
 
     def lasting(self) -> "ConnectionControl":
         """Return a further access for the same host, which does not end with the connection."""
-        return ConnectionControl(self._lease, self._hear, self.peer)
+        return ConnectionControl(self._lease, self.hear, self.peer)
 
     def leave(self) -> None:
         """Give back control, when the connection or what outlasted it has ended."""

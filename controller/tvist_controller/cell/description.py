@@ -1,0 +1,206 @@
+"""The content of a cell file: wires, tools, a gripper and parts."""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal, get_args
+
+from msgspec import Meta, Struct
+
+from tvist_plant.description import is_real_body
+from tvist_plant.plant import PERIOD
+from tvist_protocol.values import Inertia6, Mass, Payload, Pose, Vec3
+
+Terminal = Literal[
+    "standard 0", "standard 1", "standard 2", "standard 3",
+    "standard 4", "standard 5", "standard 6", "standard 7",
+    "configurable 0", "configurable 1", "configurable 2", "configurable 3",
+    "configurable 4", "configurable 5", "configurable 6", "configurable 7",
+    "tool 0", "tool 1",
+]  # fmt: skip
+"""Name of a digital terminal, in the order of the bits of inputs and outputs."""
+MOST = 100
+"""Largest number of wires, tools and parts, each."""
+STROKES = {"2F-85": 0.085, "2F-140": 0.14}
+"""Opening of each gripper [m]."""
+
+Name = Annotated[str, Meta(min_length=1, max_length=64)]
+HeavyMass = Annotated[float, Meta(gt=0, le=100)]
+Edge = Annotated[float, Meta(gt=0, le=10)]
+
+
+class CellError(ValueError):
+    """A cell is invalid; the message names key, value and limit."""
+
+
+class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A table of the file."""
+
+
+class Wire(_Table, frozen=True, kw_only=True):
+    """A wire from a digital output to a digital input, or something that acts like one: a valve, a relay, a sensor."""
+
+    output: Terminal
+    """Output: `standard 0` to `7`, `configurable 0` to `7`, or `tool 0` or `1`."""
+    input: Terminal
+    """Input, named in the same way. It has one wire."""
+    after: Annotated[float, Meta(ge=0, le=3600)] = 0.0
+    """Time after which the input follows, rounded to ticks of 2 ms, but at least one [s]."""
+    inverted: bool = False
+    """Whether the input is on while the output is off."""
+
+    @property
+    def ticks(self) -> int:
+        """Ticks after which the input follows."""
+        return max(1, round(self.after / PERIOD))
+
+
+class Tool(_Table, frozen=True, kw_only=True):
+    """A tool. The first one is on the flange, and is declared at the start: its TCP, its mass and centre of gravity."""
+
+    name: Name
+    """Its name, in messages."""
+    mass: Mass
+    """Mass [kg]."""
+    cog: Vec3
+    """Centre of gravity in the flange frame [m]."""
+    tcp: Pose
+    """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
+    inertia: Inertia6 = (0.0,) * 6
+    """Moments of inertia xx xy xz yy yz zz about the centre of gravity, flange axes [kg m²]."""
+    while_on: Terminal | None = None
+    """Digital output of a tool changer, as in `output` of a wire: while it is on, this tool replaces the first one."""
+
+
+def as_declared(tool: Tool) -> Payload:
+    """Return a tool as a client would declare it."""
+    return Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
+
+
+class GripperModel(_Table, frozen=True, kw_only=True):
+    """A gripper with two fingers, on one of the tools. It answers as a Robotiq 2F does."""
+
+    model: Literal["2F-85", "2F-140"]
+    """Which one: it opens by 85 mm or 140 mm."""
+    tool: str | None = None
+    """Name of the tool that it is part of [the first]."""
+    activated: bool = False
+    """Whether it is activated at the start. After power-on it is not: a program activates it."""
+    tolerance: Annotated[float, Meta(gt=0, le=0.1)] = 0.005
+    """Largest distance between a part and the tool centre point at which closing fingers meet it [m]."""
+    angle_tolerance: Annotated[float, Meta(gt=0, le=3.15)] = 0.2
+    """Largest angle between the two; a half turn about z changes nothing, as it only swaps the fingers [rad]."""
+
+    @property
+    def stroke(self) -> float:
+        """Opening [m]."""
+        return STROKES[self.model]
+
+
+class Part(_Table, frozen=True, kw_only=True):
+    """A box that can be gripped."""
+
+    name: Name
+    """Its name, in messages."""
+    mass: HeavyMass
+    """Mass [kg]."""
+    size: tuple[Edge, Edge, Edge]
+    """Lengths of its edges along x y z of its own frame [m]. Fingers close along y."""
+    pose: Pose
+    """Pose of its own frame in that of the base: the pose of the tool centre point that grips it in the middle."""
+    cog: Vec3 = (0.0, 0.0, 0.0)
+    """Centre of gravity in its own frame [m]."""
+
+    @property
+    def inertia(self) -> Inertia6:
+        """Moments of inertia of a box of even density about its centre, own axes [kg m²]."""
+        x, y, z = (edge * edge * self.mass / 12.0 for edge in self.size)
+        return y + z, 0.0, 0.0, x + z, 0.0, x + y
+
+
+class Cell(_Table, frozen=True, kw_only=True):
+    """A cell: what stands around one robot."""
+
+    wires: Annotated[tuple[Wire, ...], Meta(max_length=MOST)] = ()
+    """Wires between terminals."""
+    tools: Annotated[tuple[Tool, ...], Meta(max_length=MOST)] = ()
+    """Tools; the first one is on the flange."""
+    gripper: GripperModel | None = None
+    """Gripper; None if there is none."""
+    parts: Annotated[tuple[Part, ...], Meta(max_length=MOST)] = ()
+    """Parts that it can grip."""
+
+    @property
+    def changes_load(self) -> bool:
+        """Whether what the arm carries can change."""
+        return bool(self.parts) or len(self.tools) > 1
+
+    @property
+    def gripping_tool(self) -> Tool | None:
+        """Tool that the gripper is part of; None without a gripper."""
+        if self.gripper is None or self.gripper.tool is None:
+            return self.tools[0] if self.gripper is not None else None
+        return next(tool for tool in self.tools if tool.name == self.gripper.tool)
+
+    def check(self) -> None:
+        """Check what the types of the fields cannot express.
+
+        Raises:
+            CellError: Something contradicts something else.
+        """
+        self._check_wires()
+        self._check_tools()
+        for key, things in (("tools", self.tools), ("parts", self.parts)):
+            _check_names(key, [one.name for one in things])
+        if self.gripper is None:
+            if self.parts:
+                raise CellError("parts need a gripper: add the table [gripper]")
+            return
+        known = [tool.name for tool in self.tools]
+        if not known:
+            raise CellError(
+                "gripper needs a tool that it is part of, whose tcp says where it grips: add [[tools]]"
+            )
+        if self.gripper.tool is not None and self.gripper.tool not in known:
+            raise CellError(f"gripper.tool is {self.gripper.tool!r}: must be one of {', '.join(known)}")
+        for number, part in enumerate(self.parts):
+            if part.size[1] >= self.gripper.stroke:
+                raise CellError(
+                    f"parts[{number}].size[1] is {part.size[1]:g}: must be less than {self.gripper.stroke:g} m, by "
+                    f"which a {self.gripper.model} opens"
+                )
+
+    def _check_wires(self) -> None:
+        wired: dict[str, int] = {}
+        for number, wire in enumerate(self.wires):
+            first = wired.setdefault(wire.input, number)
+            if first != number:
+                raise CellError(
+                    f"wires[{number}].input is {wire.input!r}, which has a wire: that of wires[{first}]"
+                )
+
+    def _check_tools(self) -> None:
+        for number, tool in enumerate(self.tools):
+            if not is_real_body(tool.inertia):
+                raise CellError(
+                    f"tools[{number}].inertia is {list(tool.inertia)}: no body has these moments of inertia"
+                )
+            if (tool.while_on is None) != (number == 0):
+                raise CellError(
+                    "tools[0].while_on must be left out: that tool is on the flange while no other is"
+                    if number == 0
+                    else f"tools[{number}].while_on is missing: only the first tool is on the flange without an output"
+                )
+
+
+def bit_of(terminal: Terminal) -> int:
+    """Return a digital terminal as a bit among inputs or outputs."""
+    return 1 << get_args(Terminal).index(terminal)
+
+
+def _check_names(key: str, names: Sequence[str]) -> None:
+    seen: dict[str, int] = {}
+    for number, name in enumerate(names):
+        first = seen.setdefault(name, number)
+        if first != number:
+            raise CellError(f"{key}[{number}].name is {name!r}, which is the name of {key}[{first}], too")
+        if not name.isprintable():
+            raise CellError(f"{key}[{number}].name is {name!r}: must be characters that can be shown")

@@ -1,0 +1,186 @@
+"""A gripper with two fingers that move at a finite speed, with the registers of a Robotiq 2F.
+
+Positions are counts, as in its registers: the fingers are open at `OPEN` and meet at `CLOSED`, both of which are inside
+the range 0 to 255 of what can be requested. A request beyond the end of the way ends there.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from tvist_plant.plant import PERIOD
+
+OPEN, CLOSED = 3, 230
+"""Positions of open fingers and of fingers that meet [counts]; real ones differ by a few counts."""
+ACTIVATION: Final = 500
+"""Ticks that an activation takes at least."""
+SPEEDS = {0.085: (0.020, 0.150), 0.14: (0.030, 0.250)}
+"""Speed of the fingers at the registers' 0 and 255 for each opening [m/s]."""
+MOVING, STOPPED_CLOSING, ARRIVED = 0, 2, 3
+"""Values of OBJ."""
+WRITABLE: Mapping[str, int] = MappingProxyType(
+    {"ACT": 1, "GTO": 1, "ATR": 1, "ARD": 1, "POS": 255, "SPE": 255, "FOR": 255, "MOD": 1, "MSC": 255}
+)
+"""Registers that can be written, and their largest values."""
+
+Meet = Callable[[float, float], float | None]
+"""Returns the opening at which closing fingers meet a part on their way between two openings, or None [m]."""
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What the fingers did in a tick that others have to know."""
+
+    gripped: bool = False
+    """They have met a part, which stopped them."""
+    released: bool = False
+    """They have let go of the part that they held."""
+    met_nothing: bool = False
+    """They have closed without meeting a part."""
+
+
+_NOTHING = Moved()
+
+
+class Gripper:
+    """The fingers and their registers.
+
+    Args:
+        stroke: Opening [m].
+        activated: Whether it is activated at the start.
+    """
+
+    def __init__(self, stroke: float, *, activated: bool) -> None:
+        self.stroke = stroke
+        """Opening [m]."""
+        self._activated = activated
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin as at the start: the fingers are open."""
+        self._position = float(OPEN)
+        self._written = dict.fromkeys(WRITABLE, 0) | {"ACT": int(self._activated), "SPE": 255, "FOR": 255}
+        self._activating = 0
+        """Ticks that the activation has left; 0 if it is over."""
+        self._active = self._activated
+        self._released = False
+        """Whether an automatic release is over, after which it has to be activated anew."""
+        self._object = ARRIVED
+        self.holds = False
+        """Whether a part is between the fingers."""
+
+    # ------------------------------------------------------------------ registers
+
+    def write(self, values: Mapping[str, int]) -> None:
+        """Write registers at once; what they ask for begins with the next tick.
+
+        Args:
+            values: Values of some of `WRITABLE`, each within its range.
+        """
+        written, before = self._written, self._written["ACT"]
+        written.update(values)
+        if not written["ACT"]:
+            self._active, self._activating, self._released = False, 0, False
+        elif not before:
+            self._activating, self._active = ACTIVATION, False
+        if self._target is None:
+            self._object = self._object or ARRIVED  # fingers that were moving have stopped
+        elif self._target != self._position and not self._stopped:
+            self._object = MOVING
+
+    def read(self, name: str) -> int | None:
+        """Return a register; None if there is none of this name."""
+        match name:
+            case "POS":
+                return round(self._position)
+            case "PRE":
+                return self._written["POS"]
+            case "OBJ":
+                return self._object
+            case "STA":
+                return 3 if self._active else 1 if self._activating else 0
+            case "FLT":
+                return self._fault
+        return self._written.get(name)
+
+    @property
+    def _fault(self) -> int:
+        """Fault: automatic release in progress 11 or over 15; a request before the activation 7, or during it 5."""
+        if self._written["ATR"]:
+            return 15 if self._released else 11
+        if self._written["GTO"] and not self._active:
+            return 5 if self._activating else 7
+        return 0
+
+    # ------------------------------------------------------------------ motion
+
+    @property
+    def opening(self) -> float:
+        """Present distance between the fingers [m]."""
+        return self._opening(self._position)
+
+    @property
+    def _target(self) -> float | None:
+        """Position to go to [counts]; None to stay."""
+        written = self._written
+        if written["ATR"]:
+            return CLOSED if written["ARD"] else OPEN
+        if self._activating:
+            return OPEN
+        if not (self._active and written["GTO"]):
+            return None
+        return min(max(written["POS"], OPEN), CLOSED)
+
+    @property
+    def _stopped(self) -> bool:
+        """Whether the part between the fingers keeps them from going on."""
+        return self.holds and self._target is not None and self._target >= self._position
+
+    @property
+    def _step(self) -> float:
+        """Way of the fingers in a tick [counts]."""
+        slow, fast = SPEEDS[self.stroke]
+        share = 0.0 if self._written["ATR"] else 1.0 if self._activating else self._written["SPE"] / 255.0
+        return (slow + share * (fast - slow)) * PERIOD / self.stroke * (CLOSED - OPEN)
+
+    def tick(self, meet: Meet) -> Moved:
+        """Move the fingers for a tick.
+
+        Args:
+            meet: Looks for a part between the fingers; called while they close and hold nothing.
+        """
+        target, position = self._target, self._position
+        if target is None:
+            return _NOTHING
+        if self._activating > 1 or (self._activating and position == target):
+            self._activating -= 1
+            self._active = not self._activating
+        if self._stopped:
+            self._object = STOPPED_CLOSING
+            return _NOTHING
+        if target == position:
+            self._arrive()
+            return _NOTHING
+        step = min(self._step, abs(target - position))
+        new = position + step if target > position else position - step
+        released, gripped = self.holds and target < position, False
+        if target > position:
+            at = meet(self._opening(position), self._opening(new))
+            gripped = at is not None
+            new = new if at is None else CLOSED - at / self.stroke * (CLOSED - OPEN)
+        self._position, self.holds = new, gripped
+        self._object = STOPPED_CLOSING if gripped else MOVING
+        arrived = not gripped and abs(target - new) < 1e-9
+        if arrived:
+            self._position = float(target)
+            self._arrive()
+        return Moved(gripped=gripped, released=released, met_nothing=arrived and target == CLOSED)
+
+    def _arrive(self) -> None:
+        self._object = ARRIVED
+        if self._written["ATR"]:
+            self._released, self._active = True, False
+
+    def _opening(self, position: float) -> float:
+        return (CLOSED - position) / (CLOSED - OPEN) * self.stroke

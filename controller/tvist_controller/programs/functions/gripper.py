@@ -1,0 +1,172 @@
+"""Functions of Robotiq's URCap, for programs that call them without bringing them along.
+
+A program that was exported with the URCap has these functions in its preamble: then its own are called, which talk to
+the gripper over a socket.
+"""
+
+from collections.abc import Generator
+from math import ceil, floor
+
+from tvist_controller.cell.gripper import CLOSED, MOVING, OPEN, Gripper
+from tvist_controller.programs.access import Access
+from tvist_controller.programs.arguments import integer, number
+from tvist_controller.programs.arm import ProgramArm
+from tvist_urscript import Fault
+
+Turns = Generator[None, None, None]
+_ONE = "1"
+"""Gripper that a call does not name. The cell has one, so the name makes no difference."""
+
+
+class GripperFunctions:
+    """Moves the fingers of the cell's gripper, and tells what they do.
+
+    Args:
+        access: The robot.
+        arm: Its arm: what is asked of the gripper after a move that is blended begins where the blend does.
+    """
+
+    def __init__(self, access: Access, arm: ProgramArm) -> None:
+        self._cell, self._arm = access.cell, arm
+
+    # ------------------------------------------------------------------ activation
+
+    def rq_activate(self, gripper_socket: object = _ONE) -> None:
+        """Activate the gripper unless it is active: it opens its fingers."""
+        if self._gripper.read("STA") != 3:
+            self.rq_reset(gripper_socket)
+            self._write(ACT=1)
+
+    def rq_activate_and_wait(self, gripper_socket: object = _ONE) -> Turns:
+        """Activate the gripper unless it is active, and wait until it is."""
+        yield from self._arm.finish()
+        self.rq_activate(gripper_socket)
+        while self._gripper.read("STA") != 3:
+            yield
+
+    def rq_reset(self, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+        """Deactivate the gripper; its fingers stay where they are."""
+        self._write(ACT=0, ATR=0)
+
+    def rq_is_gripper_activated(self, gripper_socket: object = _ONE) -> bool:  # noqa: ARG002
+        """Return whether the gripper is active."""
+        return self._gripper.read("STA") == 3
+
+    # ------------------------------------------------------------------ fingers
+
+    def rq_open(self, gripper_socket: object = _ONE) -> None:
+        """Begin to open the fingers."""
+        self.rq_move(0, gripper_socket)
+
+    def rq_close(self, gripper_socket: object = _ONE) -> None:
+        """Begin to close the fingers."""
+        self.rq_move(255, gripper_socket)
+
+    def rq_open_and_wait(self, gripper_socket: object = _ONE) -> Turns:
+        """Open the fingers."""
+        return self.rq_move_and_wait(0, gripper_socket)
+
+    def rq_close_and_wait(self, gripper_socket: object = _ONE) -> Turns:
+        """Close the fingers, or until they meet a part."""
+        return self.rq_move_and_wait(255, gripper_socket)
+
+    def rq_move(self, pos: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+        """Begin to move the fingers to a position: 0 is open, 255 closed."""
+        self._write(POS=integer("pos", pos, 0, 255), GTO=1)
+
+    def rq_move_and_wait(self, pos: object, gripper_socket: object = _ONE) -> Turns:
+        """Move the fingers to a position, 0 to 255, or until they meet a part."""
+        yield from self._arm.finish()
+        self.rq_move(pos, gripper_socket)
+        yield from self.rq_wait(gripper_socket)
+
+    def rq_move_and_wait_norm(self, pos_norm: object, gripper_socket: object = _ONE) -> Turns:
+        """Move the fingers to a position, 0 to 100, or until they meet a part."""
+        return self.rq_move_and_wait(_from_percent("pos_norm", pos_norm), gripper_socket)
+
+    def rq_move_and_wait_mm(self, pos_in_mm: object, gripper_socket: object = _ONE) -> Turns:
+        """Move the fingers until they are so many millimetres apart, or meet a part."""
+        return self.rq_move_and_wait(self._counts(pos_in_mm), gripper_socket)
+
+    def rq_stop(self, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+        """Stop the fingers."""
+        self._write(GTO=0)
+
+    def rq_go_to(self, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+        """Let the fingers move to the position that was set."""
+        self._write(GTO=1)
+
+    def rq_wait(self, gripper_socket: object = _ONE) -> Turns:  # noqa: ARG002
+        """Wait until the fingers have stopped."""
+        yield from self._arm.finish()
+        gripper = self._gripper
+        if gripper.read("STA") != 3:
+            raise Fault("the gripper is not active: call rq_activate_and_wait() first")
+        while gripper.read("OBJ") == MOVING and gripper.read("GTO"):
+            yield
+
+    # ------------------------------------------------------------------ settings
+
+    def rq_set_pos(self, pos: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+        """Set the position to which `rq_go_to` moves the fingers, 0 to 255."""
+        self._write(GTO=0, POS=integer("pos", pos, 0, 255))
+
+    def rq_set_speed(self, speed: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+        """Set the speed of the fingers, 0 to 255."""
+        self._write(SPE=integer("speed", speed, 0, 255))
+
+    def rq_set_speed_norm(self, speed_norm: object, gripper_socket: object = _ONE) -> None:
+        """Set the speed of the fingers, 0 to 100."""
+        self.rq_set_speed(_from_percent("speed_norm", speed_norm), gripper_socket)
+
+    def rq_set_force(self, force: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+        """Set the force of the fingers, 0 to 255. It is stored; every simulated grip is firm."""
+        self._write(FOR=integer("force", force, 0, 255))
+
+    def rq_set_force_norm(self, force_norm: object, gripper_socket: object = _ONE) -> None:
+        """Set the force of the fingers, 0 to 100; see `rq_set_force`."""
+        self.rq_set_force(_from_percent("force_norm", force_norm), gripper_socket)
+
+    # ------------------------------------------------------------------ state
+
+    def rq_is_object_detected(self, gripper_socket: object = _ONE) -> bool:  # noqa: ARG002
+        """Return whether a part has stopped the fingers."""
+        return self._gripper.read("OBJ") in {1, 2}
+
+    def rq_is_motion_complete(self, gripper_socket: object = _ONE) -> bool:  # noqa: ARG002
+        """Return whether the fingers have stopped."""
+        return self._gripper.read("OBJ") != MOVING
+
+    def rq_current_pos(self, gripper_socket: object = _ONE) -> int:  # noqa: ARG002
+        """Return the position of the fingers, 0 to 255."""
+        return self._gripper.read("POS") or 0
+
+    def rq_current_pos_norm(self, gripper_socket: object = _ONE) -> int:
+        """Return the position of the fingers, 0 to 100."""
+        return floor(self.rq_current_pos(gripper_socket) / 255.0 * 100.0)
+
+    def rq_current_pos_mm(self, gripper_socket: object = _ONE) -> float:  # noqa: ARG002
+        """Return the distance between the fingers in millimetres."""
+        return 1e3 * self._gripper.opening
+
+    # ------------------------------------------------------------------ parts
+
+    @property
+    def _gripper(self) -> Gripper:
+        gripper = None if self._cell is None else self._cell.gripper
+        if gripper is None:
+            raise Fault("there is no gripper: give the robot a cell that has one (--cell FILE.toml)")
+        return gripper
+
+    def _write(self, **values: int) -> None:
+        gripper = self._gripper
+        self._arm.then(lambda: gripper.write(values))
+
+    def _counts(self, millimetres: object) -> int:
+        """Position at which the fingers are so many millimetres apart, to the next count."""
+        stroke = 1e3 * self._gripper.stroke
+        return round(CLOSED - number("pos_in_mm", millimetres, 0.0, stroke) / stroke * (CLOSED - OPEN))
+
+
+def _from_percent(name: str, value: object) -> int:
+    return ceil(number(name, value, 0.0, 100.0) / 100.0 * 255.0)

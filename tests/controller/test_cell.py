@@ -1,0 +1,314 @@
+"""A cell follows the robot to the tick: wires, a gripper that answers as a Robotiq 2F, and parts that load the arm."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.own_arm import OwnArm
+
+from tvist_controller.cell.description import Wire
+from tvist_controller.cell.gripper import ACTIVATION, CLOSED, OPEN, Gripper
+from tvist_controller.cell.live_cell import TRANSFER
+from tvist_controller.cell.urcap import Requests, answer
+from tvist_controller.cell.wires import Wires
+from tvist_controller.host import Host
+from tvist_controller.setup import Setup
+from tvist_lab.replay import replay
+from tvist_plant.plant import PERIOD
+from tvist_protocol.programs import ProgramRun
+from tvist_protocol.simulation import SimulationReset
+
+from .cells import HERE, TOOL, a_cell, in_cell, part
+from .robots import UR5E, Kept, Robot
+from .scripts import failure, finish, run, said, script, start
+
+WIRES = (
+    Wire(output="standard 1", input="configurable 2", after=0.1),
+    Wire(output="tool 0", input="tool 1", inverted=True),
+)
+
+
+def carried(robot):
+    return robot.controller.cycle.line.plant.payload
+
+
+def warnings(robot):
+    return [event.why for event in robot.events if event.kind == "warning"]
+
+
+class TestWires:
+    @given(st.lists(st.booleans(), max_size=200), st.integers(0, 30), st.booleans())
+    def test_an_input_is_its_output_some_ticks_ago_however_short_a_pulse_is(self, signal, ticks, inverted):
+        wires = Wires(
+            [Wire(output="standard 0", input="standard 0", after=ticks * PERIOD, inverted=inverted)]
+        )
+        delay, now, inputs = max(1, ticks), int(inverted), []
+        for tick, on in enumerate([False, *signal], start=1):
+            inputs.append(now)
+            mask, values = wires.tick(tick, int(on))
+            now = values if mask else now
+        outputs = [False] * delay + [False, *signal]
+        assert [bool(one) != inverted for one in inputs] == outputs[: len(inputs)]
+
+    def test_a_program_waits_for_an_input_that_an_output_sets_later(self):
+        robot = in_cell(wires=WIRES)
+        run(
+            robot,
+            "textmsg(get_tool_digital_in(1))",
+            "sync()",
+            "textmsg(get_tool_digital_in(1))",
+            "set_standard_digital_out(1, True)",
+            "n = 0",
+            "while not get_configurable_digital_in(2):",
+            "  n = n + 1",
+            "  sync()",
+            "end",
+            "textmsg(n)",
+        )
+        assert said(robot) == ["False", "True", "50"]
+        assert robot.controller.io().actual_digital_input_bits == 1 << 10 | 1 << 17
+
+    def test_a_signal_at_an_input_stays_until_its_wire_changes(self):
+        robot = in_cell(wires=WIRES)
+        robot.tick(2)
+        robot.controller.peripherals.set_digital_inputs(1 << 10, 1 << 10)
+        robot.tick(200)
+        assert robot.controller.peripherals.digital_inputs & 1 << 10
+
+
+class TestProtocol:
+    @pytest.mark.parametrize(
+        ("request_", "answered"),
+        [
+            (b"SET ACT 1 GTO 1 POS 255 SPE 255 FOR 150\n", b"ack"),
+            (b"GET POS\n", b"POS 3\n"),
+            (b"GET POS", b"003"),
+            (b"GET PRE", b"000"),
+            (b"GET FLT", b"00"),
+            (b"GET STA", b"0"),
+            (b"GET OBJ\r\n", b"OBJ 3\n"),
+            (b"GET SID\n", b"SID [9]\n"),
+            (b"GET SID", b"[9]              "),
+            (b"SET SID 9\n", b"ack"),
+            (b"SET SID 2\n", b""),
+            (b"SET POS 999\n", b"ack"),
+            (b"SET POS -1\n", b"?"),
+            (b"SET POS\n", b"?"),
+            (b"SET XYZ 1\n", b"?"),
+            (b"GET XYZ", b"?"),
+            (b"\xff\xfe\n", b"?"),
+            (b"\n", b""),
+            (b"x" * 2000, b"?"),
+        ],
+    )
+    def test_requests_are_answered_as_the_urcap_answers_them(self, request_, answered):
+        gripper = Gripper(0.085, activated=False)
+        assert b"".join(answer(gripper, one) for one in Requests().cut(request_)) == answered
+
+    @given(st.data())
+    def test_requests_may_be_cut_anywhere(self, data):
+        whole = b"SET POS 9\nSET SPE 3 FOR 4\n\nGET POS\nSET GTO 1\n"
+        at = sorted(data.draw(st.sets(st.integers(1, len(whole) - 1)).filter(lambda cuts: 34 not in cuts)))
+        requests = Requests()
+        pieces = [whole[a:b] for a, b in zip([0, *at], [*at, len(whole)], strict=True)]
+        assert [one for piece in pieces for one in requests.cut(piece)] == [
+            line + b"\n" for line in whole.split(b"\n") if line
+        ]
+
+
+class TestFingers:
+    def ticks(self, gripper, register, value, most=5000):
+        for tick in range(most):
+            if gripper.read(register) == value:
+                return tick
+            gripper.tick(lambda _wide, _narrow: None)
+        raise AssertionError(f"{register} never is {value}")
+
+    @pytest.mark.parametrize(("speed", "seconds"), [(255, 0.085 / 0.15), (0, 0.085 / 0.02)])
+    def test_fingers_close_at_the_speed_that_is_set(self, speed, seconds):
+        gripper = Gripper(0.085, activated=True)
+        gripper.write({"POS": 255, "SPE": speed, "GTO": 1})
+        assert gripper.read("OBJ") == 0
+        assert self.ticks(gripper, "OBJ", 3) == pytest.approx(seconds / PERIOD, abs=1)
+        assert (gripper.read("POS"), gripper.read("PRE"), gripper.opening) == (CLOSED, 255, 0.0)
+
+    def test_nothing_moves_before_the_gripper_is_active(self):
+        gripper = Gripper(0.085, activated=False)
+        gripper.write({"POS": 255, "GTO": 1})
+        gripper.tick(lambda _wide, _narrow: None)
+        assert (gripper.read("POS"), gripper.read("FLT")) == (OPEN, 7)
+        gripper.write({"ACT": 1})
+        assert (gripper.read("STA"), gripper.read("FLT")) == (1, 5)
+        assert self.ticks(gripper, "STA", 3) == ACTIVATION
+        self.ticks(gripper, "POS", 100)
+        gripper.write({"GTO": 0})
+        assert gripper.read("OBJ") == 3
+
+    def test_an_automatic_release_opens_slowly_and_needs_a_new_activation(self):
+        gripper = Gripper(0.085, activated=True)
+        gripper.write({"POS": 255, "GTO": 1})
+        self.ticks(gripper, "OBJ", 3)
+        gripper.write({"ATR": 1})
+        assert gripper.read("FLT") == 11
+        assert self.ticks(gripper, "FLT", 15) == pytest.approx(0.085 / 0.02 / PERIOD, abs=2)
+        gripper.write({"ATR": 0})
+        assert (gripper.read("STA"), gripper.read("FLT"), gripper.read("POS")) == (0, 7, OPEN)
+
+
+class TestParts:
+    def test_a_part_stops_the_fingers_and_loads_the_arm_until_it_is_released_elsewhere(self):
+        robot = in_cell(part((0.002, 0, 0, 0, 0, np.pi - 0.1)))  # half a turn swaps the fingers
+        run(
+            robot,
+            "rq_close_and_wait()",
+            "textmsg(rq_is_object_detected(), rq_current_pos_mm())",
+            "sleep(0.5)",
+            "movel(pose_add(get_actual_tcp_pose(), p[0, 0, 0.1, 0, 0, 0]))",
+            "rq_open_and_wait()",
+            "sleep(0.5)",
+        )
+        holds, seen, lies = said(robot)
+        assert (holds, seen) == ("cell: the gripper holds box (1.5 kg)", "True50")
+        place = np.array([float(word) for word in lies.partition("p[")[2].rstrip("]").split(",")])
+        np.testing.assert_allclose(
+            place[:3], HERE.position + HERE.rotation[:, 0] * 0.002 + [0, 0, 0.1], atol=2e-3
+        )
+        assert carried(robot).mass == TOOL["mass"]
+
+    def test_what_is_carried_is_the_tool_and_the_part_where_it_is(self):
+        robot = in_cell(part((0, 0, 0.004, 0, 0, 0), cog=(0, 0, 0.01)))
+        run(robot, "rq_close_and_wait()", "sleep(0.5)")
+        load = carried(robot)
+        assert load.mass == pytest.approx(2.4)
+        assert load.com[2] == pytest.approx((0.9 * 0.06 + 1.5 * 0.177) / 2.4, abs=1e-3)  # the arm sags
+        xx, _, _, yy, _, zz = load.inertia
+        far = 0.9 * 1.5 / 2.4 * (0.177 - 0.06) ** 2  # of two points
+        box = [1.5 / 12 * (a * a + b * b) for a, b in ((0.05, 0.08), (0.06, 0.08), (0.06, 0.05))]
+        np.testing.assert_allclose([xx, yy, zz], np.add(box, [far, far, 0]), atol=2e-4)
+
+    def test_its_weight_goes_over_in_a_fifth_of_a_second_while_the_arm_stays_where_it_is(self):
+        robot = in_cell(part())
+        start(robot, "rq_close_and_wait()", "sleep(1)")
+        masses = [0.0]
+        while masses[-1] < 2.4 - 1e-9:
+            robot.tick()
+            masses.append(carried(robot).mass)
+        rising = [one for one in masses if one > 0.9]
+        np.testing.assert_allclose(np.diff(rising), 1.5 / TRANSFER, atol=1e-9)
+        finish(robot)
+        assert np.abs(np.diff(robot.column("actual_q"), axis=0)).max() < 1e-5
+
+    @pytest.mark.parametrize(
+        ("away", "said_"),
+        [
+            ((0, 0.02, 0, 0, 0, 0), r"box lies (19|20)\.\d mm and 0.0\d rad"),
+            ((0, 0, 0, 0, 0.5, 0), r"and 0\.(49|50) rad"),
+        ],
+    )
+    def test_a_part_out_of_reach_is_not_gripped_and_the_distance_is_said(self, away, said_):
+        robot = in_cell(part(away))
+        run(robot, "rq_close_and_wait()", "textmsg(rq_is_object_detected(), rq_current_pos())")
+        assert said(robot) == [f"False{CLOSED}"]
+        assert any(re.search(said_, why) for why in warnings(robot))
+        assert carried(robot).mass == TOOL["mass"]
+
+    @pytest.mark.parametrize("declared", [True, False])
+    def test_a_part_that_is_not_declared_is_noticed(self, declared):
+        robot = in_cell(part())
+        declaration = f"set_payload({2.4 if declared else 0.9}, [0, 0, {0.124 if declared else 0.06}])"
+        run(robot, "rq_close_and_wait()", declaration, "sleep(4)")
+        mismatches = [event for event in robot.events if event.code == "payload_mismatch"]
+        assert bool(mismatches) != declared
+
+    def test_a_reset_begins_the_cell_anew(self):
+        robot = in_cell(part())
+        run(robot, "rq_close_and_wait()", "sleep(0.5)")
+        robot.send(SimulationReset)
+        assert carried(robot).mass == TOOL["mass"]
+        run(robot, "textmsg(rq_current_pos())", "rq_close_and_wait()", "textmsg(rq_is_object_detected())")
+        assert said(robot)[-3::2] == [str(OPEN), "True"]
+
+    def test_a_tool_changer_exchanges_tools_and_a_part_stays_behind(self):
+        other = TOOL | {"name": "hook", "mass": 0.3, "while_on": "tool 0"}
+        robot = in_cell(part(), tools=[TOOL, other])
+        run(robot, "rq_close_and_wait()", "sleep(0.5)", "set_tool_digital_out(0, True)", "sleep(0.1)")
+        assert carried(robot).mass == 0.3
+        assert "cell: box lies at" in said(robot)[-2]
+        run(robot, "set_tool_digital_out(0, False)", "sleep(0.1)")
+        assert carried(robot).mass == TOOL["mass"]
+
+
+PREAMBLE = """def put(name, value):
+  socket_set_var(name, value, "1")
+  sync()
+  return socket_read_byte_list(3, "1") == [3, 97, 99, 107]
+end
+def rq_close_and_wait():
+  put("POS", 255)
+  put("GTO", 1)
+  state = 48
+  while state == 48:
+    socket_send_string("GET OBJ", "1")
+    sync()
+    got = socket_read_byte_list(1, "1")
+    state = got[1]
+  end
+  textmsg("by socket ", state - 48)
+end
+socket_open("127.0.0.1", 63352, "1")""".splitlines()
+"""Functions as the URCap brings them along, which talk to the gripper by a socket."""
+
+
+class TestPrograms:
+    def test_functions_that_a_program_brings_along_reach_the_gripper_by_a_socket_without_any_network(self):
+        robot = in_cell(part())
+        run(robot, *PREAMBLE, "rq_close_and_wait()", 'textmsg(socket_get_var("POS", "1"))')
+        assert said(robot)[1:] == ["by socket 2", str(round(CLOSED - 0.05 / 0.085 * (CLOSED - OPEN)))]
+        assert robot.controller.programs.sockets.orders == []
+
+    def test_a_read_that_nobody_answers_ends_after_its_time(self):
+        robot = in_cell()
+        run(robot, *PREAMBLE, 'textmsg(socket_read_byte_list(3, "1", 0.1))')
+        assert said(robot) == ["[0, -1, -1, -1]"]
+        assert robot.states[-1].tick == pytest.approx(0.1 / PERIOD, abs=3)
+
+    def test_without_a_gripper_its_functions_say_so(self):
+        robot = in_cell(gripper=None)
+        run(robot, "rq_open()")
+        assert "there is no gripper" in failure(robot).why
+
+    def test_a_program_that_does_not_activate_the_gripper_is_told(self):
+        robot = in_cell(gripper={"model": "2F-85"})
+        run(robot, "rq_close_and_wait()")
+        assert "rq_activate_and_wait" in failure(robot).why
+        run(robot, "rq_activate_and_wait()", "rq_move_and_wait_mm(20)", "textmsg(rq_current_pos_mm())")
+        assert float(said(robot)[-1]) == pytest.approx(20.0, abs=0.2)
+
+
+def test_a_replay_is_equal_to_the_last_bit_with_what_clients_asked_of_the_gripper():
+    robot, kept = in_cell(part(), wires=WIRES), Kept()
+    host = Host(robot.controller, kept)
+    first = robot.controller.setup
+    text = script(
+        "set_standard_digital_out(1, True)", "sleep(0.6)", f"movej({[one + 0.1 for one in HERE.vector]})"
+    )
+    for tick in range(900):
+        if tick == 20:
+            robot.controller.receive(ProgramRun(token=robot.token, text=text))
+        if tick == 50:
+            assert host.ask_gripper(b"SET GTO 1 POS 255\n") == b"ack"
+        if tick % 7 == 0:
+            assert host.ask_gripper(b"GET POS\n").startswith(b"POS ")
+        host.tick()
+    assert [entry.kind for entry in kept.entries] == ["gripper"]
+    assert any("holds box" in event.why for event in kept.events if event.kind == "text")
+    done = replay(Setup.from_builtins(first.to_builtins()), kept.entries, kept.states)
+    assert done.first_difference is None
+
+
+def test_parts_need_a_plant_that_can_carry_another_payload():
+    with pytest.raises(ValueError, match="the plant OwnArm cannot carry another payload"):
+        Robot(cell=a_cell(part()), plant=OwnArm(UR5E, UR5E.payload))
+    assert Robot(cell=a_cell(), plant=OwnArm(UR5E, UR5E.payload)).controller.cell is not None

@@ -1,0 +1,45 @@
+"""The port of a cell's gripper: requests are answered in order, however many come; without a gripper it is shut."""
+
+import asyncio
+
+from tests.controller.cells import a_cell
+from tests.controller.robots import UR5E
+
+from tvist_controller.cell.live_cell import LiveCell
+from tvist_server.gateways.ur.interfaces import UrInterfaces
+
+from .desks import Desk, connect, until
+
+MANY = 300
+"""Requests at once: more than may wait for their answers."""
+
+
+async def test_requests_are_answered_in_their_order_even_if_many_come_at_once():
+    desk, cell, waiting = Desk(), LiveCell(a_cell(), UR5E, print, UR5E.payload), []
+    desk.interfaces = UrInterfaces(
+        desk, UR5E, "ur5e", "127.0.0.1", {"gripper": 0}, gripper=lambda *asked: waiting.append(asked)
+    )
+    await desk.tick()
+    await desk.interfaces.open()
+    reader, writer = await connect(desk, "gripper")
+    writer.write(b"".join(b"SET POS %d\nGET PRE\n" % (number % 256) for number in range(MANY)))
+    expected = b"".join(b"ackPRE %d\n" % (number % 256) for number in range(MANY))
+    reading, most = asyncio.create_task(reader.readexactly(len(expected))), 0
+    while not reading.done():
+        await until(lambda: waiting or reading.done())
+        most = max(most, len(waiting))
+        while waiting:
+            request, answer = waiting.pop(0)
+            answer(cell.answer(request))
+    assert await reading == expected
+    assert 0 < most < MANY
+    writer.close()
+    await until(lambda: not desk.interfaces._connections)
+    await desk.interfaces.shut()
+    desk.interfaces.close()
+
+
+async def test_without_a_gripper_nobody_listens_there():
+    interfaces = UrInterfaces(Desk(), UR5E, "ur5e", "127.0.0.1", {"gripper": 0, "rtde": 0})
+    assert set(interfaces.ports) == {"rtde"}
+    interfaces.close()

@@ -1,0 +1,43 @@
+"""Four boxes are picked and placed by URScript in lockstep and by ur_rtde in real time; recordings replay equal."""
+
+from pathlib import Path
+
+import pytest
+from tests.conformance.served import Served, finished
+from tests.places import own_address
+
+from .test_ur_lockstep import replayed
+
+EXAMPLES = Path(__file__).parents[2] / "clients" / "examples"
+CELL, PROGRAM = EXAMPLES / "cell.toml", EXAMPLES / "pick_and_place.script"
+BOXES = [f"cell: the gripper holds box {number} ({0.4 * number:g} kg)" for number in (1, 2, 3, 4)]
+
+
+def told(content):
+    """What was picked, where it was put down, and what was warned of."""
+    texts = [event.why for event in content.events if event.kind == "text"]
+    picked, put = ([text for text in texts if word in text] for word in ("holds", "lies at p[-0.6"))
+    return picked, len(put), [event.why for event in content.events if event.code == "payload_mismatch"]
+
+
+def test_a_program_in_lockstep_moves_all_boxes_with_their_payloads_declared(tmp_path):
+    path = tmp_path / "run.mcap"
+    ended = finished("-m", "tvist_cli", "run", PROGRAM, "--cell", CELL, "--lockstep", "--record", path)
+    assert ended.returncode == 0, ended.stderr
+    assert told(replayed(path)) == (BOXES, 4, [])
+    assert "made 24 moves; after a stop the tool shook with at most" in ended.stderr
+
+
+@pytest.mark.realtime
+@pytest.mark.nightly
+def test_ur_rtde_and_a_socket_to_the_gripper_move_them_in_real_time(tmp_path):
+    pytest.importorskip("rtde_control")
+    host, path = own_address(57), tmp_path / "run.mcap"
+    with Served("--ur", "--ur-address", host, "--cell", str(CELL), "--record", str(path)) as served:
+        ended = finished(EXAMPLES / "04_ur_rtde_gripper.py", host)
+        assert ended.returncode == 0, ended.stderr
+        assert "4 of 4 boxes were gripped" in ended.stdout
+        assert served.end() == 0
+    content = replayed(path)
+    assert told(content) == (BOXES, 4, [])
+    assert sum(entry.kind == "gripper" for entry in content.journal) == 2 + 2 * 4

@@ -1,0 +1,29 @@
+"""A cell, read from a TOML file."""
+
+import tomllib
+
+from tvist_controller.cell.description import Cell, CellError
+from tvist_plant.user_file import read_toml
+from tvist_protocol.content import checked
+from tvist_protocol.errors import ProtocolError
+
+
+def read_cell(path: str) -> Cell:
+    """Read a cell and check it.
+
+    Raises:
+        CellError: The file cannot be read, or a key is unknown, missing or out of range; the message says which.
+        UserFileError: The file is not text, too large or nested too deeply.
+    """
+    try:
+        cell = checked(read_toml(path, "cell"), Cell)
+        cell.check()
+    except OSError as error:
+        raise CellError(f"cell {path}: {error.strerror}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise CellError(f"cell {path}: it is not valid TOML: {error}") from error
+    except ProtocolError as error:
+        raise CellError(f"cell {path}: {error.why}") from error
+    except CellError as error:
+        raise CellError(f"cell {path}: {error}") from error
+    return cell
