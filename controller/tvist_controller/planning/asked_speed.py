@@ -12,6 +12,8 @@ from tvist_protocol.replies import Code
 
 REACHED = 0.9
 """Share of the speed that counts as reached: a peak between two ramps of the acceleration stays a little lower [-]."""
+BLUNTED = 3.0
+"""The same ratio where the way is too short for the speed: ramps take a large part of a way of millimetres [-]."""
 LATE = 1.01
 """Ratio of durations up to which a motion takes as long as asked [-]."""
 BINDING = 0.95
@@ -51,7 +53,8 @@ def slower_than_asked(
     slope = np.abs(curve.derivatives(np.linspace(0.0, way, LOOKS))[1])
     permitted = float((limits.velocity / np.maximum(slope, LEAST)).min(axis=1).max())
     within_reach = min(pacing.velocity, (pacing.acceleration * way) ** 0.5)
-    if within_reach < pacing.velocity and within_reach <= permitted:  # the way is too short for more
+    short = within_reach < pacing.velocity
+    if short and within_reach <= min(permitted, BLUNTED * fastest):
         return None
     return _because(what, _shares(curve, s, sd, sdd, limits), description)
 

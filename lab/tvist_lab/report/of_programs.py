@@ -112,7 +112,8 @@ def _drawn(results: Sequence[Mapping[str, Any]], most: float | None) -> Picture 
     for number, (file, peaks) in enumerate(seen):
         known = [(begun + place, peak) for place, peak in enumerate(peaks, 1) if peak is not None]
         series = SERIES[number % len(SERIES)]
-        panel.plot(*np.array(known).reshape(-1, 2).T, **series.points(5.0, label=literal(file)))
+        if known:
+            panel.plot(*np.array(known).T, **series.points(5.0, label=literal(file)))
         begun += len(peaks)
     if most is not None:
         dashed(panel, most, label="limit")
