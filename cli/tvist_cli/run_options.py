@@ -1,5 +1,6 @@
 """Options of `tvist run` that judge what programs did, and the files about that."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,9 +20,9 @@ UNITS = {"max_shake": "m/s²", "max_seconds": "s", "max_joint_speed": "rad/s", "
 
 
 def check_positive(name: str, value: float | None, unit: str = "s") -> None:
-    """Refuse a number that is not more than zero."""
-    if value is not None and value <= 0.0:
-        raise Failure(f"{name} is {value:g} {unit}: must be more than 0", code=2)
+    """Refuse a number that is not finite and more than zero."""
+    if value is not None and not 0.0 < value < math.inf:
+        raise Failure(f"{name} is {value:g} {unit}: must be finite and more than 0", code=2)
 
 
 @Parameter(name="*")
@@ -49,7 +50,7 @@ class RunLimits:
         """Return the limits.
 
         Raises:
-            Failure: One is not more than zero.
+            Failure: One is not finite and more than zero.
         """
         from tvist_lab.programs.limits import Limits
 
