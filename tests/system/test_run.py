@@ -267,7 +267,7 @@ class TestJudged:
             "run", "moves.script", "fails.script", "--lockstep", "--baseline", "base.json", "--shaper", "ei"
         )
         assert code == 1
-        assert "moves.script:3: move 1 let the tool shake with " in err
+        assert "moves.script:3: move 1: peak_after_stop_m_s2 is " in err
         assert "points" in err
 
 

@@ -3,11 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from matplotlib.ticker import MaxNLocator
-
-from tvist_lab.figures.style import SERIES, dashed, legend, literal, panels
-from tvist_lab.report.page import Page, PageTable, Picture, Section, picture
+from tvist_lab.report.page import Page, PageTable, Section
 from tvist_lab.study.tables import Shown, cells, titles
 from tvist_lab.words import counted
 
@@ -47,8 +43,6 @@ def programs_page(results: Sequence[Mapping[str, Any]], limits: Mapping[str, flo
     if failed:
         points = [_placed(result, one) for result in failed for one in result["failures"]]
         sections.append(Section("What failed", points=points))
-    if drawn := _drawn(results, limits.get("max_shake")):
-        sections.append(Section("Shake after each stop", pictures=[drawn]))
     if tables := [_stops(result) for result in results if result.get("moves")]:
         sections.append(Section("Stops", tables=tables, points=list(_left_out(results))))
     if said := [_placed(result, one) for result in results for one in result.get("warnings", ())]:
@@ -97,31 +91,3 @@ def _left_out(results: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for result in results:
         if (count := len(result.get("moves", ()))) > LISTED:
             yield f"{result['file']}: only the first {LISTED} of {count} stops are listed"
-
-
-def _drawn(results: Sequence[Mapping[str, Any]], most: float | None) -> Picture | None:
-    """The shake after each stop of all programs, in their order, with its limit."""
-    seen = [
-        (result["file"], [move["peak_after_stop_m_s2"] for move in result.get("moves", ())])
-        for result in results
-    ]
-    if not any(peak is not None for _, peaks in seen for peak in peaks):
-        return None
-    figure, (panel,) = panels(1, 2.8)
-    begun = 0
-    for number, (file, peaks) in enumerate(seen):
-        known = [(begun + place, peak) for place, peak in enumerate(peaks, 1) if peak is not None]
-        series = SERIES[number % len(SERIES)]
-        if known:
-            panel.plot(*np.array(known).T, **series.points(5.0, label=literal(file)))
-        begun += len(peaks)
-    if most is not None:
-        dashed(panel, most, label="limit")
-    panel.set(
-        xlabel="Stop, program by program", ylabel="Largest acceleration (m/s²)", xlim=(0.5, begun + 0.5)
-    )
-    panel.set_ylim(bottom=0.0)
-    panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-    if len(seen) <= len(SERIES):
-        legend(figure, panel)
-    return picture(figure, "Largest acceleration of the tool after each stop, program by program.")
