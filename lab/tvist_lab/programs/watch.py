@@ -20,6 +20,8 @@ SEEN = 50
 """Ticks of rest (0.1 s) that show the vibration after a stop; if it rests for less, the rest is computed ahead."""
 WINDOW = 150
 """Ticks after a stop (0.3 s) in which the peak is searched, as for the paper's residual vibration."""
+KEPT = 5000
+"""Most states of the arm that a run in real time keeps for `Move.peak`, 50 MB; later stops with no rest have none."""
 LINGER = 2500
 """Most ticks (5 s) for which an arm that has not come to rest is watched after the end of its program."""
 
@@ -80,12 +82,17 @@ class Move:
         """Largest acceleration of the tool from 10 ms until 0.3 s after the stop, without gravity [m/s²].
 
         Where the next motion began within 0.1 s, it is what the tool would have done at rest. None if the arm cannot
-        tell, or if there was no rest. To be asked once the run is over, since it is computed then.
+        tell, or if there was no rest. To be asked when the next motion has begun, since it is computed once.
         """
         if self.held is None:
             return self.peak_so_far if self.rested >= SEEN else None
         would = self.held(WINDOW)
         return float(acceleration(would.specific_force, would.flange_rotation)[AFTER_STOP - 1 :].max())
+
+    def settle(self) -> None:
+        """Compute `peak` now, so that the state of the arm need not be kept."""
+        assert self.peak is not None
+        self.held = None
 
 
 @dataclass(frozen=True)
@@ -156,6 +163,8 @@ class ProgramWatch(Sink):
         """Whether there is nothing more to observe."""
         self._names = controller.cycle.description.robot.joints
         self._ended = 0
+        self._kept = 0
+        """States of the arm that are kept for later."""
         self._placeless: list[Move | Said] = []
         """What came in this tick, and whose line is not known yet."""
         self._rest = 0
@@ -255,10 +264,22 @@ class ProgramWatch(Sink):
 
     def _note_start(self, event: Event) -> None:
         if self.moves:
-            self.moves[-1].followed = event.tick
+            self._note_next(self.moves[-1], event.tick)
         self.moves.append(Move(event.id or 0, event.tick))
         self._placeless.append(self.moves[-1])
         self._rest = 0
+
+    def _note_next(self, move: Move, tick: int) -> None:
+        """Note when the next move began; what the arm would have done else takes too long to compute in real time."""
+        move.followed = tick
+        if move.held is None:
+            return
+        if self._alone:
+            move.settle()
+        elif self._kept < KEPT:
+            self._kept += 1
+        else:
+            move.held = None
 
     def _note_end(self, event: Event) -> None:
         for move in self.moves[-2:]:  # the next one may begin in the tick in which this one ends
