@@ -4,6 +4,7 @@
 #   install SOURCE     install tvist[testing]: from a checkout, a folder with wheels, or a requirement
 #   serve [OPTION...]  serve a robot in the background, and wait until it is ready to be moved
 #   test [ARGUMENT...] run pytest; recordings of failed tests go to ./tvist-recordings
+#   programs ARG...    run programs in URScript in lockstep; the results go to ./tvist-programs.xml
 #   stop               end the served robot
 set -euo pipefail
 
@@ -62,6 +63,11 @@ run_tests() {
   "$python" -m pytest --tvist-recordings "$PWD/tvist-recordings" "$@"
 }
 
+run_programs() {
+  output "junit=$PWD/tvist-programs.xml"
+  "$python" -m tvist_cli run --lockstep --junit "$PWD/tvist-programs.xml" "$@"
+}
+
 stop() {
   [ -f "$pid" ] || fail "no robot is served"
   local number
@@ -77,6 +83,7 @@ case ${1:-} in
   install) shift && install "$@" ;;
   serve) shift && serve "$@" ;;
   test) shift && run_tests "$@" ;;
+  programs) shift && run_programs "$@" ;;
   stop) stop ;;
-  *) fail "the first argument is ${1:-missing}: must be install, serve, test or stop" ;;
+  *) fail "the first argument is ${1:-missing}: must be install, serve, test, programs or stop" ;;
 esac

@@ -1,7 +1,8 @@
 """The simulated arm, with elastic joints and links. It has no clock and no I/O."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -167,15 +168,29 @@ class FlexibleArm:
         """
         if not self._outside.rests:
             return played(self, commands)
-        T, n = len(commands), self.description.joints
-        out, flange = np.empty((T, self._width)), np.empty((T, 12))
-        if play(self.memory, np.ascontiguousarray(commands, dtype=float), out, flange) < T:
+        response = self._played(self.memory, commands)
+        force = response.specific_force
+        noisy = np.array([self._accelerometer.read(one) for one in force]).reshape(len(force), 3)
+        if len(force):
+            self._specific_force = force[-1]
+        return replace(response, measured=replace(response.measured, accelerometer=noisy))
+
+    def held(self) -> Callable[[int], Response]:
+        """Keep the present state, and return what the arm would do from it if nothing moved it; see `Foreseeing`."""
+        memory = self.memory.copy()
+        command = parts(memory).commands[NOW].copy()
+        command[1] = 0.0
+        return lambda periods: self._played(memory.copy(), np.tile(command, (periods, 1, 1)))
+
+    @staticmethod
+    def _played(memory: Floats, commands: Floats) -> Response:
+        """Compute periods on which nothing pushes; the accelerometer has no noise."""
+        T, n = len(commands), commands.shape[2]
+        out, flange = np.empty((T, 3 * n + 3)), np.empty((T, 12))
+        if play(memory, np.ascontiguousarray(commands, dtype=float), out, flange) < T:
             raise PlantError("the arm's state is no longer finite")
         force = out[:, 3 * n :]
-        noisy = np.array([self._accelerometer.read(one) for one in force]).reshape(T, 3)
-        measured = Measurement(out[:, :n], out[:, n : 2 * n], out[:, 2 * n : 3 * n], noisy)
-        if T:
-            self._specific_force = force[-1]
+        measured = Measurement(out[:, :n], out[:, n : 2 * n], out[:, 2 * n : 3 * n], force)
         return Response(measured, force, flange[:, 9:], flange[:, :9].reshape(T, 3, 3))
 
     def load(self, payload: Payload) -> None:

@@ -5,6 +5,7 @@ are interfaces of their own, too, which a plant implements by having the method:
 and knows the truth; a real arm has power, brakes, faults and a clock.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -281,6 +282,19 @@ class Playable(Protocol):
 
         Raises:
             PlantError: The state is no longer finite.
+        """
+
+
+@runtime_checkable
+class Foreseeing(Protocol):
+    """A plant that can tell what it would do if it were not moved any more."""
+
+    def held(self) -> Callable[[int], Response]:
+        """Keep the present state, which takes little time.
+
+        Returns:
+            What the arm would do in a number of periods if its drives held the position of the last command, without
+            noise and without pushes from outside. It does not change the arm, and may be called at any later time.
         """
 
 

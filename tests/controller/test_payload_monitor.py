@@ -1,5 +1,7 @@
 """What the drives add to the feed-forward tells a wrong payload, and nothing else does."""
 
+import re
+
 import numpy as np
 import pytest
 from tests.controller.robots import Line
@@ -9,6 +11,7 @@ from tvist_controller.safety.payload_monitor import TOLERATED, PayloadMonitor
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
 from tvist_lab.in_process import free_setup, robot_in_process
+from tvist_plant.arm_memory import LAST, NOW, parts
 from tvist_plant.description import load
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
@@ -49,6 +52,17 @@ class Watched:
         if self.monitor._time > 1.0 and np.isfinite(bound):
             self.worst = max(self.worst, abs(mass) / (TOLERATED + bound))
         return said
+
+    def carry(self, payload):
+        """Grip a part: the arm moves on as it was, with another body on its flange."""
+        arm = self.cycle.line.plant
+        before = parts(arm.memory)
+        kept = [before[number].copy() for number in range(2)]  # state and commands
+        arm._load(payload)
+        for number, values in enumerate(kept):
+            arm._arm[number][:] = values
+        arm._evaluate()
+        arm._arm.dynamics[LAST] = arm._arm.dynamics[NOW]
 
     def move(self, q, limits=LIMITS):
         """Warnings of a motion, of which the next begins at once."""
@@ -127,6 +141,17 @@ def test_it_is_told_at_rest_where_gravity_has_a_lever_and_not_upright():
     up = np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0])
     upright = Watched(up, 2.0, 5.0)
     assert not any(upright.step() for _ in range(1000))
+
+
+@pytest.mark.parametrize(("declared", "picked"), [(0.0, 5.0), (2.0, 5.0), (0.0, 1.5), (5.0, 0.5)])
+def test_a_part_picked_up_is_told_with_its_whole_mass_and_what_to_declare(declared, picked):
+    watched = Watched(PAPER[0], declared, declared)
+    assert not any(watched.step() for _ in range(2000))
+    watched.carry(disc(picked))
+    (said,) = [warning for q in PAPER[1:] for warning in watched.move(q)]
+    felt, bound = map(float, re.search(r"about ([\d.]+) kg \(within ([\d.]+) kg\)", said).groups())
+    assert felt == pytest.approx(picked, abs=bound)
+    assert f"set_payload({felt:.1f}, …) or set_target_payload({felt:.1f}, …)" in said
 
 
 def test_a_new_declaration_starts_anew():

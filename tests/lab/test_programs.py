@@ -10,9 +10,9 @@ from tests.own_arm import STANDS, OwnArm
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.in_process import free_setup
 from tvist_lab.metrics import amplitude, motions, tool_acceleration
+from tvist_lab.programs.account import as_dict, largest_peak, summary
 from tvist_lab.programs.in_lockstep import run_in_lockstep
 from tvist_lab.programs.start import InputError, input_command
-from tvist_lab.programs.watch import as_dict, largest_peak, summary
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_protocol.errors import RefusedError
@@ -155,11 +155,25 @@ def test_the_arm_is_watched_until_it_rests_after_the_program():
     assert watch.tick >= watch.moves[-1].ended + 150
 
 
-def test_without_a_rest_there_is_nothing_to_say_of_the_vibration():
-    first, second, last = run(*MOVES).moves
-    assert first.peak is not None
-    assert second.peak is None  # the last move follows at once
-    assert last.peak is not None
+def test_a_stop_that_the_next_move_follows_at_once_shakes_as_it_would_at_rest():
+    quick, slow = (run(*MOVES[:3], *pause, *MOVES[3:], payload=5.0) for pause in ((), ("sleep(0.5)",)))
+    assert quick.moves[1].rested < 50 < slow.moves[1].rested
+    assert quick.moves[1].peak == pytest.approx(slow.moves[1].peak, rel=0.005)
+    assert quick.moves[2].peak != pytest.approx(slow.moves[2].peak, rel=1e-6)  # it began while the tool shook
+
+
+def test_so_does_a_stop_before_a_motion_that_begins_with_a_jolt():
+    jolt, rest = "speedj([0.2, 0, 0, 0, 0, 0], 2, 0.3)", "sleep(0.5)"
+    quick, slow = (run(MOVES[0], *pause, jolt, payload=5.0, shaper="auto") for pause in ((), (rest,)))
+    assert quick.moves[0].peak == pytest.approx(slow.moves[0].peak, abs=0.003)
+
+
+def test_moves_and_warnings_have_the_lines_of_the_program():
+    up = "movel(pose_trans(get_target_tcp_pose(), p[0, 0, 0.1, 0, 0, 0]), a=30, v=9)"
+    watch = run("sleep(0.1)", up, MOVES[0])
+    assert [move.line for move in watch.moves] == [3, 4]
+    assert [(said.kind, said.line) for said in watch.said] == [("warning", 3)]
+    assert watch.fastest_joint.line in {3, 4}
 
 
 def test_shaping_lets_the_tool_shake_less():
@@ -205,6 +219,11 @@ def test_the_report_tells_everything():
     (move,) = told["moves"]
     assert move["peak_after_stop_m_s2"] == told["largest_peak_after_stop_m_s2"] > 0.0
     assert 0.3 < move["seconds"] < told["seconds"]
+    assert (move["line"], move["rested_s"]) == (4, None)
+    joint, tool = told["largest_joint_speed"], told["largest_tool_speed"]
+    assert joint["joint"] == "base"
+    assert 0.5 < joint["speed_rad_s"] < 2.0
+    assert tool["line"] == joint["line"] == 4
 
 
 def test_of_an_arm_without_truth_nobody_knows_how_its_tool_shakes():

@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+from xml.etree import ElementTree as ET
 
 import pytest
 from msgspec.structs import replace
@@ -156,7 +157,28 @@ class TestInLockstep:
             (("run", "moves.script", "--lockstep", "--config", "clock.toml"), ["clock", "--lockstep"]),
             (("run", "--check", "moves.script", "nope.script"), ["nope.script", "No such file"]),
             (("run", "--check", "--lockstep", "moves.script"), ["--check runs nothing"]),
-            (("run", "moves.script", "wrong.script"), ["wrong.script", "--check"]),
+            (("run", "moves.script", "wrong.script"), ["--lockstep", "--check", "wrong.script"]),
+            (("run", "moves.script", "moves.script", "--lockstep"), ["moves.script is given twice"]),
+            (("run", "-", " -", "--lockstep"), ["<stdin> is given twice"]),
+            (
+                ("run", "moves.script", "waits.script", "--lockstep", "--record", "x"),
+                ["record is x", "these are 2"],
+            ),
+            (("run", "moves.script", "--max-shake", "0"), ["max-shake is 0 m/s²", "more than 0"]),
+            (("run", "moves.script", "--max-seconds", "-1"), ["max-seconds is -1 s", "more than 0"]),
+            (("run", "moves.script", "--max-joint-speed", "nan"), ["max-joint-speed is nan rad/s", "finite"]),
+            (("run", "moves.script", "--max-tool-speed", "inf"), ["max-tool-speed is inf m/s", "finite"]),
+            (("run", "moves.script", "--junit", "no/x.xml"), ["junit is no/x.xml", "no folder no"]),
+            (("run", "moves.script", "--report", "."), ["report is .", "folder"]),
+            (("run", "moves.script", "--report", "x", "--junit", "x"), ["the same file"]),
+            (("run", "moves.script", "--baseline", "x.json"), ["--baseline needs --lockstep"]),
+            (("run", "moves.script", "--lockstep", "--baseline", "x.json"), ["x.json", "No such file"]),
+            (
+                ("run", "moves.script", "--lockstep", "--baseline", "clock.toml"),
+                ["baseline clock.toml is not"],
+            ),
+            (("run", "--check", "--max-shake", "1", "moves.script"), ["--check runs nothing"]),
+            (("run", "--check", "--junit", "x.xml", "moves.script"), ["--check runs nothing"]),
             (("run", "--check"), ["missing"]),
         ],
         ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
@@ -179,6 +201,74 @@ class TestInLockstep:
         assert process.returncode == 130
         assert "interrupted: waits.script had run for" in err
         assert read(tmp_path / "x.mcap").complete
+
+
+@pytest.mark.usefixtures("tvist")
+class TestJudged:
+    def test_several_programs_have_a_result_each_and_one_that_fails_makes_exit_code_1(self, called, tmp_path):
+        files = ("moves.script", "wrong.script", "fails.script")
+        code, out, err = called(
+            "run", *files, "--lockstep", "--json", "--junit", "out.xml", "--report", "out.html"
+        )
+        told = json.loads(out)
+        assert (code, told["ok"], told["failed"]) == (1, False, 2)
+        assert [one["file"] for one in told["programs"]] == list(files)
+        assert [one["exit_reason"] for one in told["programs"]] == [
+            "finished",
+            "compile_error",
+            "runtime_error",
+        ]
+        assert told["seconds"] == pytest.approx(sum(one.get("seconds", 0.0) for one in told["programs"]))
+        assert "moves.script: moves ran for" in err
+        assert err.endswith("tvist: 2 of 3 programs failed: wrong.script, fails.script\n")
+        (suite,) = ET.parse(tmp_path / "out.xml").getroot()  # noqa: S314  our own
+        assert [case.find("failure") is None for case in suite] == [True, False, False]
+        assert "2 of 3 programs failed." in (tmp_path / "out.html").read_text("utf-8")
+
+    def test_each_has_a_fresh_robot(self, called, tmp_path):
+        (tmp_path / "again.script").write_text(MOVES, encoding="utf-8")
+        code, out, _ = called("run", "moves.script", "again.script", "--lockstep", "--json")
+        one, other = json.loads(out)["programs"]
+        assert (code, one.pop("file"), other.pop("file")) == (0, "moves.script", "again.script")
+        assert one == other
+        code, out, err = called("run", "moves.script", "again.script", "--lockstep")
+        assert (code, out.count("from ["), out.count("done\n")) == (0, 2, 2)
+        assert err.endswith("2 programs ran as they should\n")
+
+    def test_a_broken_limit_is_a_line_with_its_place_and_exit_code_1(self, called):
+        code, out, err = called(
+            "run", "moves.script", "--lockstep", "--json", "--max-shake", "0.01", "--max-seconds", "1"
+        )
+        told = json.loads(out)
+        assert (code, told["ok"], told["exit_reason"]) == (1, False, "finished")
+        assert {one["kind"] for one in told["failures"]} == {"max_seconds", "max_shake"}
+        first, second, *_, last = err.splitlines()
+        assert first.startswith("moves.script: it ran for ")
+        assert second.startswith("moves.script:3: after move 1, which stopped at ")
+        assert last == "tvist: moves.script broke 3 limits"
+
+    def test_limits_that_are_kept_change_nothing(self, called):
+        given = [
+            word
+            for name in ("shake", "seconds", "joint-speed", "tool-speed")
+            for word in (f"--max-{name}", "9")
+        ]
+        code, _, err = called("run", "moves.script", "--lockstep", *given)
+        assert (code, err.count("\n"), "made 2 moves" in err) == (0, 1, True)
+
+    def test_a_run_equals_its_baseline_and_another_shaper_does_not(self, called, tmp_path):
+        run = ("run", "moves.script", "fails.script", "--lockstep")
+        for programs in (run[1:2], run[1:3]):
+            command = ("run", *programs, "--lockstep")
+            (tmp_path / "base.json").write_text(called(*command, "--json")[1], encoding="utf-8")
+            _, _, err = called(*command, "--baseline", "base.json")
+            assert "baseline" not in err
+        code, _, err = called(
+            "run", "moves.script", "fails.script", "--lockstep", "--baseline", "base.json", "--shaper", "ei"
+        )
+        assert code == 1
+        assert "moves.script:3: move 1: peak_after_stop_m_s2 is " in err
+        assert "points" in err
 
 
 class TestInRealTime:

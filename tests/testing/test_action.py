@@ -56,7 +56,7 @@ def outputs(folder):
 def test_every_step_of_the_action_is_one_of_its_script():
     action = yaml.safe_load((ACTION / "action.yml").read_text())
     called = [re.search(r"run\.sh\" (\w+)", step["run"])[1] for step in action["runs"]["steps"]]
-    assert called == ["install", "serve", "test"]
+    assert called == ["install", "serve", "test", "programs"]
     assert all(step["shell"] == "bash" for step in action["runs"]["steps"])
     known = {f"inputs.{name}" for name in action["inputs"]}
     used = set(re.findall(r"inputs\.\w+", (ACTION / "action.yml").read_text()))
@@ -74,8 +74,8 @@ def test_tests_run_and_the_recordings_of_failed_ones_are_named(run, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((), "the first argument is missing: must be install, serve, test or stop"),
-        (("fly",), "the first argument is fly: must be install, serve, test or stop"),
+        ((), "the first argument is missing: must be install, serve, test, programs or stop"),
+        (("fly",), "the first argument is fly: must be install, serve, test, programs or stop"),
         (("install",), "install takes one argument: a checkout, a folder with wheels, or a requirement"),
         (("install", "/etc"), "/etc is neither a checkout of tvist nor a folder with wheels"),
         (("stop",), "no robot is served"),
@@ -84,6 +84,15 @@ def test_tests_run_and_the_recordings_of_failed_ones_are_named(run, tmp_path):
 def test_a_wrong_step_is_told_in_a_sentence(run, arguments, said):
     ran = run(*arguments)
     assert (ran.returncode, ran.stderr) == (1, f"tvist action: {said}\n")
+
+
+def test_programs_run_and_their_results_are_named(run, tmp_path):
+    for name, error in (("good", ""), ("bad", "  y = 1 / 0\n")):
+        text = f"def {name}():\n  sleep(0.1)\n{error}end\n"
+        (tmp_path / f"{name}.script").write_text(text, encoding="utf-8")
+    ran = run("programs", "good.script", "bad.script", "--max-shake", "0.3")
+    assert (ran.returncode, "1 of 2 programs failed: bad.script" in ran.stderr) == (1, True), ran.stderr
+    assert 'tests="2" failures="1"' in Path(outputs(tmp_path)["junit"]).read_text(encoding="utf-8")
 
 
 def test_a_robot_that_cannot_start_is_told(run):

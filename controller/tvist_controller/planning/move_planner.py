@@ -8,6 +8,7 @@ import numpy as np
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_controller.line.limits import arm_limits, rate_of
+from tvist_controller.planning.asked_speed import LATE, REACHED
 from tvist_controller.planning.basis import FilterBasis, MotionBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitted, Fitter, Slower
@@ -89,10 +90,16 @@ class MovePlanner:
         limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
         if command.duration is None:
             arm = None if at_once else self._arm(basis.filter)
-            return self.along(path, limits, basis, arm=arm, at_once=at_once)
-        limits = self._lasting(path, command.duration, basis)
-        agility = at_least(limits, AGILE.acceleration, AGILE.jerk)
-        return self.along(path, limits, basis, agility, at_once=at_once)
+            planned = self.along(path, limits, basis, arm=arm, at_once=at_once)
+            slower = None if arm is not None or basis.excess > 0.0 else _jerked(planned.parts[0], limits)
+        else:
+            limits = self._lasting(path, command.duration, basis)
+            agility = at_least(limits, AGILE.acceleration, AGILE.jerk)
+            planned = self.along(path, limits, basis, agility, at_once=at_once)
+            slower = _late(planned.parts[0], command.duration)
+        if slower is None or (planned.limited is not None and planned.limited[0] == "limit_torque"):
+            return planned
+        return replace(planned, limited=slower)
 
     def _lasting(self, path: JointLine, duration: float, basis: MotionBasis) -> MotionLimits:
         """Limits with which a motion takes a duration [s], or those of the arm if it takes longer with these."""
@@ -198,3 +205,22 @@ def limited(fitted: Fitted, asked: MotionLimits | None = None) -> tuple[Code, st
     else:
         what = f"acceleration is {asked.acceleration * acceleration:.4g} of {asked.acceleration:.4g} rad/s²"
     return fitted.need.code, f"{what}, so that {fitted.need.keeps}"
+
+
+def _jerked(motion: PlannedMotion, asked: MotionLimits) -> tuple[Code, str] | None:
+    """Say that the jerk keeps a joint motion from the speed that was asked for, unless its way is too short for it."""
+    way = float(np.abs(motion.path.end - motion.path.start).max())
+    _, (_, qd, _), _ = motion.states(3)  # it is symmetric in time, so fastest in the middle
+    fastest = float(np.abs(qd).max())
+    if fastest >= REACHED * asked.velocity or asked.velocity**2 > asked.acceleration * way:
+        return None
+    what = f"velocity is {fastest:.4g} of {asked.velocity:.4g} rad/s"
+    return "limit_acceleration", f"{what}, so that the joints' jerk stays within {asked.jerk:.4g} rad/s³"
+
+
+def _late(motion: PlannedMotion, asked: float) -> tuple[Code, str] | None:
+    """Say that a joint motion takes longer than the duration that was asked for [s], as the arm's limits require."""
+    if motion.duration <= LATE * asked:
+        return None
+    what = f"duration is {motion.duration:.4g} s instead of {asked:.4g}"
+    return "limit_acceleration", f"{what}, so that the joints stay within the arm's limits"

@@ -14,6 +14,7 @@ from tvist_controller.paths.poses import Placement, placement
 from tvist_controller.paths.route import Piece, Run, runs_of
 from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolLine, ToolWay
 from tvist_controller.paths.tracking import Tracker, WayError
+from tvist_controller.planning.asked_speed import slower_than_asked
 from tvist_controller.planning.basis import MotionBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitted, Slower
@@ -33,6 +34,7 @@ from tvist_protocol.motions import (
     ProcessSegment,
     Segment,
 )
+from tvist_protocol.replies import Code
 from tvist_shaping.base import Filter
 
 POSTURES = 9
@@ -92,8 +94,10 @@ class PathPlanner:
         tvist, done, motions = self._filters.present(basis.filter), 0.0, list[PlannedMotion]()
         window, velocity, told = 0.0, 0.0, None
         for run in runs:
-            fitted, delay, highest = self._motion(run, command.jerk, tvist, basis)
-            motion, told = fitted.motion, told or limited(fitted)
+            fitted, delay, highest, slower = self._motion(run, command.jerk, tvist, basis)
+            if slower is not None and len(legs) > 1:
+                slower = slower[0], f"{run[0].where}: {slower[1]}"
+            motion, told = fitted.motion, told or limited(fitted) or slower
             velocity = max(velocity, highest)
             self._check_clear(motion, run, (done, length), basis)
             motions.append(motion)
@@ -191,13 +195,18 @@ class PathPlanner:
 
     def _motion(
         self, run: Run, jerk: float, tvist: Filter, basis: MotionBasis
-    ) -> tuple[Fitted, float, float]:
-        """A motion, the delay of the shaper on it [s], and the largest velocity of any joint [rad/s]."""
+    ) -> tuple[Fitted, float, float, tuple[Code, str] | None]:
+        """A motion, and what is known of it.
+
+        Returns:
+            The motion, the delay of the shaper on it [s], the largest velocity of any joint [rad/s], and of a run along
+            one segment what makes it slower than asked, see `slower_than_asked`.
+        """
         limits, spared = self._description.limits, 1.0 - basis.excess
         if not run:  # the arm is there already
             still = JointLine(basis.q, basis.q)
             motion = quickest_motion(still, arm_limits(self._description), PERIOD, basis.speed)
-            return Fitted(motion), 0.0, 0.0
+            return Fitted(motion), 0.0, 0.0, None
         knots = joined(run)
         self._check_range(knots.s / knots.s[-1], knots.q, run[0].where)
         acceleration = np.array(limits.acceleration) * spared
@@ -208,6 +217,8 @@ class PathPlanner:
             SPARED * np.array(limits.velocity) / peak, SPARED * acceleration / peak**2, min(limits.jerk)
         )
         law = law_of(run, curve, joints, jerk, delay)
+        alone = all(piece.where == run[0].where for piece in run)
+        slower = slower_than_asked(run, curve, law, joints, self._description) if alone else None
         highest = fastest(law, curve)
         rate = rate_of(basis.speed, highest, basis.slowest)
 
@@ -218,7 +229,7 @@ class PathPlanner:
             )
 
         fitted = self._moves.fitter.fit(make, basis, lambda: self._filters.present(basis.filter))
-        return fitted, delay, highest * fitted.slower.rate
+        return fitted, delay, highest * fitted.slower.rate, slower
 
     @staticmethod
     def _delay(curve: SplineCurve, tvist: Filter) -> float:

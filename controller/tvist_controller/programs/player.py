@@ -94,6 +94,11 @@ class ProgramPlayer:
         return self.statements.published
 
     @property
+    def present_line(self) -> int:
+        """Line of the main thread at this tick, unlike `line`, which is told now and then; 0 if there is none."""
+        return 0 if self._main is None else self._main.machine.line
+
+    @property
     def progress(self) -> tuple[str | None, ProgramState, int]:
         """Fields of the program in `io`: its name, its state and its line."""
         return self.name, self.state, self.line

@@ -15,6 +15,8 @@ EVERY = 10
 """Number of ticks that are averaged into one measurement."""
 MEMORY = 2.0
 """Time in which the weight of a measurement decays to 1/e [s]; many periods of a vibration."""
+RECENT = 0.1
+"""The same for the mass that a warning names [s]: the long memory still holds what was before a part was picked up."""
 ENOUGH = 1.0
 """Observation time required for a judgement [s]."""
 TOLERATED = 0.5
@@ -95,7 +97,7 @@ class PayloadMonitor:
         self._sum = np.zeros(description.joints)
         # Without this floor, a joint without friction would dominate the estimate.
         self._friction = np.maximum(drives.coulomb_friction, 0.01 * np.array(description.limits.torque))
-        self._fade = float(np.exp(-EVERY * PERIOD / MEMORY))
+        self._fade = np.exp(-EVERY * PERIOD / np.array([MEMORY, RECENT]))
         self.declare(declared)
         still = np.zeros_like(self._sum)  # the first calls load compiled code, which takes many ticks
         add(still, still, still)
@@ -113,15 +115,20 @@ class PayloadMonitor:
         """Discard past measurements, since the arm was placed elsewhere, its power was off, or something pushed it."""
         self._wait = 0
         self._ticks, self._sum[:] = 0, 0.0
-        self._time = self._yy = self._yr = self._bound = 0.0
+        self._time = 0.0
+        self._yy, self._yr, self._bound = np.zeros((3, len(self._fade)))
         self._warned = False
 
     @property
     def excess(self) -> tuple[float, float]:
         """Estimated mass error of the declaration, and its bound from friction, which may be infinite [kg]."""
-        if self._yy <= 0.0:
+        return self._estimate(0)
+
+    def _estimate(self, memory: int) -> tuple[float, float]:
+        """The same with `MEMORY`, 0, or `RECENT`, 1."""
+        if self._yy[memory] <= 0.0:
             return 0.0, np.inf
-        return self._yr / self._yy, self._bound / self._yy
+        return float(self._yr[memory] / self._yy[memory]), float(self._bound[memory] / self._yy[memory])
 
     def update(self, target: Target, expected: Floats, moment: Floats) -> str | None:
         """Take one tick in which the drives hold the arm.
@@ -147,7 +154,7 @@ class PayloadMonitor:
         )
         self._ticks, self._sum[:] = 0, 0.0
         fade = self._fade
-        self._time = fade * self._time + EVERY * PERIOD
+        self._time = float(fade[0]) * self._time + EVERY * PERIOD
         self._yy = fade * self._yy + square
         self._yr = fade * self._yr + product / EVERY
         self._bound = fade * self._bound + FRICTION * bound
@@ -160,8 +167,10 @@ class PayloadMonitor:
         if not abs(mass) > TOLERATED + bound:
             return None
         self._warned = True
+        mass, bound = self._estimate(1)
         felt = max(self.payload.mass + mass, 0.0)
         return (
             f"{self.payload.mass:g} kg are declared, but the drives hold about {felt:.1f} kg (within {bound:.1f} kg): "
-            "declare the actual payload, or find out what pushes the arm"
+            f"declare them, in a program with set_payload({felt:.1f}, …) or set_target_payload({felt:.1f}, …) and "
+            "their centre of mass, or find out what pushes the arm"
         )

@@ -1,22 +1,27 @@
 """Observation of one program, tick by tick, in the controller's thread."""
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from tvist_controller.api.robot import Controller, Sink, truth_of
-from tvist_plant.plant import GRAVITY, PERIOD, Truthful
+from tvist_plant.model import Floats
+from tvist_plant.plant import GRAVITY, PERIOD, Foreseeing, Response, Truthful
 from tvist_protocol.stream import Event, State
 
 AFTER_STOP = 5
 """Ticks after a stop (10 ms) at which the search for the peak begins, when the last ramp has passed."""
 SEEN = 50
-"""Ticks of rest (0.1 s) without which nothing can be said of the vibration after a stop."""
+"""Ticks of rest (0.1 s) that show the vibration after a stop; if it rests for less, the rest is computed ahead."""
 WINDOW = 150
 """Ticks after a stop (0.3 s) in which the peak is searched, as for the paper's residual vibration."""
+KEPT = 5000
+"""Most states of the arm that a run in real time keeps for `Move.peak`, 50 MB; later stops with no rest have none."""
 LINGER = 2500
 """Most ticks (5 s) for which an arm that has not come to rest is watched after the end of its program."""
 
@@ -41,6 +46,8 @@ class Said:
     tick: int
     kind: Literal["text", "popup", "warning"]
     text: str
+    line: int = 0
+    """Line that the program carried out then; 0 if none."""
     title: str | None = None
     """Title of a popup."""
     level: Literal["message", "warning", "error"] | None = None
@@ -53,14 +60,52 @@ class Move:
 
     id: int
     started: int
+    line: int = 0
+    """Line of the program that began it; 0 if no line did."""
     ended: int | None = None
     """Tick of its end; None if it had not ended when the run did."""
     stopped: str | None = None
     """Why it was stopped before its target; None if it was not."""
-    peak: float | None = None
-    """Largest acceleration of the tool from 10 ms until 0.3 s after the stop, without gravity [m/s²]; None if the arm
-    did not rest long enough to tell, or cannot tell."""
-    peak_so_far: float = 0.0
+    rests: int | None = None
+    """Tick at which the shaped reference came to rest after it; None if it did not before the next motion."""
+    followed: int | None = None
+    """Tick at which the next motion began; None if none did."""
+    rested: int = 0
+    """Ticks for which the reference rested after it, as far as the vibration is looked at."""
+    peak_so_far: float | None = None
+    """Largest acceleration of the tool seen so far; None if none was seen [m/s²]."""
+    held: Callable[[int], Response] | None = None
+    """What the arm would have done at rest; None if it need not be asked, since it was seen."""
+
+    @cached_property
+    def peak(self) -> float | None:
+        """Largest acceleration of the tool from 10 ms until 0.3 s after the stop, without gravity [m/s²].
+
+        Where the next motion began within 0.1 s, it is what the tool would have done at rest. None if the arm cannot
+        tell, or if there was no rest. To be asked when the next motion has begun, since it is computed once.
+        """
+        if self.held is None:
+            return self.peak_so_far if self.rested >= SEEN else None
+        would = self.held(WINDOW)
+        return float(acceleration(would.specific_force, would.flange_rotation)[AFTER_STOP - 1 :].max())
+
+    def settle(self) -> None:
+        """Compute `peak` now, so that the state of the arm need not be kept."""
+        assert self.peak is not None
+        self.held = None
+
+
+@dataclass(frozen=True)
+class Fastest:
+    """The largest speed of a run, and when and where it was."""
+
+    speed: float = 0.0
+    """Measured speed [rad/s, or m/s]."""
+    tick: int = 0
+    line: int = 0
+    """Line that the program carried out then; 0 if none."""
+    joint: str | None = None
+    """Name of the joint; None for the tool."""
 
 
 @dataclass(frozen=True)
@@ -112,13 +157,21 @@ class ProgramWatch(Sink):
         """What was said, for another thread to take."""
         self.moves: list[Move] = []
         """Motions of the program."""
+        self.fastest_joint, self.fastest_tool = Fastest(), Fastest()
+        """Largest speeds of a joint and of the tool centre point, as measured."""
         self.over = False
         """Whether there is nothing more to observe."""
+        self._names = controller.cycle.description.robot.joints
         self._ended = 0
+        self._kept = 0
+        """States of the arm that are kept for later."""
+        self._placeless: list[Move | Said] = []
+        """What came in this tick, and whose line is not known yet."""
         self._rest = 0
         """Ticks for which the shaped reference has rested after the last move."""
         plant = controller.cycle.line.plant
         self._truthful = isinstance(plant, Truthful) and plant.truth() is not None
+        self._foreseeing = plant if isinstance(plant, Foreseeing) else None
 
     @property
     def seconds(self) -> float:
@@ -128,7 +181,7 @@ class ProgramWatch(Sink):
     @property
     def line(self) -> int:
         """Line that the program carries out; 0 if it has ended."""
-        return self._controller.programs.line
+        return self._controller.programs.present_line
 
     def end(self, reason: Reason, why: str | None) -> None:
         """Note how the run has ended; what is noted first counts.
@@ -148,7 +201,7 @@ class ProgramWatch(Sink):
             case "program_started" if not self.name:
                 self.name = event.program or ""
             case "text" | "popup" | "warning" if event.line is None:
-                self._say(Said(event.tick, event.kind, event.why or "", event.title, event.level))
+                self._say(Said(event.tick, event.kind, event.why or "", 0, event.title, event.level))
                 if event.blocking:
                     self._close_popup()
             case "warning" if event.program == self.name:
@@ -161,14 +214,16 @@ class ProgramWatch(Sink):
             case "program_stopped" if event.program == self.name:
                 self.end("finished" if event.why is None else "stopped", event.why)
             case "motion_started":
-                self.moves.append(Move(event.id or 0, event.tick))
-                self._rest = 0
+                self._note_start(event)
             case "motion_done" | "motion_stopped":
                 self._note_end(event)
 
     def state(self, state: State) -> None:
         """Take a tick's state, which its events precede."""
         self.tick = state.tick
+        while self._placeless:  # a program's line is known between its turns
+            self._placeless.pop().line = self.line
+        self._note_speeds(state)
         at_rest = self._controller.cycle.mode.at_rest
         if self.moves:
             self._watch_rest(self.moves[-1], at_rest=at_rest)
@@ -189,11 +244,42 @@ class ProgramWatch(Sink):
         if not at_rest or move.ended is None:
             self._rest = 0
         elif self._rest <= WINDOW:
-            self._rest += 1
+            if self._rest == 0:  # before the next motion may have begun
+                move.rests = self.tick
+                move.held = None if self._foreseeing is None else self._foreseeing.held()
+            self._rest = move.rested = self._rest + 1
+            if self._rest == SEEN:
+                move.held = None
             if self._rest > AFTER_STOP and self._truthful:
-                move.peak_so_far = max(move.peak_so_far, self._acceleration())
-            if self._rest >= SEEN and self._truthful:
-                move.peak = move.peak_so_far
+                truth = truth_of(self._controller.cycle.line.plant)
+                seen = float(acceleration(truth.specific_force, truth.flange_rotation))
+                move.peak_so_far = max(move.peak_so_far or 0.0, seen)
+
+    def _note_speeds(self, state: State) -> None:
+        speeds = [abs(speed) for speed in state.actual_qd]
+        if (most := max(speeds)) > self.fastest_joint.speed:
+            self.fastest_joint = Fastest(most, state.tick, self.line, self._names[speeds.index(most)])
+        if (tool := math.hypot(*state.actual_TCP_speed[:3])) > self.fastest_tool.speed:
+            self.fastest_tool = Fastest(tool, state.tick, self.line)
+
+    def _note_start(self, event: Event) -> None:
+        if self.moves:
+            self._note_next(self.moves[-1], event.tick)
+        self.moves.append(Move(event.id or 0, event.tick))
+        self._placeless.append(self.moves[-1])
+        self._rest = 0
+
+    def _note_next(self, move: Move, tick: int) -> None:
+        """Note when the next move began; what the arm would have done else takes too long to compute in real time."""
+        move.followed = tick
+        if move.held is None:
+            return
+        if self._alone:
+            move.settle()
+        elif self._kept < KEPT:
+            self._kept += 1
+        else:
+            move.held = None
 
     def _note_end(self, event: Event) -> None:
         for move in self.moves[-2:]:  # the next one may begin in the tick in which this one ends
@@ -202,71 +288,18 @@ class ProgramWatch(Sink):
                 if event.kind == "motion_stopped":
                     move.stopped = event.why or "it was stopped"
 
-    def _acceleration(self) -> float:
-        """Magnitude of the tool's acceleration, without gravity [m/s²]."""
-        truth = truth_of(self._controller.cycle.line.plant)
-        up = truth.flange_rotation[2]  # the world's z axis, in the frame of the flange
-        return float(np.linalg.norm(truth.specific_force - GRAVITY * up))
-
     def _say(self, said: Said) -> None:
         self.said.append(said)
+        self._placeless.append(said)
         self.news.append(said)
 
 
-def largest_peak(watch: ProgramWatch) -> float | None:
-    """Largest acceleration of the tool after a stop [m/s²]; None if it was never at rest for long enough."""
-    return max((move.peak for move in watch.moves if move.peak is not None), default=None)
+def acceleration(specific_force: Floats, rotation: Floats) -> Floats:
+    """Magnitudes of the tool's acceleration without gravity, shape (...) [m/s²].
 
-
-def summary(watch: ProgramWatch) -> str:
-    """Say in a sentence how long a program ran, how often it moved, and how much the tool shook."""
-    said = f"{watch.name} ran for {watch.seconds:.3f} s of robot time"
-    if watch.moves:
-        said += f" and made {len(watch.moves)} {'move' if len(watch.moves) == 1 else 'moves'}"
-    peak = largest_peak(watch)
-    return said if peak is None else f"{said}; after a stop the tool shook with at most {peak:.3g} m/s²"
-
-
-def as_dict(watch: ProgramWatch) -> dict[str, Any]:
-    """Return everything that is known of a run, as plain values."""
-    error = watch.error
-    return {
-        "program": watch.name,
-        "ok": watch.reason == "finished",
-        "exit_reason": watch.reason,
-        "why": watch.why,
-        "error": None if error is None else {"line": error.line, "column": error.column, "text": error.text},
-        "seconds": round(watch.seconds, 6),
-        "messages": [_message(said) for said in watch.said if said.kind != "warning"],
-        "warnings": [
-            {"timestamp": _time(said.tick), "text": said.text}
-            for said in watch.said
-            if said.kind == "warning"
-        ],
-        "moves": [_move(move) for move in watch.moves],
-        "largest_peak_after_stop_m_s2": largest_peak(watch),
-    }
-
-
-def _message(said: Said) -> dict[str, Any]:
-    message: dict[str, Any] = {"timestamp": _time(said.tick), "kind": said.kind, "text": said.text}
-    return message | ({"title": said.title, "level": said.level} if said.kind == "popup" else {})
-
-
-def _move(move: Move) -> dict[str, Any]:
-    return {
-        "id": move.id,
-        "timestamp": _time(move.started),
-        "seconds": None if move.ended is None else _seconds(move.ended - move.started),
-        "stopped": move.stopped,
-        "peak_after_stop_m_s2": move.peak,
-    }
-
-
-def _time(tick: int) -> float:
-    """Time of a tick, as `timestamp` in `state` gives it [s]."""
-    return _seconds(tick)
-
-
-def _seconds(ticks: int) -> float:
-    return round(ticks * PERIOD, 6)  # 0.002 is no binary number
+    Args:
+        specific_force: Specific force in the flange frame, shape (..., 3) [m/s²].
+        rotation: Orientation of the flange, shape (..., 3, 3).
+    """
+    up = rotation[..., 2, :]  # the world's z axis, in the frame of the flange
+    return np.asarray(np.linalg.norm(specific_force - GRAVITY * up, axis=-1))

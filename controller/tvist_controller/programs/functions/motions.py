@@ -45,10 +45,13 @@ class MotionFunctions:
     @costs(180)
     def movej(self, q: object, a: object = 1.4, v: object = 1.05, t: object = 0, r: object = 0) -> Turns:
         """Move all joints in phase to joint positions, or to those nearest that reach a pose."""
-        posture = self._posture("q", q)
+        posture, speed = self._posture("q", q), positive("v", v)
+        if speed > self._velocity and number("t", t) == 0.0:
+            why = f"v of movej is {speed:.4g} rad/s: the joints turn with at most {self._velocity:.4g}"
+            self._access.emit("warning", code="limit_velocity", why=why)
         segment = JointSegment(
             q=posture,
-            velocity=self._within(positive("v", v), "velocity", self._velocity),
+            velocity=self._within(speed, "velocity", self._velocity),
             acceleration=self._within(positive("a", a), "acceleration", self._acceleration),
             duration=_duration(t),
             blend=number("r", r, 0.0, MAX_BLEND),
