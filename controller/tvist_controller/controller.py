@@ -44,7 +44,7 @@ from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_controller.setup import Setup, body
 from tvist_plant.fingerprint import fingerprint
-from tvist_plant.plant import PERIOD, Loadable, Placeable, Plant, PlantError
+from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Reply
@@ -104,7 +104,11 @@ class Controller(WholeRobot):
         self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
         self.forces = ToolForces(setup.description, self.peripherals, lambda: self.latest)
         """Forces and torques on the arm."""
-        self.cell = self._made_cell()
+        self.cell = (
+            None
+            if setup.cell is None
+            else LiveCell(setup.cell, setup.description, self.cycle.line.plant, self.peripherals, self._emit)
+        )
         """What stands around the robot; None for nothing."""
         guidance = Guidance(self.motion)
         self.programs = ProgramPlayer(self._access(guidance), safety)
@@ -238,7 +242,7 @@ class Controller(WholeRobot):
             sample = self.motion.step()
             self._safety.watch(sample)
             if self.cell is not None:
-                self._tick_cell(self.cell, sample)
+                self.cell.tick(self.tick_number + 1, sample.measured.q)
         except PlantError as error:
             self._faults.clear()
             sample = self._safety.recover(error, self._seed)
@@ -266,31 +270,6 @@ class Controller(WholeRobot):
             setpoint_sequence=motion.streams.sequence,
             missed_ticks=self.counters.missed_ticks,
         )
-
-    def _made_cell(self) -> LiveCell | None:
-        cell, plant = self.setup.cell, self.cycle.line.plant
-        if cell is None:
-            return None
-        if cell.changes_load and not isinstance(plant, Loadable):
-            name = type(plant).__name__
-            raise ValueError(
-                f"cell: the plant {name} cannot carry another payload while it moves, since it has no load: leave "
-                "parts and all tools but one out"
-            )
-        if cell.tools:
-            self.peripherals.set_tcp(cell.tools[0].tcp)
-        return LiveCell(cell, self.setup.description, self._emit, plant.payload)
-
-    def _tick_cell(self, cell: LiveCell, sample: Sample) -> None:
-        """Let the cell follow the outputs and the arm; what it does counts from the next tick on."""
-        (mask, values), payload = cell.tick(
-            self.tick_number + 1, self.peripherals.digital_outputs, sample.measured.q
-        )
-        if mask:
-            self.peripherals.set_digital_inputs(mask, values)
-        plant = self.cycle.line.plant
-        if payload is not None and isinstance(plant, Loadable):
-            plant.load(payload)
 
     def _look_again(self) -> None:
         """Let the next tick see what has timed out, and what modes have become: a command may have changed both."""

@@ -1,6 +1,6 @@
 """A cell in time: what it does in every tick."""
 
-from typing import NamedTuple
+from typing import Protocol
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.paths.poses import Placement, placement
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import Floats
+from tvist_plant.plant import Loadable, Plant
+from tvist_protocol.values import Pose
 
 TRANSFER = 100
 """Ticks (0.2 s) in which the weight of a part goes over to the arm and back, as when it is lifted off its support."""
@@ -25,13 +27,18 @@ _SWAPPED = np.diag([-1.0, -1.0, 1.0])
 """Half a turn about z."""
 
 
-class Effect(NamedTuple):
-    """What the cell does to the robot before its next tick."""
+class Terminals(Protocol):
+    """Terminals of the robot, and the place where its tool centre point is declared."""
 
-    inputs: tuple[int, int]
-    """Digital inputs that change, as a mask, and their values."""
-    payload: Payload | None
-    """What the arm carries from now on; None if nothing changes."""
+    @property
+    def digital_outputs(self) -> int:
+        """Digital outputs, a bit each."""
+
+    def set_digital_inputs(self, mask: int, values: int) -> None:
+        """Apply signals to the digital inputs that the mask selects."""
+
+    def set_tcp(self, pose: Pose) -> None:
+        """Declare the tool centre point in the flange frame."""
 
 
 class LiveCell:
@@ -40,12 +47,26 @@ class LiveCell:
     Args:
         cell: The cell, which has been checked.
         description: The robot.
+        plant: Its arm; what that carries at the start is the first tool unless a test wants something else.
+        terminals: What the wires connect.
         emit: Emits events.
-        load: What the arm carries at the start, which is the first tool unless a test wants something else.
+
+    Raises:
+        ValueError: Parts or tools would change what the arm carries, and the plant cannot.
     """
 
-    def __init__(self, cell: Cell, description: RobotDescription, emit: Emit, load: Payload) -> None:
-        self._cell, self._emit = cell, emit
+    def __init__(
+        self, cell: Cell, description: RobotDescription, plant: Plant, terminals: Terminals, emit: Emit
+    ) -> None:
+        if cell.changes_load and not isinstance(plant, Loadable):
+            name = type(plant).__name__
+            raise ValueError(
+                f"cell: the plant {name} cannot carry another payload while it moves, since it has no load: leave "
+                "parts and all tools but one out"
+            )
+        if cell.tools:
+            terminals.set_tcp(cell.tools[0].tcp)
+        self._cell, self._plant, self._terminals, self._emit = cell, plant, terminals, emit
         self._kinematics = ToolKinematics(description)
         self._kinematics.pose(np.zeros(description.joints))  # its kernel is loaded before the first tick
         self.gripper = (
@@ -55,7 +76,7 @@ class LiveCell:
         tool = cell.gripping_tool
         self._tcp = placement(None if tool is None else tool.tcp)
         self._changers = [(bit_of(tool.while_on), tool) for tool in cell.tools[1:] if tool.while_on]
-        self.begin(load)
+        self.begin(plant.payload)
 
     @property
     def empty(self) -> Payload:
@@ -99,15 +120,14 @@ class LiveCell:
         """Return whether a program that connects to a machine reaches the gripper."""
         return self.gripper is not None and port == PORT and address.strip().lower() in THIS_MACHINE
 
-    def tick(self, tick: int, outputs: int, q: Floats) -> Effect:
-        """Do what happens in a tick.
+    def tick(self, tick: int, q: Floats) -> None:
+        """Follow the outputs and the arm; what the cell does counts from the next tick on.
 
         Args:
             tick: Number of the tick that has been computed.
-            outputs: Its digital outputs.
             q: Measured joint positions, shape (n,) [rad].
         """
-        before = self._tool, self._share
+        before, outputs = (self._tool, self._share), self._terminals.digital_outputs
         if self._changers:
             first = self._cell.tools[0]
             self._mount(next((tool for bit, tool in self._changers if outputs & bit), first), q)
@@ -117,9 +137,11 @@ class LiveCell:
             self._share = min(self._share + 1, TRANSFER)
         elif self._share:
             self._share -= 1
-        changed = (self._tool, self._share) != before
-        payload = joined(self._load, self._part, self._share / TRANSFER) if changed else None
-        return Effect(self._wires.tick(tick, outputs), payload)
+        if (self._tool, self._share) != before and isinstance(self._plant, Loadable):
+            self._plant.load(joined(self._load, self._part, self._share / TRANSFER))
+        mask, values = self._wires.tick(tick, outputs)
+        if mask:
+            self._terminals.set_digital_inputs(mask, values)
 
     # ------------------------------------------------------------------ parts
 

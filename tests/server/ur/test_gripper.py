@@ -1,11 +1,13 @@
 """The port of a cell's gripper: requests are answered in order, however many come; without a gripper it is shut."""
 
 import asyncio
+from types import SimpleNamespace
 
 from tests.controller.cells import a_cell
 from tests.controller.robots import UR5E
 
 from tvist_controller.cell.live_cell import LiveCell
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 
 from .desks import Desk, connect, until
@@ -15,7 +17,8 @@ MANY = 300
 
 
 async def test_requests_are_answered_in_their_order_even_if_many_come_at_once():
-    desk, cell, waiting = Desk(), LiveCell(a_cell(), UR5E, print, UR5E.payload), []
+    plant, terminals = FlexibleArm(UR5E, UR5E.payload), SimpleNamespace(set_tcp=print)
+    desk, cell, waiting = Desk(), LiveCell(a_cell(), UR5E, plant, terminals, print), []
     desk.interfaces = UrInterfaces(
         desk, UR5E, "ur5e", "127.0.0.1", {"gripper": 0}, gripper=lambda *asked: waiting.append(asked)
     )
