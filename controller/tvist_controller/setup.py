@@ -15,7 +15,8 @@ from tvist_controller.sources.own_plants import OwnPlant
 from tvist_controller.sources.own_shapers import OwnShaper
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
-from tvist_plant.plant import Placeable, Plant, measured_standing
+from tvist_plant.plant import Placeable, Plant
+from tvist_plant.plant_checks import measured_standing
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError

@@ -10,7 +10,7 @@ from msgspec.structs import fields
 from tvist_controller.api.line import OwnShaper, RecordedShaper, Setup
 from tvist_controller.api.robot import Controller, OwnPlant, Presence, RecordedPlant, SocketNews
 from tvist_lab.recordings.mcap_file import RecordingFile
-from tvist_plant.plant import check_unpaced
+from tvist_plant.plant_checks import check_unpaced
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError, TvistError

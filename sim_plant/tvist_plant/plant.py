@@ -200,44 +200,6 @@ class Pacing(Protocol):
         """Wait until the next control period begins; return False if it does not within the timeout [s]."""
 
 
-def check_unpaced(plant: Plant) -> None:
-    """Check that a plant may be moved as fast as a machine computes, without a clock.
-
-    Raises:
-        ValueError: It gives the tick, so it may be a real arm.
-    """
-    paced = isinstance(plant, Pacing)
-    if paced:
-        name = type(plant).__name__
-        raise ValueError(
-            f"the plant {name} gives the tick: it moves in real time only, and not as fast as this machine computes"
-        )
-
-
-def measured_standing(plant: Plant, joints: int) -> Measurement:
-    """Return what a plant that cannot be placed measures where it stands.
-
-    Args:
-        plant: The plant.
-        joints: Number of joints in the robot's description.
-
-    Raises:
-        ValueError: The plant does not answer, its measurement has the wrong shape or is not finite, or it can
-            neither be placed nor measured.
-    """
-    name = type(plant).__name__
-    if not isinstance(plant, Standing):
-        raise ValueError(f"the plant {name} has neither reset nor measure: it needs one of them")  # noqa: TRY004  it is a value of the user's
-    try:
-        measured = plant.measure()
-    except PlantError as error:
-        raise ValueError(f"plant {name}: where it stands is unknown: {error}") from error
-    check_measurement(measured, joints, plant)
-    if not np.isfinite(measured.q).all():
-        raise ValueError(f"plant {name}: measured q is {measured.q.tolist()}: must be finite")
-    return measured
-
-
 @runtime_checkable
 class Loadable(Protocol):
     """A plant whose carried payload can change while it moves, for the parts and tools of a cell."""
@@ -331,23 +293,3 @@ def played(plant: Plant, commands: Floats) -> Response:
         rows.append((*own, truth.specific_force, truth.flange_position, truth.flange_rotation))
     q, qd, moment, accelerometer, *felt = (np.array(column) for column in zip(*rows, strict=True))
     return Response(Measurement(q, qd, moment, accelerometer), *felt)
-
-
-def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
-    """Check the first measurement of a plant, which may be a user's own.
-
-    Args:
-        measured: Measurement that it returned.
-        joints: Number of joints in the robot's description.
-        plant: The plant, named in the error.
-
-    Raises:
-        ValueError: An array is missing or has the wrong shape, for example for another number of joints.
-    """
-    for name, shape in (("q", (joints,)), ("qd", (joints,)), ("moment", (joints,)), ("accelerometer", (3,))):
-        found = getattr(getattr(measured, name, None), "shape", None)
-        if found != shape:
-            what = "is not an array" if found is None else f"has shape {found}"
-            raise ValueError(
-                f"plant {type(plant).__name__}: measured {name} {what}: its shape must be {shape}"
-            )

@@ -12,7 +12,8 @@ from tvist_controller.line.sample import Sample
 from tvist_controller.trajectory import Rest, StuckError, Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import PERIOD, Measurement, Placeable, Plant, check_measurement, measured_standing
+from tvist_plant.plant import PERIOD, Measurement, Placeable, Plant
+from tvist_plant.plant_checks import check_measurement, measured_standing
 from tvist_shaping.base import Filter
 
 T = TypeVar("T", bound=Trajectory)
