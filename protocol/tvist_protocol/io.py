@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from tvist_protocol.client_message import ClientMessage
-from tvist_protocol.programs import Interpreter, ProgramState
+from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
 from tvist_protocol.values import Fraction, Payload, Token
 
 BITS, NUMBERS = 128, 48
@@ -59,6 +59,8 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     """State of the loaded program."""
     program_line: int = 0
     """Line that is being carried out, or will be when the program continues, counted from 1; 0 if there is none."""
+    program_label: ProgramLabel | None = None
+    """Label that the program has passed last; null if there is none."""
     interpreter: Interpreter | None = None
     """Statements that clients have added to the program; null before the first program that takes some."""
     watched: list[str] = []

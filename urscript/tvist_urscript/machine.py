@@ -39,6 +39,7 @@ class Machine:
         left: What is left of the budget of this tick; compiled code takes from it.
         thread: Number of the thread that runs now, or ran last; 0 is the main thread.
         halted: Whether it has ended by `halt`.
+        label: Number and name of the label that the main thread has passed last; None before the first.
 
     Args:
         script: The program.
@@ -61,6 +62,7 @@ class Machine:
         self.left = 0
         self.thread = 0
         self.halted = False
+        self.label: tuple[int, str] | None = None
         self._finish = finish or _nothing
         self._started = 0
         self._holder: Thread | None = None
@@ -311,6 +313,10 @@ class Machine:
         if not thread.critical and self._holder is thread:
             self._holder = None
 
+    def _label(self, number: int, name: str) -> None:
+        if self._running is self._main:
+            self.label = number, name
+
     def _called(self) -> dict[str, Any]:
         return {
             HERE: self,
@@ -321,6 +327,7 @@ class Machine:
             "enter_critical": self._enter,
             "exit_critical": self._exit,
             "halt": _halt,
+            "label": self._label,
             "too_deep": _too_deep,
         }
 

@@ -206,6 +206,10 @@ class Statements(Expressions):
                 return [at.statement(at.waiting(at.call("join", self.value(statement.value))))]
             case tree.Word():
                 return self.word(statement, at)
+            case tree.Label():
+                return [
+                    at.statement(at.call("label", at.constant(statement.number), at.constant(statement.name)))
+                ]
             case _:
                 raise AssertionError(statement)
 

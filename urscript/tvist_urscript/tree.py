@@ -151,6 +151,14 @@ class Word(Node):
 
 
 @dataclass(slots=True)
+class Label(Node):
+    """`$ 3 "Waypoint_1"`: the line of PolyScope's program tree to which the next statements belong."""
+
+    number: int
+    name: str
+
+
+@dataclass(slots=True)
 class Function(Node):
     """A function, a thread, or a whole program; its position is that of its name."""
 
@@ -160,4 +168,4 @@ class Function(Node):
     body: list["Statement"]
 
 
-Statement = Assign | Evaluate | If | While | Return | Handle | Word | Function
+Statement = Assign | Evaluate | If | While | Return | Handle | Word | Label | Function

@@ -17,7 +17,7 @@ from tvist_protocol.io import (
     SetTcp,
     SimulationSetInputs,
 )
-from tvist_protocol.programs import Interpreter, ProgramState
+from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
 from tvist_protocol.values import Payload
 
 CURRENT = (0.004, 0.020)
@@ -50,6 +50,10 @@ class LoadedProgram(Protocol):
     @property
     def line(self) -> int:
         """Current line, as in `Io`."""
+
+    @property
+    def label(self) -> ProgramLabel | None:
+        """Last label, as in `Io`."""
 
     @property
     def interpreter(self) -> Interpreter | None:
@@ -270,6 +274,7 @@ class Peripherals:
             program=program.name,
             program_state=program.state,
             program_line=program.line,
+            program_label=program.label,
             interpreter=program.interpreter,
             watched=program.watched,
             tool_output_voltage=self._tool_voltage,

@@ -16,10 +16,7 @@ from tvist_controller.programs.steadiness import Steadiness
 from tvist_controller.programs.watchdogs import Watchdogs
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_protocol.modes import RobotMode
-from tvist_protocol.programs import (
-    Interpreter,
-    ProgramState,
-)
+from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
 from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
@@ -80,6 +77,8 @@ class ProgramPlayer:
         """The one whose turn it is."""
         self.line = 0
         """Present line, or the one with which playing would resume, counted from 1; 0 if there is none."""
+        self.label: ProgramLabel | None = None
+        """Label that the program had passed at that line; None if there is none."""
 
     @property
     def watched(self) -> list[str]:
@@ -92,9 +91,9 @@ class ProgramPlayer:
         return self.statements.published
 
     @property
-    def progress(self) -> tuple[str | None, ProgramState, int]:
-        """Fields of the program in `io`: its name, its state and its line."""
-        return self.name, self.state, self.line
+    def progress(self) -> tuple[str | None, ProgramState, int, ProgramLabel | None]:
+        """Fields of the program in `io`: its name, its state, its line and its label."""
+        return self.name, self.state, self.line, self.label
 
     # ------------------------------------------------------------------ ticks and events
 
@@ -134,7 +133,13 @@ class ProgramPlayer:
         self._left = left
         self.arm.settle(self._lives)
         if self._main is not None and (self.line == 0 or tick % TOLD_EVERY == 0):
-            self.line = self._main.machine.line
+            self._find_line(self._main.machine)
+
+    def _find_line(self, machine: Machine) -> None:
+        self.line = machine.line
+        self.label = (
+            None if machine.label is None else ProgramLabel(number=machine.label[0], name=machine.label[1])
+        )
 
     @property
     def _held(self) -> bool:
@@ -222,7 +227,7 @@ class ProgramPlayer:
         secondary = running.script.secondary or None
         self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
         if running is self._main:
-            self._main, self.state, self.line = None, "STOPPED", 0
+            self._main, self.state, self.line, self.label = None, "STOPPED", 0, None
             self._watchdogs.clear()
             self.statements.close()
             self.arm.forget()
@@ -300,5 +305,5 @@ class ProgramPlayer:
         """Pause the program: none of its threads has a turn any more, from this tick on."""
         self.state = "PAUSED"
         if self._main is not None:
-            self.line = self._main.machine.line
+            self._find_line(self._main.machine)
             self._main.machine.left = 0
