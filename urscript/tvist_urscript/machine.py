@@ -15,8 +15,8 @@ from tvist_urscript.values import Value
 
 EVALUATIONS = 500
 """Budget of a tick: evaluations of all threads together."""
-PATIENCE = 250
-"""Ticks in a row in which a thread may use up its budget before it counts as an endless loop."""
+PATIENCE = 1_000_000
+"""Evaluations of a thread without waiting for time to pass, or reading what has come, after which it is endless."""
 OVERDRAFT = 2000
 """Most evaluations by which one statement may exceed the budget."""
 
@@ -164,6 +164,7 @@ class Machine:
         assert thread.steps is not None
         self._running = thread
         self.thread = thread.number
+        before = self.left
         self.left -= thread.owes
         thread.owes = 0
         try:
@@ -174,24 +175,30 @@ class Machine:
             self.halted = True
             self.end()
         else:
-            self._waits(thread, why)
+            self._waits(thread, why, before)
 
-    def _waits(self, thread: Thread, cost: int | None) -> None:
-        """Note that a thread waits: for time, or for a budget that can bear the cost of its next statements."""
+    def _waits(self, thread: Thread, cost: int | None, before: int) -> None:
+        """Note that a thread waits: for time, or for a budget that can bear the cost of its next statements.
+
+        Args:
+            thread: The thread.
+            cost: That cost; None if it waits for time.
+            before: What was left of the budget before its turn.
+        """
         if cost is None:
             thread.spent = 0
             if self._holder is thread:
                 self._holder = None
             return
         thread.owes = cost
+        thread.spent += before - (self.left + cost)
         self.left = min(self.left + cost, 0)  # it has not been carried out
-        thread.spent += 1
         if thread.spent >= PATIENCE:
             line, column = position_of(thread.steps) or (1, 1)
             raise ScriptError(
                 line,
                 column,
-                f"an endless loop: the thread has computed for {PATIENCE} ticks without waiting for time to pass",
+                f"an endless loop: the thread has computed {PATIENCE} evaluations without waiting for time to pass",
             )
 
     def _may_enter(self, thread: Thread) -> bool:
