@@ -77,17 +77,20 @@ class Builder(Transformer[Token, Any]):
 
     def assign(self, children: Children) -> tree.Assign:
         *qualifier, target, equal, value = children
-        indices: list[tree.Expression] = []
+        indices: list[tree.Expression | tree.Step] = []
         inner, bracket = target, target
-        while isinstance(inner, tree.Index):
-            indices[:0] = inner.indices
+        while isinstance(inner, tree.Index | tree.Member):
+            if isinstance(inner, tree.Index):
+                indices[:0] = inner.indices
+            else:
+                indices.insert(0, tree.Step(inner.line, inner.column, inner.name))
             inner, bracket = inner.value, inner
         if not isinstance(inner, tree.Name):
             raise _syntax(
-                inner if qualifier else equal, "only a variable or an element of one can be assigned"
+                inner if qualifier else equal, "only a variable, or an element or member of one, can be assigned"
             )
         if qualifier and indices:
-            raise _syntax(bracket, f"{qualifier[0]} declares a variable, not an element")
+            raise _syntax(bracket, f"{qualifier[0]} declares a variable, not an element or a member")
         node = tree.Assign(
             inner.line,
             inner.column,
@@ -128,6 +131,14 @@ class Builder(Transformer[Token, Any]):
     def index(self, children: Children) -> tree.Index:
         value, bracket, *indices = children
         return _deeper(tree.Index(bracket.line, bracket.column, value, indices), [value], indices)
+
+    def member(self, children: Children) -> tree.Member:
+        value, name = children
+        return _deeper(tree.Member(name.line, name.column, value, str(name)), [value])
+
+    def method(self, children: Children) -> tree.Method:
+        value, name, *arguments = children
+        return _deeper(tree.Method(name.line, name.column, value, str(name), arguments), [value], arguments)
 
     def number(self, children: Children) -> tree.Constant:
         (token,) = children

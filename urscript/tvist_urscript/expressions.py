@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 from tvist_urscript import tree
 from tvist_urscript.errors import name_not_found
-from tvist_urscript.names import BUILT_IN_ARRAYS, Scope
+from tvist_urscript.names import BUILT_IN_ARRAYS, METHOD, Scope
 from tvist_urscript.pieces import DEPTH, MISSING, Position
 from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
 from tvist_urscript.values import LONGEST, NUMBERS, Array, Pose
@@ -15,8 +15,8 @@ MOST_OPERATIONS = 1000
 START = 20
 """Evaluations that the start of a thread costs, which limits the threads that start in a tick."""
 
+STRUCT = "struct"
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
-SCALING, SUMS = "*/", "+-"
 ORDER: dict[str, type[ast.cmpop]] = {"<": ast.Lt, ">": ast.Gt, "<=": ast.LtE, ">=": ast.GtE}
 EQUALITY: dict[str, tuple[type[ast.cmpop], str]] = {
     "==": (ast.Eq, "is_equal"),
@@ -60,6 +60,12 @@ class Expressions:
                 return self.run(node) if node.runs else self.call(node)
             case tree.Index():
                 return self.index(node)
+            case tree.Member():
+                self.cost += 1
+                at = Position.of(node)
+                return at.call("member", self.value(node.value), at.constant(node.name))
+            case tree.Method():
+                return self.method(node)
             case tree.Listing():
                 return self.listing(node)
             case tree.Unary(operator="-"):
@@ -108,9 +114,7 @@ class Expressions:
         self.cost += 1
         left, right = self.value(node.left), self.value(node.right)
         if node.operator in ARITHMETIC:
-            has_constant = isinstance(node.left, tree.Constant) or isinstance(node.right, tree.Constant)
-            if node.operator in SCALING or (node.operator in SUMS and not has_constant):
-                self.works = True
+            self.works = True
             return at.call(ARITHMETIC[node.operator], left, right)
         if node.operator in ORDER:
             return at.compare(left, ORDER[node.operator](), right)
@@ -207,6 +211,8 @@ class Expressions:
         at = Position.of(node)
         self.cost += 1
         scope = None if built_in else self.scope.find(node.name)
+        if node.name == STRUCT and scope is None:
+            return self.struct(node)
         if scope is not None:
             if scope.function.kind == "thread":
                 self.report(
@@ -233,6 +239,33 @@ class Expressions:
         ]
         call = at.call(f"b_{node.name}", *self.arguments(node, known))
         return at.waiting(call) if signature.blocks else call
+
+    def struct(self, node: tree.Call) -> ast.expr:
+        """Translate `struct(a=1, b=2)`."""
+        at = Position.of(node)
+        names = [argument.name for argument in node.arguments]
+        if not names or len(names) > LONGEST:
+            self.report(node.line, node.column, f"{STRUCT} takes from 1 to {LONGEST} members, not {len(names)}")
+        for place, argument in enumerate(node.arguments):
+            if argument.name is None:
+                why = f"{STRUCT} needs a name for each member, as in {STRUCT}(x=1)"
+                self.report(argument.line, argument.column, why)
+            elif argument.name in names[:place]:
+                self.report(argument.line, argument.column, f"{STRUCT} is given {argument.name} twice")
+        self.cost += len(names)
+        values = at.tuple([self.value(argument.value) for argument in node.arguments])
+        return at.call("structured", at.tuple([at.constant(name) for name in names]), values)
+
+    def method(self, node: tree.Method) -> ast.expr:
+        """Translate the call of a method, of which the controller knows what it is."""
+        at = Position.of(node)
+        self.cost += 1 + len(node.arguments)
+        values = at.tuple([self.value(argument.value) for argument in node.arguments])
+        if METHOD not in self.signatures:
+            self.report(node.line, node.column, name_not_found(f"{METHOD}{node.name}"))
+            return at.constant(None)
+        self.used.add(METHOD)
+        return at.call(f"b_{METHOD}", self.value(node.value), at.constant(node.name), values)
 
     def arguments(self, node: tree.Call, parameters: list[tuple[str, str | None]]) -> list[ast.expr]:
         """Put the arguments of a call into the order of the parameters; they are computed in the order of the text.
@@ -294,12 +327,12 @@ class Expressions:
         return at.constant(None)
 
 
-def first(node: tree.Expression) -> tuple[int, int]:
+def first(node: tree.Expression | tree.Step) -> tuple[int, int]:
     """Return line and column of the first token of an expression."""
     while True:
         if isinstance(node, tree.Binary):
             node = node.left
-        elif isinstance(node, tree.Index):
+        elif isinstance(node, tree.Index | tree.Member | tree.Method):
             node = node.value
         else:
             return node.line, node.column

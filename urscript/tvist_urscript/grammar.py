@@ -39,6 +39,8 @@ assign: (GLOBAL | LOCAL)? postfix EQUAL expression
     | postfix
 ?postfix: atom
     | postfix LSQB expression ("," expression)* "]" -> index
+    | postfix "." NAME -> member
+    | postfix "." NAME "(" (argument ("," argument)*)? ")" -> method
 ?atom: NUMBER -> number
     | TEXT -> text
     | (TRUE | FALSE | NONE) -> constant

@@ -43,7 +43,7 @@ _COMPLETE = frozenset(
      "ENTER_CRITICAL", "EXIT_CRITICAL", "END")
 )  # fmt: skip
 """Tokens after which no expression goes on with a name or `run`: it can only begin the next statement of the line."""
-_AFTER_NAME = frozenset(("LPAR", "LSQB", "EQUAL"))
+_AFTER_NAME = frozenset(("LPAR", "LSQB", "EQUAL", "DOT"))
 """Tokens that follow the name with which a statement begins."""
 
 

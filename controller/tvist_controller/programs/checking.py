@@ -7,11 +7,11 @@ from typing import Literal
 
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import SIGNATURES
-from tvist_urscript import PURE, ScriptError, check
+from tvist_urscript import METHOD, PURE, ScriptError, check
 
 _SIMULATED = {name: one for name, one in SIGNATURES.items() if name not in SUBJECTS}
 _NAMES = {name.lower(): name for name in (*SIGNATURES, *PURE)}
-_UNKNOWN = re.compile(r"compile_error_name_not_found:(\w+):")
+_UNKNOWN = re.compile(r"compile_error_name_not_found:(\.?\w+):")
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,12 @@ def check_program(text: str) -> list[Finding]:
     known = {(finding.line, finding.column) for finding in findings}
     for error in check(text, _SIMULATED):
         unknown = _UNKNOWN.fullmatch(error.text)
-        if unknown is not None and unknown[1] in SUBJECTS and (error.line, error.column) not in known:
-            name = unknown[1]
-            text_of_it = f"{name}: this controller does not simulate {SUBJECTS[name][1]}"
+        if unknown is None or (error.line, error.column) in known:
+            continue
+        name = unknown[1].removeprefix(METHOD)
+        subject = SUBJECTS.get(name if name == unknown[1] else METHOD)
+        if subject is not None:
+            text_of_it = f"{name}: this controller does not simulate {subject[1]}"
             findings.append(Finding(error.line, error.column, "warning", text_of_it))
     return sorted(findings, key=lambda finding: (finding.line, finding.column))
 
