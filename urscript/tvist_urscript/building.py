@@ -87,7 +87,8 @@ class Builder(Transformer[Token, Any]):
             inner, bracket = inner.value, inner
         if not isinstance(inner, tree.Name):
             raise _syntax(
-                inner if qualifier else equal, "only a variable, or an element or member of one, can be assigned"
+                inner if qualifier else equal,
+                "only a variable, or an element or member of one, can be assigned",
             )
         if qualifier and indices:
             raise _syntax(bracket, f"{qualifier[0]} declares a variable, not an element or a member")

@@ -5,7 +5,8 @@ from collections.abc import Callable, Sequence
 
 from tvist_urscript import tree
 from tvist_urscript.errors import name_not_found
-from tvist_urscript.names import BUILT_IN_ARRAYS, METHOD, Scope
+from tvist_urscript.members import Members
+from tvist_urscript.names import BUILT_IN_ARRAYS, Scope
 from tvist_urscript.pieces import DEPTH, MISSING, Position
 from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
 from tvist_urscript.values import LONGEST, NUMBERS, Array, Pose
@@ -15,7 +16,6 @@ MOST_OPERATIONS = 1000
 START = 20
 """Evaluations that the start of a thread costs, which limits the threads that start in a tick."""
 
-STRUCT = "struct"
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
 ORDER: dict[str, type[ast.cmpop]] = {"<": ast.Lt, ">": ast.Gt, "<=": ast.LtE, ">=": ast.GtE}
 EQUALITY: dict[str, tuple[type[ast.cmpop], str]] = {
@@ -26,7 +26,7 @@ EQUALITY: dict[str, tuple[type[ast.cmpop], str]] = {
 Report = Callable[[int, int, str], None]
 
 
-class Expressions:
+class Expressions(Members):
     """Translates expressions.
 
     Attributes:
@@ -47,7 +47,7 @@ class Expressions:
         self.constants: dict[str, object] = {}
         self.globals: set[str] = set()
 
-    def value(self, node: tree.Expression) -> ast.expr:  # noqa: PLR0911  one for each kind of node
+    def value(self, node: tree.Expression) -> ast.expr:  # noqa: C901, PLR0911  one for each kind of node
         """Translate an expression for its value."""
         match node:
             case tree.Constant():
@@ -61,9 +61,7 @@ class Expressions:
             case tree.Index():
                 return self.index(node)
             case tree.Member():
-                self.cost += 1
-                at = Position.of(node)
-                return at.call("member", self.value(node.value), at.constant(node.name))
+                return self.member(node)
             case tree.Method():
                 return self.method(node)
             case tree.Listing():
@@ -211,7 +209,7 @@ class Expressions:
         at = Position.of(node)
         self.cost += 1
         scope = None if built_in else self.scope.find(node.name)
-        if node.name == STRUCT and scope is None:
+        if node.name == "struct" and scope is None:
             return self.struct(node)
         if scope is not None:
             if scope.function.kind == "thread":
@@ -239,33 +237,6 @@ class Expressions:
         ]
         call = at.call(f"b_{node.name}", *self.arguments(node, known))
         return at.waiting(call) if signature.blocks else call
-
-    def struct(self, node: tree.Call) -> ast.expr:
-        """Translate `struct(a=1, b=2)`."""
-        at = Position.of(node)
-        names = [argument.name for argument in node.arguments]
-        if not names or len(names) > LONGEST:
-            self.report(node.line, node.column, f"{STRUCT} takes from 1 to {LONGEST} members, not {len(names)}")
-        for place, argument in enumerate(node.arguments):
-            if argument.name is None:
-                why = f"{STRUCT} needs a name for each member, as in {STRUCT}(x=1)"
-                self.report(argument.line, argument.column, why)
-            elif argument.name in names[:place]:
-                self.report(argument.line, argument.column, f"{STRUCT} is given {argument.name} twice")
-        self.cost += len(names)
-        values = at.tuple([self.value(argument.value) for argument in node.arguments])
-        return at.call("structured", at.tuple([at.constant(name) for name in names]), values)
-
-    def method(self, node: tree.Method) -> ast.expr:
-        """Translate the call of a method, of which the controller knows what it is."""
-        at = Position.of(node)
-        self.cost += 1 + len(node.arguments)
-        values = at.tuple([self.value(argument.value) for argument in node.arguments])
-        if METHOD not in self.signatures:
-            self.report(node.line, node.column, name_not_found(f"{METHOD}{node.name}"))
-            return at.constant(None)
-        self.used.add(METHOD)
-        return at.call(f"b_{METHOD}", self.value(node.value), at.constant(node.name), values)
 
     def arguments(self, node: tree.Call, parameters: list[tuple[str, str | None]]) -> list[ast.expr]:
         """Put the arguments of a call into the order of the parameters; they are computed in the order of the text.

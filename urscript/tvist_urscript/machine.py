@@ -178,12 +178,9 @@ class Machine:
             self._waits(thread, why, before)
 
     def _waits(self, thread: Thread, cost: int | None, before: int) -> None:
-        """Note that a thread waits: for time, or for a budget that can bear the cost of its next statements.
+        """Note that a thread waits for time, or for a budget that can bear the cost of its next statements.
 
-        Args:
-            thread: The thread.
-            cost: That cost; None if it waits for time.
-            before: What was left of the budget before its turn.
+        Before its turn, `before` was left of the budget.
         """
         if cost is None:
             thread.spent = 0

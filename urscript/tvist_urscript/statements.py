@@ -186,7 +186,7 @@ class Statements(Expressions):
         self.loops -= 1
         return ast.While(test, [*at.charge(cost, check=True), *body], [], **at.given)
 
-    def simple(self, statement: tree.Statement, at: Position) -> list[ast.stmt]:
+    def simple(self, statement: tree.Statement, at: Position) -> list[ast.stmt]:  # noqa: PLR0911  one for each kind
         """Translate a statement that contains no others."""
         match statement:
             case tree.Assign():
@@ -207,9 +207,8 @@ class Statements(Expressions):
             case tree.Word():
                 return self.word(statement, at)
             case tree.Label():
-                return [
-                    at.statement(at.call("label", at.constant(statement.number), at.constant(statement.name)))
-                ]
+                what = at.call("label", at.constant(statement.number), at.constant(statement.name))
+                return [at.statement(what)]
             case _:
                 raise AssertionError(statement)
 

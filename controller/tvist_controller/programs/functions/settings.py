@@ -10,7 +10,7 @@ from tvist_plant.robot_checks import lacking_inertia
 from tvist_plant.robot_tables import Tensor
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.io import SetTcp
-from tvist_urscript import Fault, costs
+from tvist_urscript import Array, Fault, costs
 
 GRAVITY = 9.82
 """Gravity that programs declare, within `TOLERANCE`; the simulated arm stands upright and knows no other [m/s^2]."""
@@ -95,6 +95,10 @@ class SettingFunctions:
         if max(abs(x), abs(y), abs(z - GRAVITY)) > TOLERANCE:
             raise Fault(f"set_gravity: d is [{x:g}, {y:g}, {z:g}]; the simulated arm stands upright, so it must be "
                         f"[0, 0, {GRAVITY}]")  # fmt: skip
+
+    def get_gravity(self) -> Array:
+        """Return the gravity that the arm has, which is installed upright [m/s^2]."""
+        return Array((0.0, 0.0, GRAVITY))
 
     @costs(80)
     def zero_ftsensor(self) -> None:

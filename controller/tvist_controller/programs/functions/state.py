@@ -90,6 +90,16 @@ class StateFunctions:
         return self._speed(target.q, target.qd)
 
     @costs(50)
+    def get_target_tcp_pose_along_path(self) -> Pose:
+        """Return `get_target_tcp_pose`, since nothing offsets the path."""
+        return self.get_target_tcp_pose()
+
+    @costs(50)
+    def get_target_tcp_speed_along_path(self) -> Array:
+        """Return `get_target_tcp_speed`, since nothing offsets the path."""
+        return self.get_target_tcp_speed()
+
+    @costs(50)
     def get_actual_tool_flange_pose(self) -> Pose:
         """Return the pose of the flange by the measured joint positions."""
         return a_pose(self._kinematics.tool_pose(np.array(self._access.latest().actual_q), (0.0,) * 6))
@@ -139,6 +149,10 @@ class StateFunctions:
     def is_steady(self) -> bool:
         """Return whether the target has been at rest for 500 ms."""
         return self._access.steadiness.steady
+
+    def get_tool_current(self) -> float:
+        """Return the current of the tool's supply [A]: 0, since nothing draws any."""
+        return 0.0
 
     def get_tool_accelerometer_reading(self) -> Array:
         """Return what the accelerometer in the flange measures, gravity included [m/s^2]."""
