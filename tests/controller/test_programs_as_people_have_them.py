@@ -72,7 +72,7 @@ def test_a_preamble_is_accepted_and_what_it_sets_shows_in_rtde():
         ("set_runstate_standard_digital_output_to_value(0, 6)", "whether the arm has power are not simulated"),
         ("position_deviation_warning(True, 1.5)", "threshold is 1.5"),
         ("time(2)", "mode is 2; this controller has no clock of the day"),
-        ('modbus_add_signal("1.2.3.4", 255, 0, 0, "x", True)', "modbus_add_signal: this controller does not simulate Modbus"),
+        ('modbus_add_signal("1.2.3.4", 255, 0, 0, "x", True)', "does not simulate Modbus"),
         ("x = struct(a=1)\n  x.go(1)", "go: this controller does not simulate remote procedure calls and Ethernet/IP"),
     ],
 )  # fmt: skip
