@@ -8,7 +8,7 @@ from tvist_protocol.programs import ProgramPause, ProgramPlay
 from tvist_protocol.replies import Done
 
 from .robots import UR5E
-from .scripts import a_robot, failure, finish, playing, run, said, start
+from .scripts import URSIM, a_robot, failure, finish, playing, run, said, start
 
 PREAMBLE = """
 set_standard_analog_input_domain(0, 1)
@@ -108,6 +108,30 @@ def test_time_is_the_robots_and_random_the_same_in_each_run():
     one, other = map(float, first.strip("[]").split(","))
     assert 0.0 <= one < 1.0 > other >= 0.0
     assert one != other
+
+
+def test_variables_of_rtde_are_those_that_clients_get():
+    keys = (
+        "target_q",
+        "runtime_state",
+        "output_int_register_7",
+        "output_bit_register_64",
+        "tcp_offset",
+        "payload",
+    )
+    robot = a_robot()
+    start(robot, "write_output_integer_register(7, -9)", "write_output_boolean_register(64, True)", "sync()",
+          *(f'textmsg(get_rtde_value("{key}"))' for key in keys))  # fmt: skip
+    finish(robot)
+    assert failure(robot) is None
+    q, *others = said(robot)
+    assert [float(one) for one in q.strip("[]").split(", ")] == pytest.approx(URSIM, abs=1e-6)
+    assert others == ["2", "-9", "True", "[0, 0, 0, 0, 0, 0]", "5"]
+
+
+@pytest.mark.parametrize("key", ["joint_temperatures", "state", "_kept", "output_int_register_48"])
+def test_a_variable_that_programs_do_not_get_is_refused_by_its_name(key):
+    assert f'"{key}"' in failure(run(a_robot(), f'x = get_rtde_value("{key}")')).why
 
 
 def test_a_check_names_all_that_is_missing_at_once():

@@ -151,7 +151,14 @@ class TerminalValues(Reading):
         return 0
 
     def __getattr__(self, name: str) -> bool | int | float:
-        """Return a register by RTDE's name."""
+        return self.register(name)
+
+    def register(self, name: str) -> bool | int | float:
+        """Return a register by RTDE's name.
+
+        Raises:
+            AttributeError: There is none of this name.
+        """
         found = _WORDS.fullmatch(name)
         if found is not None:
             words: list[int] = getattr(self.io, f"{found[1]}_bit_register")

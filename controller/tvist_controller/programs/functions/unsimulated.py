@@ -122,7 +122,6 @@ SUBJECTS: dict[str, tuple[tuple[Parameter, ...], str]] = {
     "estimate_payload": (parameters("poses", "wrenches"), "estimating a payload"),
     "get_coriolis_and_centrifugal_torques": (parameters(q=None, qd=None), "Coriolis torques in programs"),
     "get_jacobian_time_derivative": (parameters(q=None, qd=None, tcp=None), "the Jacobian's derivative"),
-    "get_rtde_value": (parameters("key"), "reading variables of RTDE in programs"),
     "pause_on_error_code": (parameters("code", "argument"), "error codes of the joints"),
     "set_pos": (parameters("q"), "programs that put the arm elsewhere at once"),
     "screw_driving": (parameters("f", "v_limit"), "screw driving"),
