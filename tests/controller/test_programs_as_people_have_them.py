@@ -156,6 +156,14 @@ end
     ]
 
 
+def test_a_library_is_checked_with_a_warning_that_it_does_nothing():
+    library = "def a(x):\n  return b(x)\nend\ndef b(x):\n  return x\nend\n"
+    assert [(one.level, one.text) for one in check_program(library)] == [
+        ("warning", "the text only defines functions: as a program, it ends at once")
+    ]
+    assert check_program(library + "a(1)\n") == []
+
+
 def outputs(robot):
     io = robot.controller.io()
     return [bool(io.actual_digital_output_bits >> bit & 1) for bit in (0, 1, 2, 11, 17)]

@@ -29,6 +29,7 @@ class Script:
         used: The built-in functions that it calls.
         scope: What names mean on its outermost level.
         scopes: Number of its scopes, with those of the program that it is added to.
+        idle: It only defines functions, so it ends at once.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Script:
     used: frozenset[str]
     scope: Scope = field(repr=False)
     scopes: int
+    idle: bool = False
 
     def forgetting(self, last: "Script") -> "Script":
         """Return the program for later statements, which know nothing of what was added up to the last one."""
@@ -101,6 +103,7 @@ def translate(
             frozenset(translator.used),
             outline(found[0]),
             found[0].number + len(found),
+            bool(program.body) and all(isinstance(one, tree.Function) for one in program.body),
         ),
         [],
     )

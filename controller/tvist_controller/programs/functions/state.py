@@ -104,6 +104,11 @@ class StateFunctions:
         return self._speed(target.q, target.qd)
 
     @costs(50)
+    def tool_pose(self) -> Pose:
+        """Return `get_target_tcp_pose`: PolyScope's name for the feature Tool, where a program uses one."""
+        return self.get_target_tcp_pose()
+
+    @costs(50)
     def get_target_tcp_pose_along_path(self) -> Pose:
         """Return `get_target_tcp_pose`, since nothing offsets the path."""
         return self.get_target_tcp_pose()
