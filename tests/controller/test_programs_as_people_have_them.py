@@ -55,6 +55,17 @@ def test_a_preamble_is_accepted_and_what_it_sets_shows_in_rtde():
     assert (snapshot.tool_digital_output0_mode, snapshot.tool_digital_output1_mode) == (2, 3)
 
 
+def test_the_older_call_for_ranges_of_inputs_knows_those_of_the_tool():
+    robot = run(
+        a_robot(),
+        *[f"set_analog_inputrange({port}, {which})" for port, which in ((0, 0), (1, 2), (2, 2), (3, 0))],
+    )
+    io = robot.controller.io()
+    assert failure(robot) is None
+    assert (io.analog_io_types & 3, io.tool_analog_input_types) == (3, 2)
+    assert "must be 0 or 2" in failure(run(robot, "set_analog_inputrange(0, 1)")).why
+
+
 @pytest.mark.parametrize(
     ("call", "why"),
     [
