@@ -106,7 +106,7 @@ class TerminalFunctions:
         self._arm.then(lambda: self._terminals.choose_output(place, voltage=voltage))
 
     def set_analog_inputrange(self, port: object, range: object) -> None:
-        """Make an input 0 to 10 V: ports 0 and 1 by 0 or 2, those of the tool, 2 and 3, by 0 or 1, and by 2 a current."""
+        """Make ports 0 and 1 a voltage by ranges 0 and 2; those of the tool, 2 and 3, by 0 and 1, or a current by 2."""
         place = integer("port", port, 0, 3)
         which = integer("range", range, 0, 2)
         if place > 1:
