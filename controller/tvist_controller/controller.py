@@ -338,6 +338,7 @@ class Controller(WholeRobot):
             send=self._carry_out,
             plans=self.plans,
             latest=lambda: self.latest,
+            io=lambda: self.io(wrench=False),
             declared=lambda: self.declared,
             forces=self.forces,
             shape_guided=self.setup.shape_servo,

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from tvist_protocol.client_message import ClientMessage
-from tvist_protocol.programs import Interpreter, ProgramState
+from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
 from tvist_protocol.values import Fraction, Payload, Token
 
 BITS, NUMBERS = 128, 48
@@ -34,7 +34,7 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     analog_io_types: int
     """Types of the analogue inputs (bits 0–1) and outputs (bits 2–3): 0 is current (4–20 mA), 1 voltage (0–10 V)."""
     tool_analog_input: list[float]
-    """Two analogue inputs of the tool [V]."""
+    """Two analogue inputs of the tool [A or V, by `tool_analog_input_types`]."""
     input_bit_register: list[int]
     """128 input bits as four words of 32, the lowest first."""
     input_int_register: list[int]
@@ -59,6 +59,8 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     """State of the loaded program."""
     program_line: int = 0
     """Line that is being carried out, or will be when the program continues, counted from 1; 0 if there is none."""
+    program_label: ProgramLabel | None = None
+    """Label that the program has passed last; null if there is none."""
     interpreter: Interpreter | None = None
     """Statements that clients have added to the program; null before the first program that takes some."""
     watched: list[str] = []
@@ -66,6 +68,14 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     same value."""
     tool_output_voltage: int = 0
     """Supply voltage of the tool [V]."""
+    tool_analog_input_types: int = 3
+    """Types of the tool's analogue inputs, bit 0 for the first: 0 is current (4–20 mA), 1 voltage (0–10 V)."""
+    tool_output_mode: int = 0
+    """Use of the tool's digital outputs: 0 as such, 1 as a second supply."""
+    tool_digital_output0_mode: int = 1
+    """What the first digital output of the tool does: 1 sinks, 2 sources, 3 both."""
+    tool_digital_output1_mode: int = 1
+    """What the second digital output of the tool does."""
     tcp_force_zero: list[float] | None = None
     """Force and torque that count as zero since a program zeroed them, in the base frame [N, N m]; null: none."""
     actual_TCP_force: list[float] | None = None

@@ -76,6 +76,15 @@ class Interpreter(Struct, frozen=True, kw_only=True):
     """Number of statements that have not begun."""
 
 
+class ProgramLabel(Struct, frozen=True, kw_only=True):
+    """A label of a program, such as `$ 3 "Waypoint_1"`: a line of the program tree from which it was written."""
+
+    number: int
+    """Its number."""
+    name: str
+    """Its name."""
+
+
 class ProgramClosePopup(ClientMessage, frozen=True, kw_only=True, tag="program.close_popup"):
     """Close the message that a program shows, for which it may be waiting. Any client may send this."""
 

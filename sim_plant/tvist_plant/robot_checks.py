@@ -32,9 +32,21 @@ def check(description: RobotDescription, source: str | Path) -> None:
 
 def is_real_body(inertia: Tensor) -> bool:
     """Return whether the principal moments are physically possible: none negative, none above the sum of the others."""
+    least, middle, most = _principal(inertia)
+    return least >= -1e-9 * most and most <= (least + middle) * (1.0 + 1e-6)
+
+
+def lacking_inertia(inertia: Tensor) -> float:
+    """Return what all principal moments lack at least to be physically possible; 0 for a real body [kg m^2]."""
+    least, middle, most = _principal(inertia)
+    return 0.0 if is_real_body(inertia) else max(most - least - middle, -least)
+
+
+def _principal(inertia: Tensor) -> list[float]:
+    """Principal moments, the least first [kg m^2]."""
     xx, xy, xz, yy, yz, zz = inertia
-    least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return bool(least >= -1e-9 * most and most <= (least + middle) * (1.0 + 1e-6))
+    found: list[float] = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).tolist()
+    return found
 
 
 def _check_names(description: RobotDescription, source: str | Path) -> None:

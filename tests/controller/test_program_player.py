@@ -377,3 +377,32 @@ def test_whatever_happens_every_motion_ends_once_and_only_a_playing_program_begi
     robot.tick(LONG)
     ended = [event.id for event in robot.events if event.kind in {"motion_done", "motion_stopped"}]
     assert sorted(ended) == sorted(ours | wanted)
+
+
+def test_the_label_that_the_program_has_passed_is_told_with_its_line_until_it_ends(robot):
+    text = """
+def p():
+  thread t():
+    $ 9 "Thread_1"
+    sleep(1)
+  end
+  def inner():
+    sleep(0.2)
+  end
+  run t()
+  $ 1 "Robot Program"
+  $ 2 "Wait: 0.2"
+  inner()
+  $ 3 "Wait: 0.2" "noBreak"
+  sleep(0.2)
+end
+"""
+    assert robot.send(ProgramLoad, name="p", text=text) == Done()
+    assert robot.send(ProgramPlay) == Done()
+    seen = []
+    for _ in range(300):
+        robot.tick()
+        label, line = robot.controller.io().program_label, robot.controller.io().program_line
+        if not seen or seen[-1] != (line, label and (label.number, label.name)):
+            seen.append((line, label and (label.number, label.name)))
+    assert seen == [(1, None), (8, (2, "Wait: 0.2")), (15, (3, "Wait: 0.2")), (0, None)]

@@ -262,6 +262,7 @@ def test_what_is_sent(call, sent):
         (r'socket_read_string(suffix="\n", interpret_escape=True)', b"a b\nc", "a b"),
         ('socket_get_var("POS")', b"POS 12\n", "12"),
         ('socket_get_var("POS")', b"VEL 12\n", "0"),
+        ('socket_get_var("POS")', b"\r\n\nPOS 12\n", "12"),
     ],
 )
 def test_what_is_read(call, received, value):
@@ -271,6 +272,19 @@ def test_what_is_read(call, received, value):
     assert said(robot) == ([] if value is None else [value])
     if "get_var" in call:
         assert far.sent == b"GET POS\n"
+
+
+@pytest.mark.parametrize(
+    "parts", [[b"(1, 2)\nPOS 3\nabc\n"], [b"(1, 2)\r\nPOS 3\nabc\n"], [b"(1, 2)", b"\nPOS 3\nabc\n"]]
+)
+def test_the_end_of_a_line_of_numbers_is_no_answer_to_what_is_asked_next(parts):
+    robot, far = opened(
+        "textmsg(socket_read_ascii_float(2))", 'textmsg(socket_get_var("POS"))', "textmsg(socket_read_line())"
+    )
+    for part in parts:
+        far.tell("received", part)
+        robot.tick(3)
+    assert said(robot) == ["[2, 1, 2]", "3", "abc"]
 
 
 def test_a_name_that_is_not_utf_8_can_be_told():

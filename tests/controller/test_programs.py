@@ -539,3 +539,32 @@ def test_a_servoj_to_where_the_arm_rests_is_no_motion():
         f"while True:\n servoj({NEAR})\n if get_target_joint_positions() == {NEAR}:\n halt\n end\n end",
     )
     assert moved.kinds().count("motion_started") == 1
+
+
+@pytest.mark.parametrize(
+    ("inertia", "found"),
+    [
+        ("[0.001, 0.001, 0.00205, 0, 0, 0]", [0.00105, 0.00105, 0.0021]),
+        ("[0.001, 0.001, 0.002, 0, 0, 0]", None),
+    ],
+)
+def test_an_inertia_that_was_rounded_becomes_that_of_a_body_with_a_warning(inertia, found):
+    robot = run(
+        a_robot(),
+        f"set_target_payload(1.0, [0, 0, 0.05], {inertia})",
+        "textmsg(get_target_payload_inertia())",
+    )
+    assert failure(robot) is None
+    kept = robot.controller.declared.inertia
+    assert [kept[0], kept[3], kept[5]] == pytest.approx(found or [0.001, 0.001, 0.002], abs=1e-9)
+    told = [event.why for event in robot.events if event.kind == "warning"]
+    assert bool(told) == bool(found)
+    assert all(
+        inertia.replace(" 0,", " 0.0,").replace(" 0]", " 0.0]") in why and "5e-05" in why for why in told
+    )
+
+
+@pytest.mark.parametrize("inertia", ["[0.001, 0.001, 0.0022, 0, 0, 0]", "[1, 1, 1, 3, 0, 0]"])
+def test_an_inertia_that_no_body_has_ends_the_program(inertia):
+    robot = run(a_robot(), f"set_target_payload(1.0, [0, 0, 0.05], {inertia})")
+    assert "no body has these moments of inertia" in failure(robot).why

@@ -15,7 +15,8 @@ from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad, ProgramStop
 from tvist_protocol.replies import Done, Refused
 from tvist_server.config import ConfigError
 from tvist_server.config_file import from_mapping
-from tvist_server.polyscope import EXTERNAL_CONTROL, program, with_external_control
+from tvist_server.polyscope import program, with_external_control
+from tvist_server.polyscope_nodes import EXTERNAL_CONTROL
 from tvist_server.program_folder import ProgramFolder
 
 TEXT = "def pick():\n  sync()\nend\n"
@@ -94,14 +95,83 @@ def test_a_text_without_a_header_stands_whole_where_the_node_is():
     assert with_external_control(program("a", EXTERNAL_CONTROL), "sync()\n") == "def a():\n\nsync()\n\nend\n"
 
 
+def expression(*parts):
+    """An expression, of characters and of elements that begin with <."""
+    written = (
+        part
+        if part.startswith("<")
+        else "".join(f'<ExpressionChar character="{letter}"/>' for letter in part)
+        for part in parts
+    )
+    return f"<expression>{''.join(written)}</expression>"
+
+
+COUNT = "../../../../../../SpecialSequence/children/Assignment/variable"
+TREE = f"""<?xml version='1.0'?><URProgram><children>
+<SpecialSequence type='BeforeStart'><children>
+  <Assignment valueSource='Expression'><variable name='count'/>{expression("1")}</Assignment>
+</children></SpecialSequence>
+<MainProgram runOnlyOnce='true'><children>
+  <Comment comment='nothing'/><SuppressedNode><suppressedNode class='Halt'/></SuppressedNode>
+  <Loop type='While' checkContinuously='false'>
+    {expression(f"<ExpressionVariable><ProgramVariable reference='{COUNT}'/></ExpressionVariable>", "≠3")}
+    <children><Folder><children>
+      <Assignment valueSource='Expression'><variable name='count'/>{expression("count+1")}</Assignment>
+    </children></Folder></children>
+  </Loop>
+  <If type='If' checkContinuously='false'>{expression("count≟", "<ExpressionToken token=' 3 '/>")}<children>
+    <Move motionType='MoveJ' speed='1.5' acceleration='2.0' useActiveTCP='true' optimoveEnabled='false'><children>
+      <Waypoint type='Fixed' name='Way &quot;1&quot;'><motionParameters/><position>
+        <JointAngles angles='-1.5, -1.6, -2.2, -0.8, 1.6, 0.0'/></position></Waypoint>
+      <Waypoint type='Variable'><motionParameters/><variable name='place'/></Waypoint>
+    </children></Move>
+  </children></If>
+  <If type='Else'>{expression()}<children><Popup type='Message' message='no' haltProgram='true'/></children></If>
+  <Halt/>
+</children></MainProgram>
+<Thread name='Thread 1' runOnlyOnce='false'><children>
+  <Wait type='Sleep'><waitTime>0.5</waitTime></Wait>
+</children></Thread>
+</children></URProgram>"""
+
+
+def test_nodes_of_a_program_tree_become_lines_with_labels(folder):
+    (folder.path / "tree.urp").write_text(TREE, encoding="utf-8")
+    assert folder.read("tree.urp").split("\n") == [
+        "def tree():", "thread Thread_1():", "while True:", "sleep(0.5)", "end", "end",
+        '$ 1 "count"', "global count = 1", "run Thread_1()",
+        "while count!=3:", '$ 2 "count"', "global count = count+1", "end",
+        "if count== 3 :", '$ 3 "Way "1""', "movej([-1.5, -1.6, -2.2, -0.8, 1.6, 0], a=2, v=1.5)",
+        '$ 4 "place"', "movej(place, a=2, v=1.5)",
+        "else:", '$ 5 "Popup"', 'popup("no", blocking=True)', "halt", "end",
+        '$ 6 "Halt"', "halt", "end", "",
+    ]  # fmt: skip
+    assert [one.text for one in check_program(folder.read("tree.urp"))] == [
+        "compile_error_name_not_found:place:"
+    ]
+
+
 @pytest.mark.parametrize(
     ("content", "why"),
     [
-        (gzip.compress(polyscope("<Move/>", SCRIPT_NODE).encode(), mtime=0), "has the nodes Move, Script"),
-        (polyscope().encode(), "has the nodes none"),
+        (TREE.replace("MoveJ", "MoveP").encode(), r"has Move \(MoveP\), which"),
+        (TREE.replace("<motionParameters/>", "<motionParameters blend='1'/>").encode(), "has Waypoint"),
+        (
+            TREE.replace("Assignment/variable", "Assignment[2]/variable").encode(),
+            "has a variable without a name",
+        ),
+        (
+            TREE.replace("checkContinuously='false'", "checkContinuously='true'").encode(),
+            r"has Loop \(While\)",
+        ),
+        (
+            gzip.compress(polyscope("<Move/>", SCRIPT_NODE).encode(), mtime=0),
+            "has Move, which cannot be played",
+        ),
+        (polyscope().encode(), "has no program"),
         (polyscope("<Script/>").encode(), "without text"),
-        (polyscope(SCRIPT_NODE, "<Wait type='DigitalInput'/>").encode(), "has the nodes Script, Wait"),
-        (polyscope("<Contributed strategyClass='com.other'/>").encode(), "has the nodes Contributed"),
+        (polyscope(SCRIPT_NODE, "<Wait type='DigitalInput'/>").encode(), r"has Wait \(DigitalInput\), which"),
+        (polyscope("<Contributed strategyClass='com.other'/>").encode(), "has Contributed, which"),
         (b"<!DOCTYPE a>" + polyscope(SCRIPT_NODE).encode(), "has a document type"),
         (b"<a", "not valid XML"),
         (b"\x1f\x8bxx", "cannot be unpacked"),

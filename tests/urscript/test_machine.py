@@ -20,6 +20,7 @@ from tvist_urscript import (
 )
 from tvist_urscript.expressions import START
 from tvist_urscript.machine import OVERDRAFT, PATIENCE
+from tvist_urscript.statements import PIECE
 from tvist_urscript.threads import MOST_THREADS
 
 SIGNATURES = {
@@ -335,24 +336,40 @@ def test_who_missed_a_tick_is_first_in_the_next():
     assert order[:2] == [1, 2]
 
 
-def test_an_endless_loop_is_an_error_after_its_patience():
+@pytest.mark.parametrize("budget", [EVALUATIONS, 20_000])
+def test_an_endless_loop_is_an_error_after_a_million_evaluations(budget):
     robot = Robot("say(1)\nwhile True:\n  x = 1\nend")
-    robot.ticks(PATIENCE - 1)
-    with pytest.raises(ScriptError, match="endless loop") as caught:
-        robot.ticks(1)
+    robot.ticks(PATIENCE // budget - 1, budget=budget)
+    with pytest.raises(ScriptError, match="1000000 evaluations without waiting") as caught:
+        robot.ticks(3, budget=budget)
     assert caught.value.line == 2
+
+
+def test_a_long_computation_goes_on_over_ticks_none_of_which_does_more_than_its_budget():
+    robot = Robot("i = 0\nwhile i < 100000:\n  i = i + 1\nend\nsay(i)")
+    left = robot.ticks(2 * PATIENCE // EVALUATIONS)
+    assert robot.said == ["100000"]
+    assert min(left) > -PIECE
+
+
+def test_evaluations_count_for_each_thread_alone_and_anew_after_each_wait():
+    robot = Robot("thread t():\n  while True:\n    sync()\n  end\nend\nrun t()\nwhile True:\n  x = 1\nend")
+    robot.ticks(PATIENCE // EVALUATIONS)
+    assert robot.machine.running
+    with pytest.raises(ScriptError, match="endless loop"):
+        robot.ticks(PATIENCE // EVALUATIONS // 50)
 
 
 def test_a_loop_that_waits_may_run_for_ever():
     robot = Robot("while True:\n  i = 0\n  while i < 300:\n    i = i + 1\n  end\n  sync()\nend")
-    robot.ticks(3 * PATIENCE)
+    robot.ticks(2 * PATIENCE // EVALUATIONS)
     assert robot.machine.running
 
 
 def test_an_endless_recursion_of_threads_is_an_error():
     robot = Robot("thread t():\n run t()\n run t()\n sync()\nend\nrun t()\nwhile True:\n sync()\nend")
     with pytest.raises(ScriptError, match=f"at most {MOST_THREADS} threads"):
-        robot.ticks(PATIENCE)
+        robot.ticks(1000)
 
 
 def test_work_on_long_lists_counts_by_their_length():

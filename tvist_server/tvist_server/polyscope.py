@@ -1,18 +1,12 @@
 """Programs that PolyScope has saved, as text in URScript.
 
-A saved program is XML. Its nodes Script, Wait and External Control are understood; others would change what the program
-does, so a program that has them is refused.
+A saved program is XML. What `polyscope_nodes` does not translate would change what the program does, so a program that
+has it is refused.
 """
 
-from xml.etree import ElementTree as ET
-
 from tvist_plant.user_file import UserFileError, xml
+from tvist_server.polyscope_nodes import EXTERNAL_CONTROL, Nodes
 
-EXTERNAL_CONTROL = (
-    'popup("Play this program from the machine that controls it.", title="External Control", blocking=True)'
-)
-"""Line that stands for a node External Control until the program is played; see `with_external_control`."""
-_NODE = "com.fzi.externalcontrol.ExternalControlNode"
 _HEADER_ENDS = "# HEADER_END"
 
 
@@ -31,21 +25,32 @@ def script_of(name: str, data: bytes) -> str:
         PolyscopeError: It is not XML, or has nodes that are not understood.
     """
     try:
-        main = xml(data).find("./children/MainProgram")
+        tree = xml(data)
     except UserFileError as error:
         raise PolyscopeError(str(error)) from error
-    nodes = [] if main is None else main.findall("./children/*")
-    texts = [_text(node) for node in nodes]
-    if main is None or not nodes or None in texts:
-        found = ", ".join(node.tag for node in nodes) or "none"
+    main = tree.find("./children/MainProgram")
+    if main is None or main.find("./children/*") is None:
+        raise PolyscopeError("it is PolyScope's and has no program: save it as a script")
+    nodes, root = Nodes(tree), tree.find("./children")
+    assert root is not None, "the main program was found in it"
+    lines: list[str] = []
+    for thread in root.findall("./Thread"):
+        title = _name(thread.get("name") or "thread")
+        body = "\n".join(nodes.lines(thread.findall("./children/*")))
+        lines += [f"thread {title}():", body if thread.get("runOnlyOnce") == "true" else _again(body), "end"]
+    for before in root.findall("./SpecialSequence"):
+        lines += nodes.lines(before.findall("./children/*"))
+    lines += [f"run {_name(thread.get('name') or 'thread')}()" for thread in root.findall("./Thread")]
+    body = "\n".join(nodes.lines(main.findall("./children/*")))
+    if main.get("InitVariablesNode") == "true":
+        nodes.missing.append("InitVariables")
+    if nodes.missing:
+        found = ", ".join(dict.fromkeys(nodes.missing))
         raise PolyscopeError(
-            f"it is PolyScope's and has the nodes {found}: only Script, Wait for a time and External Control can be "
-            "played; save it as a script"
+            f"it is PolyScope's and has {found}, which cannot be played; save it as a script"
         )
-    body = "\n".join(text for text in texts if text is not None)
-    if main.get("runOnlyOnce") == "false":
-        body = f"while True:\n{body}\nend"
-    return program(name, body)
+    lines.append(_again(body) if main.get("runOnlyOnce") == "false" else body)
+    return program(name, "\n".join(lines))
 
 
 def program(name: str, body: str) -> str:
@@ -70,24 +75,10 @@ def with_external_control(text: str, sent: str) -> str:
     return f"{first}\n{header}{mark}\n{rest.replace(EXTERNAL_CONTROL, part)}"
 
 
-def _text(node: ET.Element) -> str | None:
-    """Text of a node; None if it is not understood."""
-    if node.tag == "Contributed" and node.get("strategyClass") == _NODE:
-        return EXTERNAL_CONTROL
-    if node.tag == "Wait" and node.get("type") == "Sleep":
-        return _sleep(node.findtext("waitTime"))
-    if node.tag.lower() != "script":
-        return None
-    characters = [letter.get("character") or "" for letter in node.iterfind("./expression/ExpressionChar")]
-    parts = ["".join(characters), node.findtext("cachedContents"), node.findtext("text"), node.text]
-    text = next((part for part in parts if part), "")
-    if not text.strip():
-        raise PolyscopeError("it has a Script node without text: save the script itself")
-    return text
+def _again(body: str) -> str:
+    return f"while True:\n{body}\nend"
 
 
-def _sleep(seconds: str | None) -> str | None:
-    try:
-        return f"sleep({float(seconds or ''):g})"
-    except ValueError:
-        return None
+def _name(title: str) -> str:
+    name = "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in title)
+    return name if name[:1].isalpha() else f"program_{name}".rstrip("_")

@@ -6,6 +6,7 @@ from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault, ScriptError
 from tvist_urscript.library import PURE
 from tvist_urscript.machine import EVALUATIONS, Machine
+from tvist_urscript.names import METHOD
 from tvist_urscript.signatures import (
     REQUIRED,
     Parameter,
@@ -15,11 +16,12 @@ from tvist_urscript.signatures import (
     signature,
     signatures,
 )
-from tvist_urscript.values import LONGEST, Array, Pose, Value, to_str
+from tvist_urscript.values import LONGEST, Array, Pose, Struct, Value, to_str
 
 __all__ = [
     "EVALUATIONS",
     "LONGEST",
+    "METHOD",
     "PURE",
     "REQUIRED",
     "Array",
@@ -31,6 +33,7 @@ __all__ = [
     "ScriptError",
     "Signature",
     "Signatures",
+    "Struct",
     "Value",
     "check",
     "compile_script",

@@ -52,7 +52,7 @@ def _quotient(a: Number, b: Number) -> Number:
 
 
 def add(a: Value, b: Value, work: Work) -> Value:
-    """Return a + b of numbers, or of lists of equal length.
+    """Return a + b of numbers, of lists of equal length, or of a list and a number.
 
     Raises:
         Fault: The operands do not fit.
@@ -61,7 +61,7 @@ def add(a: Value, b: Value, work: Work) -> Value:
 
 
 def subtract(a: Value, b: Value, work: Work) -> Value:
-    """Return a - b of numbers, or of lists of equal length.
+    """Return a - b of numbers, of lists of equal length, or of a list and a number.
 
     Raises:
         Fault: The operands do not fit.
@@ -72,8 +72,15 @@ def subtract(a: Value, b: Value, work: Work) -> Value:
 def _beside(of: Callable[[Any, Any], Value], a: Value, b: Value, done: str, work: Work) -> Value:
     if type(a) is Array and type(b) is Array:
         return _elementwise(of, a, b, done, work)
-    if type(a) in NUMBERS and type(b) in NUMBERS:
-        return of(a, b)
+    if type(a) in NUMBERS:
+        if type(b) in NUMBERS:
+            return of(a, b)
+        if type(b) is Array:
+            return _scaled(b, a, of, work, turned=True)  # type: ignore[arg-type]
+    elif type(a) is Array and type(b) in NUMBERS:
+        return _scaled(a, b, of, work)  # type: ignore[arg-type]
+    if done == "divided":
+        raise Fault(f"{kind(a)} cannot be divided by {kind(b)}")
     advice = ""
     if type(a) is Pose and type(b) is Pose:
         advice = ": use pose_add or pose_trans" if done == "added" else ": use pose_sub"
@@ -86,7 +93,7 @@ def _elementwise(of: Callable[[Any, Any], Value], a: Array, b: Array, done: str,
     if len(a.items) != len(b.items):
         raise Fault(f"lists of {len(a.items)} and {len(b.items)} elements cannot be {done}")
     work(len(a.items))
-    if only_numbers(a) and only_numbers(b):
+    if of in _PLAIN and of is not _quotient and only_numbers(a) and only_numbers(b):
         return _whole(map(_PLAIN[of], a.items, b.items))
     return Array(
         of(x, y) if type(x) in NUMBERS and type(y) in NUMBERS else _beside(of, x, y, done, work)
@@ -114,35 +121,32 @@ def multiply(a: Value, b: Value, work: Work) -> Value:
 
 
 def divide(a: Value, b: Value, work: Work) -> Value:
-    """Return a / b of numbers, or of a list and a number; quotients are floats.
+    """Return a / b of numbers, or of lists as for a + b; quotients are floats.
 
     Raises:
         Fault: The operands do not fit, or b is 0.
     """
-    if type(b) in NUMBERS:
-        if type(a) in NUMBERS:
-            return _quotient(a, b)  # type: ignore[arg-type]
-        if type(a) is Array:
-            return _scaled(a, b, _quotient, work)  # type: ignore[arg-type]
-    raise Fault(f"{kind(a)} cannot be divided by {kind(b)}")
+    if type(a) in NUMBERS and type(b) in NUMBERS:
+        return _quotient(a, b)  # type: ignore[arg-type]
+    return _beside(_quotient, a, b, "divided", work)
 
 
-def remainder(a: Value, b: Value) -> Value:
-    """Return a % b, the remainder with the sign of a.
+def remainder(a: Value, b: Value, work: Work) -> Value:
+    """Return a % b of numbers, or of lists as for a + b: the remainder with the sign of a.
 
     Raises:
-        Fault: An operand is no number, or b is 0.
+        Fault: The operands do not fit, or b is 0.
     """
-    if type(a) not in NUMBERS or type(b) not in NUMBERS:
-        raise Fault(f"{kind(a)} has no remainder by {kind(b)}")
+    return _beside(_rest, a, b, "divided", work)
+
+
+def _rest(a: Number, b: Number) -> Number:
     if b == 0:
         raise Fault("division by zero")
     if type(a) is int and type(b) is int:
         rest = abs(a) % abs(b)
         return rest if a >= 0 else -rest
-    if math.isinf(a):  # type: ignore[arg-type]
-        return math.nan
-    return math.fmod(a, b)  # type: ignore[arg-type]
+    return math.nan if math.isinf(a) else math.fmod(a, b)
 
 
 def negate(a: Value, work: Work) -> Value:
@@ -160,14 +164,18 @@ def negate(a: Value, work: Work) -> Value:
     raise Fault(f"{kind(a)} has no negative")
 
 
-def _scaled(a: Array, by: Number, of: Callable[[Any, Any], Value], work: Work) -> Array:
+def _scaled(
+    a: Array, by: Number, of: Callable[[Any, Any], Value], work: Work, *, turned: bool = False
+) -> Array:
+    """Compute `of(x, by)` of each element x of a list and of the lists inside it; `of(by, x)` if it is turned."""
     work(len(a.items))
-    if only_numbers(a) and not (of is _quotient and by == 0):
-        return _whole(map(_PLAIN[of], a.items, repeat(by)))
+    if of in _PLAIN and only_numbers(a) and not (of is _quotient and (turned or by == 0)):
+        plain, numbers = _PLAIN[of], a.items
+        return _whole(map(plain, repeat(by), numbers) if turned else map(plain, numbers, repeat(by)))
     return Array(
-        of(x, by)
+        (of(by, x) if turned else of(x, by))
         if type(x) in NUMBERS
-        else _scaled(x, by, of, work)
+        else _scaled(x, by, of, work, turned=turned)
         if type(x) is Array
         else of(number(x, "an element of the list"), by)
         for x in a.items

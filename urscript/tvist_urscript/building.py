@@ -1,16 +1,20 @@
 """The tree of a script, built bottom-up while it is parsed: no recursion, whatever a text nests."""
 
+import re
 from typing import Any, TypeVar
 
 from lark import Token, Transformer
 
 from tvist_urscript import tree
 from tvist_urscript.errors import ScriptError, syntax_error
-from tvist_urscript.values import LONGEST_TEXT, to_bytes, whole
+from tvist_urscript.values import HIGHEST, LONGEST_TEXT, to_bytes, whole
 
 DEEPEST = 100
 """Most levels of expressions inside each other; a block counts as BLOCK of them."""
 BLOCK = 4
+
+_LABEL = re.compile(r'\$[ \t]*(\d+)[ \t]*"(.*?)"(?:[ \t]+"\w+")*[ \t\r]*(?:#.*)?', re.ASCII)
+"""A label: its number, its name, and words such as "noBreak" that mean nothing here. A name may contain quotes."""
 
 Children = list[Any]
 T = TypeVar("T", bound=tree.Node)
@@ -60,19 +64,34 @@ class Builder(Transformer[Token, Any]):
         (word,) = children
         return tree.Word(word.line, word.column, str(word))  # type: ignore[arg-type]
 
+    def label(self, children: Children) -> tree.Label:
+        (token,) = children
+        found = _LABEL.fullmatch(token)
+        if found is None:
+            raise _syntax(token, "a label is a line with $, a number and a name in quotes")
+        if len(found[1]) > 10 or int(found[1]) > HIGHEST:
+            raise _syntax(token, f"the number of a label is at most {HIGHEST}")
+        if len(to_bytes(found[2])) > LONGEST_TEXT:
+            raise _syntax(token, f"a text is too long, the limit is {LONGEST_TEXT} bytes")
+        return tree.Label(token.line, token.column, int(found[1]), found[2])
+
     def assign(self, children: Children) -> tree.Assign:
         *qualifier, target, equal, value = children
-        indices: list[tree.Expression] = []
+        indices: list[tree.Expression | tree.Step] = []
         inner, bracket = target, target
-        while isinstance(inner, tree.Index):
-            indices[:0] = inner.indices
+        while isinstance(inner, tree.Index | tree.Member):
+            if isinstance(inner, tree.Index):
+                indices[:0] = inner.indices
+            else:
+                indices.insert(0, tree.Step(inner.line, inner.column, inner.name))
             inner, bracket = inner.value, inner
         if not isinstance(inner, tree.Name):
             raise _syntax(
-                inner if qualifier else equal, "only a variable or an element of one can be assigned"
+                inner if qualifier else equal,
+                "only a variable, or an element or member of one, can be assigned",
             )
         if qualifier and indices:
-            raise _syntax(bracket, f"{qualifier[0]} declares a variable, not an element")
+            raise _syntax(bracket, f"{qualifier[0]} declares a variable, not an element or a member")
         node = tree.Assign(
             inner.line,
             inner.column,
@@ -113,6 +132,14 @@ class Builder(Transformer[Token, Any]):
     def index(self, children: Children) -> tree.Index:
         value, bracket, *indices = children
         return _deeper(tree.Index(bracket.line, bracket.column, value, indices), [value], indices)
+
+    def member(self, children: Children) -> tree.Member:
+        value, name = children
+        return _deeper(tree.Member(name.line, name.column, value, str(name)), [value])
+
+    def method(self, children: Children) -> tree.Method:
+        value, name, *arguments = children
+        return _deeper(tree.Method(name.line, name.column, value, str(name), arguments), [value], arguments)
 
     def number(self, children: Children) -> tree.Constant:
         (token,) = children

@@ -29,6 +29,7 @@ class Script:
         used: The built-in functions that it calls.
         scope: What names mean on its outermost level.
         scopes: Number of its scopes, with those of the program that it is added to.
+        idle: It only defines functions, so it ends at once.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Script:
     used: frozenset[str]
     scope: Scope = field(repr=False)
     scopes: int
+    idle: bool = False
 
     def forgetting(self, last: "Script") -> "Script":
         """Return the program for later statements, which know nothing of what was added up to the last one."""
@@ -47,7 +49,7 @@ class Script:
 
 
 def compile_script(text: str, signatures: Signatures, after: Script | None = None) -> Script:
-    """Compile a program: a `def` or `sec` with its `end`, or statements without.
+    """Compile a program: a `def` or `sec` with its `end`, or statements and functions as in a Script node.
 
     Args:
         text: The script as it was sent.
@@ -101,6 +103,7 @@ def translate(
             frozenset(translator.used),
             outline(found[0]),
             found[0].number + len(found),
+            bool(program.body) and all(isinstance(one, tree.Function) for one in program.body),
         ),
         [],
     )
@@ -109,21 +112,14 @@ def translate(
 def _program(text: str) -> tree.Function:
     statements = _parsed(text)
     head = statements[0]
-    if isinstance(head, tree.Function):
-        if head.kind == "thread":
-            raise ScriptError(
-                head.line, head.column, syntax_error(head.line, "a thread belongs into a program")
-            )
-        if len(statements) > 1:
-            after = statements[1]
-            raise ScriptError(
-                after.line, after.column, syntax_error(after.line, f"the program {head.name} has ended above")
-            )
-        if head.parameters:
-            name, _ = head.parameters[0]
-            raise ScriptError(name.line, name.column, f"the program {head.name} cannot have parameters")
-        return head
-    return _together(text, statements)
+    if len(statements) > 1 or not isinstance(head, tree.Function):
+        return _together(text, statements)
+    if head.kind == "thread":
+        raise ScriptError(head.line, head.column, syntax_error(head.line, "a thread belongs into a program"))
+    if head.parameters:
+        name, _ = head.parameters[0]
+        raise ScriptError(name.line, name.column, f"the program {head.name} cannot have parameters")
+    return head
 
 
 def _statements(text: str) -> tree.Function:
@@ -143,10 +139,12 @@ def _parsed(text: str, *, several: bool = False) -> list[tree.Statement]:
 
 
 def _together(text: str, statements: list[tree.Statement]) -> tree.Function:
-    """Statements without `def` as a program, which the first word names."""
+    """Statements as a program, which the last function among them names, or else the first word."""
     head = statements[0]
+    names = [statement.name for statement in statements if isinstance(statement, tree.Function)]
     word = re.search(r"^[ \t]*([A-Za-z_]\w*)", text, re.MULTILINE)
-    return tree.Function(head.line, head.column, "def", word[1] if word else "program", [], statements)
+    name = names[-1] if names else word[1] if word else "program"
+    return tree.Function(head.line, head.column, "def", name, [], statements)
 
 
 def _code(made: ast.FunctionDef) -> CodeType:

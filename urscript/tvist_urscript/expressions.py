@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 from tvist_urscript import tree
 from tvist_urscript.errors import name_not_found
+from tvist_urscript.members import Members
 from tvist_urscript.names import BUILT_IN_ARRAYS, Scope
 from tvist_urscript.pieces import DEPTH, MISSING, Position
 from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
@@ -16,7 +17,6 @@ START = 20
 """Evaluations that the start of a thread costs, which limits the threads that start in a tick."""
 
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
-SCALING, SUMS = "*/", "+-"
 ORDER: dict[str, type[ast.cmpop]] = {"<": ast.Lt, ">": ast.Gt, "<=": ast.LtE, ">=": ast.GtE}
 EQUALITY: dict[str, tuple[type[ast.cmpop], str]] = {
     "==": (ast.Eq, "is_equal"),
@@ -26,7 +26,7 @@ EQUALITY: dict[str, tuple[type[ast.cmpop], str]] = {
 Report = Callable[[int, int, str], None]
 
 
-class Expressions:
+class Expressions(Members):
     """Translates expressions.
 
     Attributes:
@@ -47,7 +47,7 @@ class Expressions:
         self.constants: dict[str, object] = {}
         self.globals: set[str] = set()
 
-    def value(self, node: tree.Expression) -> ast.expr:  # noqa: PLR0911  one for each kind of node
+    def value(self, node: tree.Expression) -> ast.expr:  # noqa: C901, PLR0911  one for each kind of node
         """Translate an expression for its value."""
         match node:
             case tree.Constant():
@@ -60,6 +60,10 @@ class Expressions:
                 return self.run(node) if node.runs else self.call(node)
             case tree.Index():
                 return self.index(node)
+            case tree.Member():
+                return self.member(node)
+            case tree.Method():
+                return self.method(node)
             case tree.Listing():
                 return self.listing(node)
             case tree.Unary(operator="-"):
@@ -108,9 +112,7 @@ class Expressions:
         self.cost += 1
         left, right = self.value(node.left), self.value(node.right)
         if node.operator in ARITHMETIC:
-            has_constant = isinstance(node.left, tree.Constant) or isinstance(node.right, tree.Constant)
-            if node.operator in SCALING or (node.operator in SUMS and not has_constant):
-                self.works = True
+            self.works = True
             return at.call(ARITHMETIC[node.operator], left, right)
         if node.operator in ORDER:
             return at.compare(left, ORDER[node.operator](), right)
@@ -207,6 +209,8 @@ class Expressions:
         at = Position.of(node)
         self.cost += 1
         scope = None if built_in else self.scope.find(node.name)
+        if node.name == "struct" and scope is None:
+            return self.struct(node)
         if scope is not None:
             if scope.function.kind == "thread":
                 self.report(
@@ -294,12 +298,12 @@ class Expressions:
         return at.constant(None)
 
 
-def first(node: tree.Expression) -> tuple[int, int]:
+def first(node: tree.Expression | tree.Step) -> tuple[int, int]:
     """Return line and column of the first token of an expression."""
     while True:
         if isinstance(node, tree.Binary):
             node = node.left
-        elif isinstance(node, tree.Index):
+        elif isinstance(node, tree.Index | tree.Member | tree.Method):
             node = node.value
         else:
             return node.line, node.column

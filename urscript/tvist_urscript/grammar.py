@@ -18,6 +18,7 @@ loop: WHILE expression ":" block "end"
     | (KILL | JOIN) expression -> handle
     | (BREAK | CONTINUE | PASS) -> word
     | (HALT | ENTER_CRITICAL | EXIT_CRITICAL) ("(" ")")? -> word
+    | LABEL -> label
 
 assign: (GLOBAL | LOCAL)? postfix EQUAL expression
 
@@ -38,6 +39,8 @@ assign: (GLOBAL | LOCAL)? postfix EQUAL expression
     | postfix
 ?postfix: atom
     | postfix LSQB expression ("," expression)* "]" -> index
+    | postfix "." NAME -> member
+    | postfix "." NAME "(" (argument ("," argument)*)? ")" -> method
 ?atom: NUMBER -> number
     | TEXT -> text
     | (TRUE | FALSE | NONE) -> constant
@@ -54,6 +57,7 @@ call: NAME "(" (argument ("," argument)*)? ")"
 NAME: /[A-Za-z_][A-Za-z_0-9]*/
 NUMBER: /(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?/
 TEXT: /"[^"\n]*"/
+LABEL: /\$[^\n]*/
 DEF: "def"
 SEC: "sec"
 THREAD: "thread"

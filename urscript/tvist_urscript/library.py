@@ -35,6 +35,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "pose_trans": poses.pose_trans,
     "pow": numbers.power,
     "r2d": numbers.r2d,
+    "random": numbers.generator(),
     "rotvec2rpy": poses.rotvec2rpy,
     "rpy2rotvec": poses.rpy2rotvec,
     "sin": numbers.sin,
@@ -65,6 +66,9 @@ WEIGHTS = {
     "transpose": 1,
 }
 """Functions that take the elements of the lists they are given from the budget, and how often each counts."""
+
+ANEW: Mapping[str, Callable[[], Callable[..., Any]]] = MappingProxyType({"random": numbers.generator})
+"""Functions that remember something: what makes one for each program."""
 
 PURE: Mapping[str, tuple[Signature, Callable[..., Any]]] = MappingProxyType(
     {name: (signature(function, linear=name in WEIGHTS), function) for name, function in _FUNCTIONS.items()}

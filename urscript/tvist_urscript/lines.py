@@ -43,7 +43,7 @@ _COMPLETE = frozenset(
      "ENTER_CRITICAL", "EXIT_CRITICAL", "END")
 )  # fmt: skip
 """Tokens after which no expression goes on with a name or `run`: it can only begin the next statement of the line."""
-_AFTER_NAME = frozenset(("LPAR", "LSQB", "EQUAL"))
+_AFTER_NAME = frozenset(("LPAR", "LSQB", "EQUAL", "DOT"))
 """Tokens that follow the name with which a statement begins."""
 
 
@@ -68,7 +68,8 @@ class Lines:
         brackets = 0
         last = END
         pending: Token | None = None
-        for token in _parted(tokens) if self._several else tokens:
+        named = _named(tokens)
+        for token in _parted(named) if self._several else named:
             kind = token.type
             if kind == END:
                 if brackets == 0 and last != END and last not in _GOES_ON and pending is None:
@@ -98,6 +99,16 @@ class Lines:
             yield pending
         elif last != END:
             yield _after(token_before)
+
+
+def _named(tokens: Iterator[Token]) -> Iterator[Token]:
+    """Make names of the words after a point, and of `sec` in brackets: `time().sec`, `struct(sec=1)`."""
+    last, brackets = END, 0
+    for token in tokens:
+        brackets += (token.type in _OPENS) - (token.type in _CLOSES)
+        last, before = token.type, last
+        is_name = token.isidentifier() if before == "DOT" else last == "SEC" and brackets > 0
+        yield Token.new_borrow_pos("NAME", token, token) if is_name else token
 
 
 def _parted(tokens: Iterator[Token]) -> Iterator[Token]:

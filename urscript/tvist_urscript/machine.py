@@ -15,8 +15,8 @@ from tvist_urscript.values import Value
 
 EVALUATIONS = 500
 """Budget of a tick: evaluations of all threads together."""
-PATIENCE = 250
-"""Ticks in a row in which a thread may use up its budget before it counts as an endless loop."""
+PATIENCE = 1_000_000
+"""Evaluations of a thread without waiting for time to pass, or reading what has come, after which it is endless."""
 OVERDRAFT = 2000
 """Most evaluations by which one statement may exceed the budget."""
 
@@ -39,6 +39,7 @@ class Machine:
         left: What is left of the budget of this tick; compiled code takes from it.
         thread: Number of the thread that runs now, or ran last; 0 is the main thread.
         halted: Whether it has ended by `halt`.
+        label: Number and name of the label that the main thread has passed last; None before the first.
 
     Args:
         script: The program.
@@ -61,6 +62,7 @@ class Machine:
         self.left = 0
         self.thread = 0
         self.halted = False
+        self.label: tuple[int, str] | None = None
         self._finish = finish or _nothing
         self._started = 0
         self._holder: Thread | None = None
@@ -162,6 +164,7 @@ class Machine:
         assert thread.steps is not None
         self._running = thread
         self.thread = thread.number
+        before = self.left
         self.left -= thread.owes
         thread.owes = 0
         try:
@@ -172,24 +175,27 @@ class Machine:
             self.halted = True
             self.end()
         else:
-            self._waits(thread, why)
+            self._waits(thread, why, before)
 
-    def _waits(self, thread: Thread, cost: int | None) -> None:
-        """Note that a thread waits: for time, or for a budget that can bear the cost of its next statements."""
+    def _waits(self, thread: Thread, cost: int | None, before: int) -> None:
+        """Note that a thread waits for time, or for a budget that can bear the cost of its next statements.
+
+        Before its turn, `before` was left of the budget.
+        """
         if cost is None:
             thread.spent = 0
             if self._holder is thread:
                 self._holder = None
             return
         thread.owes = cost
+        thread.spent += before - (self.left + cost)
         self.left = min(self.left + cost, 0)  # it has not been carried out
-        thread.spent += 1
         if thread.spent >= PATIENCE:
             line, column = position_of(thread.steps) or (1, 1)
             raise ScriptError(
                 line,
                 column,
-                f"an endless loop: the thread has computed for {PATIENCE} ticks without waiting for time to pass",
+                f"an endless loop: the thread has computed {PATIENCE} evaluations without waiting for time to pass",
             )
 
     def _may_enter(self, thread: Thread) -> bool:
@@ -311,6 +317,10 @@ class Machine:
         if not thread.critical and self._holder is thread:
             self._holder = None
 
+    def _label(self, number: int, name: str) -> None:
+        if self._running is self._main:
+            self.label = number, name
+
     def _called(self) -> dict[str, Any]:
         return {
             HERE: self,
@@ -321,6 +331,7 @@ class Machine:
             "enter_critical": self._enter,
             "exit_critical": self._exit,
             "halt": _halt,
+            "label": self._label,
             "too_deep": _too_deep,
         }
 

@@ -14,6 +14,9 @@ BUILT_IN_ARRAYS: dict[str, tuple[str, str]] = {
 }
 """Arrays of the controller, and the functions that read and write an element; the second is empty for inputs."""
 
+METHOD = "."
+"""The built-in function that a call of a method is: it gets the object, the method's name and the arguments."""
+
 
 @dataclass(eq=False)
 class Scope:

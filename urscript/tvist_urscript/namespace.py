@@ -6,7 +6,7 @@ from types import FunctionType
 from typing import Any
 
 from tvist_urscript.compiler import Script
-from tvist_urscript.library import PURE, WEIGHTS
+from tvist_urscript.library import ANEW, PURE, WEIGHTS
 from tvist_urscript.operators import operators
 from tvist_urscript.values import Array
 
@@ -71,6 +71,8 @@ class Namespace:
     def _built_in(self, name: str) -> Callable[..., Any]:
         if name in self._functions:
             return self._functions[name]
+        if name in ANEW:
+            return self._names.get(f"b_{name}") or ANEW[name]()
         if name not in PURE:
             raise ValueError(f"the script calls {name}, which is not given")
         signature, function = PURE[name]

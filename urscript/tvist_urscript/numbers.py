@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from random import Random
 
 from tvist_urscript.errors import Fault
 from tvist_urscript.values import HIGHEST, LOWEST, Value, number
@@ -75,3 +76,13 @@ def _integer(name: str, of: Callable[[float], int], f: Value) -> int:
     if LOWEST <= x <= HIGHEST:
         return of(x)
     raise Fault(f"{name} has no integer of 32 bits for {x:g}")
+
+
+def generator() -> Callable[[], float]:
+    """Return `random` for a program that begins: numbers from 0 to below 1, the same ones in each run."""
+    dice = Random(0)  # noqa: S311  nothing secret
+
+    def random() -> float:
+        return dice.random()
+
+    return random

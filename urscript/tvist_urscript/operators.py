@@ -5,7 +5,7 @@ from typing import Any
 
 from tvist_urscript import arithmetic, indexing
 from tvist_urscript.arithmetic import Work
-from tvist_urscript.values import Array, Pose
+from tvist_urscript.values import Array, Pose, Struct
 
 
 def operators(work: Work) -> Mapping[str, Callable[..., Any]]:
@@ -39,14 +39,16 @@ def operators(work: Work) -> Mapping[str, Callable[..., Any]]:
         "subtract": subtract,
         "multiply": multiply,
         "divide": lambda a, b: arithmetic.divide(a, b, work),
-        "remainder": arithmetic.remainder,
+        "remainder": lambda a, b: arithmetic.remainder(a, b, work),
         "negate": lambda a: arithmetic.negate(a, work),
         "is_equal": is_equal,
         "is_unequal": lambda a, b: not is_equal(a, b),
         "element": indexing.element,
+        "member": indexing.member,
         "element_of_matrix": indexing.element_of_matrix,
         "replaced": lambda new, indices, value: indexing.replaced(new, indices, value, work),
         "listed": Array,
+        "structured": Struct,
         "arranged": lambda order, values: [values[place] for place in order],
         "posed": Pose,
     }

@@ -186,7 +186,7 @@ class Statements(Expressions):
         self.loops -= 1
         return ast.While(test, [*at.charge(cost, check=True), *body], [], **at.given)
 
-    def simple(self, statement: tree.Statement, at: Position) -> list[ast.stmt]:
+    def simple(self, statement: tree.Statement, at: Position) -> list[ast.stmt]:  # noqa: PLR0911  one for each kind
         """Translate a statement that contains no others."""
         match statement:
             case tree.Assign():
@@ -206,6 +206,9 @@ class Statements(Expressions):
                 return [at.statement(at.waiting(at.call("join", self.value(statement.value))))]
             case tree.Word():
                 return self.word(statement, at)
+            case tree.Label():
+                what = at.call("label", at.constant(statement.number), at.constant(statement.name))
+                return [at.statement(what)]
             case _:
                 raise AssertionError(statement)
 
@@ -230,18 +233,25 @@ class Statements(Expressions):
     def assign(self, statement: tree.Assign, at: Position) -> ast.stmt:
         """Translate an assignment. The value is computed before the variable is read or declared."""
         name, indices = statement.target.name, statement.indices
-        if indices and self.built_in_array(statement.target):
+        plain = [index for index in indices if not isinstance(index, tree.Step)]
+        if indices and len(plain) == len(indices) and self.built_in_array(statement.target):
             setter = BUILT_IN_ARRAYS[name][1]
             if not setter:
                 self.report(statement.line, statement.column, f"{name} cannot be assigned")
                 return at.statement(at.constant(None))
-            return at.statement(self.call_built_in(at, setter, [*indices, statement.value]))
+            return at.statement(self.call_built_in(at, setter, [*plain, statement.value]))
         value = self.value(statement.value)
         if indices:
             here = Position(*first(indices[0]))
             self.cost += len(indices)
             self.works = True
-            places = at.tuple([self.value(index) for index in indices])
+            places = at.tuple(
+                [
+                    # Nothing else that a script has is a tuple.
+                    at.tuple([at.constant(index.name)]) if isinstance(index, tree.Step) else self.value(index)
+                    for index in indices
+                ]
+            )
             value = here.call("replaced", value, places, self.name(statement.target))
             variable = self.scope.variable(name)
         else:

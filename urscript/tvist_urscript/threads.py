@@ -18,7 +18,7 @@ class Thread:
         parent: The thread that has started it, or the nearest thread before that which has not ended; None for the main
             thread.
         critical: How many critical sections it is in.
-        spent: Ticks one after the other in which it used up its budget.
+        spent: Evaluations since it has waited for time to pass, or has got something from outside.
         owes: Evaluations of what it does first in its next turn, which that tick has to bear.
         added: Whether it was started by statements that were added to the program, or is the main thread and runs such
             statements now.

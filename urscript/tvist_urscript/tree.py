@@ -51,6 +51,30 @@ class Index(Node):
 
 
 @dataclass(slots=True)
+class Member(Node):
+    """`a.name`; its position is that of the name."""
+
+    value: "Expression"
+    name: str
+
+
+@dataclass(slots=True)
+class Method(Node):
+    """`a.name(arguments)`; its position is that of the name."""
+
+    value: "Expression"
+    name: str
+    arguments: list["Argument"]
+
+
+@dataclass(slots=True)
+class Step(Node):
+    """`.name` in the target of an assignment."""
+
+    name: str
+
+
+@dataclass(slots=True)
 class Argument(Node):
     """An argument of a call, with its name where it is given by name."""
 
@@ -92,15 +116,15 @@ class Logic(Node):
     values: list["Expression"]
 
 
-Expression = Constant | Name | Listing | Index | Call | Unary | Binary | Logic
+Expression = Constant | Name | Listing | Index | Member | Method | Call | Unary | Binary | Logic
 
 
 @dataclass(slots=True)
 class Assign(Node):
-    """`target = value`, with `global` or `local` before it."""
+    """`target = value`, with `global` or `local` before it; `indices` lead to an element or a member of the target."""
 
     target: Name
-    indices: list[Expression]
+    indices: list[Expression | Step]
     value: Expression
     qualifier: Literal["global", "local"] | None = None
 
@@ -151,6 +175,14 @@ class Word(Node):
 
 
 @dataclass(slots=True)
+class Label(Node):
+    """`$ 3 "Waypoint_1"`: the line of PolyScope's program tree to which the next statements belong."""
+
+    number: int
+    name: str
+
+
+@dataclass(slots=True)
 class Function(Node):
     """A function, a thread, or a whole program; its position is that of its name."""
 
@@ -160,4 +192,4 @@ class Function(Node):
     body: list["Statement"]
 
 
-Statement = Assign | Evaluate | If | While | Return | Handle | Word | Function
+Statement = Assign | Evaluate | If | While | Return | Handle | Word | Label | Function

@@ -99,7 +99,31 @@ class Pose(Array):
         return self.items  # type: ignore[return-value]
 
 
-LISTS = frozenset((Array, Pose))
+class Struct(Array):
+    """Values with names, which can be reached by their places as well.
+
+    Attributes:
+        names: Names of its elements.
+
+    Raises:
+        Fault: As for a list.
+    """
+
+    __slots__ = ("names",)
+    names: tuple[str, ...]
+
+    def __init__(self, names: tuple[str, ...], items: Iterable["Value"]) -> None:
+        super().__init__(items)
+        self.names = names
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is Struct and self.names == other.names and self.items == other.items
+
+    def __hash__(self) -> int:
+        return hash((self.names, self.items))
+
+
+LISTS = frozenset((Array, Pose, Struct))
 NUMBERS = frozenset((int, float))
 T = TypeVar("T")
 Value: TypeAlias = int | float | bool | str | Array | None
@@ -111,6 +135,7 @@ KINDS: dict[type, str] = {
     str: "a text",
     Array: "a list",
     Pose: "a pose",
+    Struct: "a struct",
     type(None): "None",
 }
 
@@ -257,10 +282,13 @@ def _written(value: Value) -> str:
     if isinstance(value, Array):
         parts: list[str] = []
         length = 0
-        for item in value.items:
-            parts.append(_written(item))
+        names = [f"{name}=" for name in value.names] if type(value) is Struct else [""] * len(value.items)
+        for name, item in zip(names, value.items, strict=True):
+            parts.append(name + _written(item))
             length += len(parts[-1]) + 2
             if length > LONGEST_TEXT + 8:
                 raise Fault(f"a list is too long as a text: the limit is {LONGEST_TEXT} bytes")
+        if type(value) is Struct:
+            return f"struct({', '.join(parts)})"
         return f"{'p' if type(value) is Pose else ''}[{', '.join(parts)}]"
     return str(value)

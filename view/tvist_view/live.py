@@ -14,6 +14,7 @@ from tvist_client.errors import AnswerTimeoutError, ClientError
 from tvist_client.robot import Robot
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
+from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.stream import Event, State, Truth
 from tvist_view.appearance import Appearance
@@ -136,6 +137,7 @@ class LivePage:
         self._pilot = Pilot(robot, f"view-{os.getpid()}", self._say)
         self._history = History(info.geometry.alpha, 2000)
         self._state: State | None = None
+        self._io: Io | None = None
         self._moments = Moments()
         self._has_truth = False
         self._cockpits: dict[int, Cockpit] = {}
@@ -164,6 +166,7 @@ class LivePage:
             robot.on_state(self._on_state),
             robot.on_truth(self._on_truth),
             robot.on_event(self._on_event),
+            robot.on_io(self._on_io),
         ]
         for client in server.get_clients().values():
             self.came(client)
@@ -217,7 +220,7 @@ class LivePage:
         why = f" — {plain(stop.why)}" if stop is not None and safety != "NORMAL" else ""
         words = (
             f"**{self._info.name}** {robot}, {safety}{why} · shaper **{plain(self._info.shaper)}** · "
-            f"{state.timestamp:.1f} s"
+            f"{state.timestamp:.1f} s{_program(self._io)}"
         )
         if self._status.content != words:
             self._status.content = words
@@ -226,6 +229,9 @@ class LivePage:
         self._state = state
         self._moments.add(state)
         self._history.add(state)
+
+    def _on_io(self, io: Io) -> None:
+        self._io = io
 
     def _on_truth(self, truth: Truth) -> None:
         if not self._has_truth:
@@ -272,6 +278,14 @@ class LivePage:
         if not task.cancelled() and (error := task.exception()) is not None:
             log.error("the page: %s", error, exc_info=error)
         self._refresh()
+
+
+def _program(io: Io | None) -> str:
+    """The program that runs or is paused, and where it is; empty if there is none."""
+    if io is None or io.program is None or io.program_state == "STOPPED":
+        return ""
+    label = "" if io.program_label is None else f" “{plain(io.program_label.name)}”"
+    return f" · {plain(io.program)} {io.program_state}, line {io.program_line}{label}"
 
 
 def _word(kind: type[RobotMode] | type[SafetyMode], number: int) -> str:

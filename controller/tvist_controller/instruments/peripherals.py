@@ -17,7 +17,7 @@ from tvist_protocol.io import (
     SetTcp,
     SimulationSetInputs,
 )
-from tvist_protocol.programs import Interpreter, ProgramState
+from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
 from tvist_protocol.values import Payload
 
 CURRENT = (0.004, 0.020)
@@ -52,6 +52,10 @@ class LoadedProgram(Protocol):
         """Current line, as in `Io`."""
 
     @property
+    def label(self) -> ProgramLabel | None:
+        """Last label, as in `Io`."""
+
+    @property
     def interpreter(self) -> Interpreter | None:
         """Statements for the program, as in `Io`."""
 
@@ -82,6 +86,7 @@ class Peripherals:
         }
         self._written: dict[tuple[Bank, int], int] = {}
         self._tool_voltage = 0
+        self._tool_types, self._tool_output_mode, self._tool_digital_modes = 0b11, 0, [1, 1]
         self.changed = True
         """True if `io` has to be published, since something in it has changed; whoever publishes it resets this."""
         self.wrench_zero: list[float] | None = None
@@ -160,6 +165,19 @@ class Peripherals:
     def _choose(self, bit: int, *, voltage: bool) -> None:
         self._analog_types = self._analog_types & ~(1 << bit) | voltage << bit
         self.changed = True
+
+    def choose_tool_input(self, number: int, *, voltage: bool) -> None:
+        """Make an analogue input of the tool a voltage or a current; the signal at it keeps its number."""
+        self._tool_types = self._tool_types & ~(1 << number) | voltage << number
+        self.changed = True
+
+    def set_tool_output_mode(self, mode: int) -> None:
+        """Use the tool's digital outputs as such (0) or as a supply (1)."""
+        self._tool_output_mode, self.changed = mode, True
+
+    def set_tool_digital_output_mode(self, number: int, mode: int) -> None:
+        """Let a digital output of the tool sink (1), source (2) or both (3)."""
+        self._tool_digital_modes[number], self.changed = mode, True
 
     def set_tool_voltage(self, voltage: int) -> None:
         """Set the supply of the tool [V]."""
@@ -273,9 +291,14 @@ class Peripherals:
             program=program.name,
             program_state=program.state,
             program_line=program.line,
+            program_label=program.label,
             interpreter=program.interpreter,
             watched=program.watched,
             tool_output_voltage=self._tool_voltage,
+            tool_analog_input_types=self._tool_types,
+            tool_output_mode=self._tool_output_mode,
+            tool_digital_output0_mode=self._tool_digital_modes[0],
+            tool_digital_output1_mode=self._tool_digital_modes[1],
             tcp_force_zero=self.wrench_zero,
             actual_TCP_force=wrench,
         )

@@ -77,17 +77,17 @@ class TerminalValues(Reading):
 
     @property
     def tool_analog_input_types(self) -> Uint32:
-        """Constant: 3, both are voltages."""
-        return 3
+        """Io: types of the tool's analogue inputs, bits 0–1; 0 is current, 1 voltage."""
+        return self.io.tool_analog_input_types
 
     @property
     def tool_analog_input0(self) -> Double:
-        """Io: analogue input 0 of the tool [V]."""
+        """Io: analogue input 0 of the tool [A or V]."""
         return self.io.tool_analog_input[0]
 
     @property
     def tool_analog_input1(self) -> Double:
-        """Io: analogue input 1 of the tool [V]."""
+        """Io: analogue input 1 of the tool [A or V]."""
         return self.io.tool_analog_input[1]
 
     @property
@@ -107,18 +107,18 @@ class TerminalValues(Reading):
 
     @property
     def tool_output_mode(self) -> Uint8:
-        """Constant: 0, the tool's outputs are digital ones."""
-        return 0
+        """Io: 0, the tool's outputs are digital ones; 1, they are a second supply."""
+        return self.io.tool_output_mode
 
     @property
     def tool_digital_output0_mode(self) -> Uint8:
-        """Constant: 1, the output sinks."""
-        return 1
+        """Io: 1, the output sinks; 2, it sources; 3, both."""
+        return self.io.tool_digital_output0_mode
 
     @property
     def tool_digital_output1_mode(self) -> Uint8:
-        """Constant: 1, the output sinks."""
-        return 1
+        """Io: 1, the output sinks; 2, it sources; 3, both."""
+        return self.io.tool_digital_output1_mode
 
     @property
     def euromap67_input_bits(self) -> Uint32:
@@ -151,7 +151,14 @@ class TerminalValues(Reading):
         return 0
 
     def __getattr__(self, name: str) -> bool | int | float:
-        """Return a register by RTDE's name."""
+        return self.register(name)
+
+    def register(self, name: str) -> bool | int | float:
+        """Return a register by RTDE's name.
+
+        Raises:
+            AttributeError: There is none of this name.
+        """
         found = _WORDS.fullmatch(name)
         if found is not None:
             words: list[int] = getattr(self.io, f"{found[1]}_bit_register")

@@ -14,6 +14,7 @@ from tvist_controller.planning.plans import Plans
 from tvist_controller.programs.steadiness import Steadiness
 from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import Command
+from tvist_protocol.io import Io
 from tvist_protocol.replies import Reply
 from tvist_protocol.stream import State
 from tvist_protocol.values import Payload
@@ -34,6 +35,8 @@ class Access:
     """The way to plans."""
     latest: Callable[[], State]
     """State of the last tick."""
+    io: Callable[[], Io]
+    """Terminals, registers and settings, as published."""
     declared: Callable[[], Payload]
     """Declared payload."""
     forces: ToolForces

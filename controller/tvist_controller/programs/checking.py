@@ -7,11 +7,11 @@ from typing import Literal
 
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import SIGNATURES
-from tvist_urscript import PURE, ScriptError, check
+from tvist_urscript import METHOD, PURE, ScriptError, check, compile_script
 
 _SIMULATED = {name: one for name, one in SIGNATURES.items() if name not in SUBJECTS}
 _NAMES = {name.lower(): name for name in (*SIGNATURES, *PURE)}
-_UNKNOWN = re.compile(r"compile_error_name_not_found:(\w+):")
+_UNKNOWN = re.compile(r"compile_error_name_not_found:(\.?\w+):")
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Finding:
     column: int
     """Column of the first character of the token at fault, from 1."""
     level: Literal["error", "warning"]
-    """An error keeps the program from starting; a warning ends it when the place is reached."""
+    """An error keeps the program from starting; a warning mostly ends it when the place is reached."""
     text: str
     """A sentence that says what is wrong."""
 
@@ -32,7 +32,7 @@ def check_program(text: str) -> list[Finding]:
     """Return what is wrong with a program, in the order of its text; empty if nothing is.
 
     Errors are those of the compiler: syntax, unknown names, calls that do not fit their functions. Warnings are the
-    calls of functions that this controller does not simulate.
+    calls of functions that this controller does not simulate, and that a text of functions alone does nothing.
 
     Args:
         text: The program: a `def` or `sec` with its `end`, or statements.
@@ -42,10 +42,16 @@ def check_program(text: str) -> list[Finding]:
     known = {(finding.line, finding.column) for finding in findings}
     for error in check(text, _SIMULATED):
         unknown = _UNKNOWN.fullmatch(error.text)
-        if unknown is not None and unknown[1] in SUBJECTS and (error.line, error.column) not in known:
-            name = unknown[1]
-            text_of_it = f"{name}: this controller does not simulate {SUBJECTS[name][1]}"
+        if unknown is None or (error.line, error.column) in known:
+            continue
+        name = unknown[1].removeprefix(METHOD)
+        subject = SUBJECTS.get(name if name == unknown[1] else METHOD)
+        if subject is not None:
+            text_of_it = f"{name}: this controller does not simulate {subject[1]}"
             findings.append(Finding(error.line, error.column, "warning", text_of_it))
+    if not known and compile_script(text, SIGNATURES).idle:
+        why = "the text only defines functions: as a program, it ends at once"
+        findings.append(Finding(1, 1, "warning", why))
     return sorted(findings, key=lambda finding: (finding.line, finding.column))
 
 

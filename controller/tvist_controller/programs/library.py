@@ -12,6 +12,7 @@ from tvist_controller.programs.functions.poses import PoseFunctions
 from tvist_controller.programs.functions.registers import RegisterFunctions
 from tvist_controller.programs.functions.safety import SafetyFunctions
 from tvist_controller.programs.functions.settings import SettingFunctions
+from tvist_controller.programs.functions.setup import SetupFunctions
 from tvist_controller.programs.functions.sockets import SocketFunctions
 from tvist_controller.programs.functions.state import StateFunctions
 from tvist_controller.programs.functions.statements import StatementFunctions
@@ -20,6 +21,7 @@ from tvist_controller.programs.functions.unsimulated import MISSING, SUBJECTS, I
 from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.programs.popups import Popups
+from tvist_controller.programs.runstate import RunstateOutputs
 from tvist_controller.programs.sockets import Sockets
 from tvist_controller.programs.watchdogs import Watchdogs
 from tvist_urscript import Signature, Signatures, signatures
@@ -31,6 +33,7 @@ FAMILIES: Mapping[type, str] = {
     SettingFunctions: "Settings",
     RegisterFunctions: "Registers and flags",
     TerminalFunctions: "Inputs and outputs",
+    SetupFunctions: "Set-up",
     MessageFunctions: "Messages and time",
     SocketFunctions: "Sockets",
     StatementFunctions: "Statements from clients",
@@ -57,6 +60,7 @@ def functions(
     watchdogs: Watchdogs,
     connections: Sockets,
     queue: StatementQueue,
+    runstate: RunstateOutputs,
 ) -> dict[str, Callable[..., Any]]:
     """Return the functions for the programs of one robot, by name."""
     kinematics = ProgramKinematics(access.description, access.motion, arm.spend)
@@ -67,6 +71,7 @@ def functions(
         SettingFunctions(access, arm),
         RegisterFunctions(access, arm),
         TerminalFunctions(access, arm),
+        SetupFunctions(access, arm, runstate),
         MessageFunctions(access, arm, popups),
         SocketFunctions(connections, arm),
         StatementFunctions(arm, queue),

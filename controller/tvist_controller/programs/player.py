@@ -11,15 +11,13 @@ from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.kept import Kept, KeptPrograms
 from tvist_controller.programs.library import MOVING, functions
 from tvist_controller.programs.popups import Popups
+from tvist_controller.programs.runstate import RunstateOutputs
 from tvist_controller.programs.sockets import Sockets
 from tvist_controller.programs.steadiness import Steadiness
 from tvist_controller.programs.watchdogs import Watchdogs
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_protocol.modes import RobotMode
-from tvist_protocol.programs import (
-    Interpreter,
-    ProgramState,
-)
+from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
 from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
@@ -62,8 +60,9 @@ class ProgramPlayer:
             access.emit, self._machine, lambda: self._now.origin if self._now else None, access.cell
         )
         self.statements = StatementQueue(self._machine, self.arm, access.peripherals, access.emit)
+        self._runstate = RunstateOutputs(access.peripherals)
         self._functions = functions(
-            access, self.arm, self.popups, self._watchdogs, self.sockets, self.statements
+            access, self.arm, self.popups, self._watchdogs, self.sockets, self.statements, self._runstate
         )
         self.kept = KeptPrograms(built_in(access.description))
         """The programs that can be loaded."""
@@ -80,8 +79,12 @@ class ProgramPlayer:
         """Evaluations that the last tick left; below 0 they are a debt, which is paid before any program goes on."""
         self._now: _Running | None = None
         """The one whose turn it is."""
+        self._failed = False
+        """Whether the program ends by an error or a stop."""
         self.line = 0
         """Present line, or the one with which playing would resume, counted from 1; 0 if there is none."""
+        self.label: ProgramLabel | None = None
+        """Label that the program had passed at that line; None if there is none."""
 
     @property
     def watched(self) -> list[str]:
@@ -99,9 +102,9 @@ class ProgramPlayer:
         return 0 if self._main is None else self._main.machine.line
 
     @property
-    def progress(self) -> tuple[str | None, ProgramState, int]:
-        """Fields of the program in `io`: its name, its state and its line."""
-        return self.name, self.state, self.line
+    def progress(self) -> tuple[str | None, ProgramState, int, ProgramLabel | None]:
+        """Fields of the program in `io`: its name, its state, its line and its label."""
+        return self.name, self.state, self.line, self.label
 
     # ------------------------------------------------------------------ ticks and events
 
@@ -142,7 +145,13 @@ class ProgramPlayer:
         self._left = left
         self.arm.settle(self._lives)
         if self._main is not None and (self.line == 0 or tick % TOLD_EVERY == 0):
-            self.line = self._main.machine.line
+            self._find_line(self._main.machine)
+
+    def _find_line(self, machine: Machine) -> None:
+        self.line = machine.line
+        self.label = (
+            None if machine.label is None else ProgramLabel(number=machine.label[0], name=machine.label[1])
+        )
 
     @property
     def _held(self) -> bool:
@@ -169,8 +178,9 @@ class ProgramPlayer:
             return
         against = self.arm.hear(event)
         if event.kind == "protective_stop" and self._main is not None:
-            self._wait()
+            self._wait(failed=True)
         elif (event.kind == "safety_stop" and event.category != 2) or (against and self._main is not None):
+            self._failed = True
             self.end(event.why or event.kind)
 
     def end(self, why: str) -> None:
@@ -202,6 +212,7 @@ class ProgramPlayer:
             self.hold()
 
     def _fail(self, running: _Running, error: ScriptError) -> None:
+        self._failed |= running is self._main
         self._emit(
             "warning", why=readable(error.text), line=error.line, column=error.column, program=running.name
         )
@@ -230,7 +241,8 @@ class ProgramPlayer:
         secondary = running.script.secondary or None
         self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
         if running is self._main:
-            self._main, self.state, self.line = None, "STOPPED", 0
+            self._main, self.state, self.line, self.label = None, "STOPPED", 0, None
+            self._runstate.tell(runs=False, failed=self._failed)
             self._watchdogs.clear()
             self.statements.close()
             self.arm.forget()
@@ -269,7 +281,8 @@ class ProgramPlayer:
         """Begin the loaded program; `origin` is the address of the machine that both sent and plays it, if known."""
         assert self.loaded is not None, "a program is loaded before it is played"
         self._main = self._begin(self.loaded.script, self.name or self.loaded.script.name, origin)
-        self.state, self.line = "PLAYING", 1
+        self.state, self.line, self._failed = "PLAYING", 1, False
+        self._runstate.tell(runs=True)
         self.statements.open(self._main.machine)
 
     def play_beside(self, script: Script, origin: str | None) -> None:
@@ -294,6 +307,7 @@ class ProgramPlayer:
         """Let the paused program go on from this tick."""
         self._watchdogs.begin_anew(tick)
         self.state = "PLAYING"
+        self._runstate.tell(runs=True)
 
     def hold(self) -> None:
         """Pause the program. A planned motion pauses on its path, a guided one is stopped."""
@@ -304,9 +318,10 @@ class ProgramPlayer:
             self.arm.brake(lambda: self._motion.stop(None, "the program was paused"))
         self._wait()
 
-    def _wait(self) -> None:
+    def _wait(self, *, failed: bool = False) -> None:
         """Pause the program: none of its threads has a turn any more, from this tick on."""
         self.state = "PAUSED"
+        self._runstate.tell(runs=False, failed=failed)
         if self._main is not None:
-            self.line = self._main.machine.line
+            self._find_line(self._main.machine)
             self._main.machine.left = 0

@@ -52,27 +52,32 @@ def between(received: bytes, prefix: bytes, suffix: bytes) -> tuple[bytes, int] 
 
 
 def floats(received: bytes, number: int) -> tuple[tuple[float, ...] | None, int] | None:
-    """Cut numbers in brackets, separated by commas: `( 1.414 , 3.14159, 1.616, 0.0 )`."""
+    """Cut numbers in brackets, separated by commas: `( 1.414 , 3.14159, 1.616, 0.0 )`, with the line's end behind."""
     end = received.find(b")")
     if end < 0:
         return None
+    rest = next((len(mark) for mark in (b"\n", b"\r\n") if received.startswith(mark, end + 1)), 0)
     start = received.rfind(b"(", 0, end)
     parts = received[start + 1 : end].decode("ascii", "replace").split(",")
     short = all(len(part) <= LONGEST_NUMBER for part in parts)  # the pattern takes long for long ones
     valid = start >= 0 and len(parts) == number and short and all(map(DECIMAL.fullmatch, parts))
-    return tuple(map(float, parts)) if valid else None, end + 1
+    return tuple(map(float, parts)) if valid else None, end + 1 + rest
 
 
 def variable(received: bytes, name: str) -> tuple[int | None, int] | None:
-    """Cut the answer to a request for a variable: a line with its name and an integer."""
-    found = line(received)
+    """Cut the answer to a request for a variable: a line with its name and an integer; blank lines before are dropped.
+
+    One may be left of a message whose line feed came later than the rest of it.
+    """
+    begin = len(received) - len(received.lstrip(b"\r\n"))
+    found = line(received[begin:])
     if found is None:
         return None
     answer = _VARIABLE.fullmatch(found[0].decode("ascii", "replace"))
     if answer is None or answer[1] != name or len(answer[2]) > LONGEST_NUMBER:
-        return None, found[1]
+        return None, begin + found[1]
     value = int(answer[2])
-    return value if -(2**31) <= value < 2**31 else None, found[1]
+    return value if -(2**31) <= value < 2**31 else None, begin + found[1]
 
 
 def unescaped(text: str) -> str:

@@ -5,7 +5,7 @@ from inspect import getdoc
 
 from tvist_controller.programs.functions.unsimulated import SUBJECTS, IdleFunctions
 from tvist_controller.programs.library import FAMILIES, SIGNATURES
-from tvist_urscript import REQUIRED, Signature, signatures
+from tvist_urscript import METHOD, REQUIRED, Signature, signatures
 
 HEAD = """# Functions of programs
 
@@ -42,10 +42,11 @@ def page() -> str:
     missing = [
         (f"`{name}`", what)
         for name, (_, what) in sorted(SUBJECTS.items(), key=lambda row: (row[1][1], row[0]))
+        if name != METHOD
     ]
     idle = ", ".join(f"`{name}`" for name in signatures(IdleFunctions))
     parts.append(
-        "## Not simulated\n\nThese end the program with an error that says so. "
+        "## Not simulated\n\nThese, and methods such as `handle.call()`, end the program with an error that says so. "
         f"{idle} succeed, since what they set or end is never going on.\n\n{_table(('function', 'subject'), missing)}\n"
     )
     return "\n".join(parts)

@@ -94,6 +94,7 @@ def _popup(c):
 
 _MESSAGES = {
     0: lambda c: {"text": c.text()},
+    1: lambda c: {"number": c.take("i"), "text": c.text()},
     2: _popup,
     3: _version,
     5: _safety,

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from tvist_protocol.programs import (
     ProgramClosePopup,
+    ProgramLabel,
     ProgramLoad,
     ProgramPause,
     ProgramPlay,
@@ -99,6 +100,18 @@ def test_what_other_clients_load_and_play_is_told_too(programs, robot):
     assert (programs.path, programs.playing, programs.saved) == ("/programs/Q2.urp", True, True)
     programs.io(io(program="rtde_control", program_state="PLAYING", program_line=1))
     assert (programs.path, programs.playing, programs.saved) == ("rtde_control", True, False)
+
+
+def test_a_label_is_told_once_when_the_program_comes_to_it(programs, robot):
+    for number, name in ((1, "Robot Program"), (1, "Robot Program"), (2, "Waypoint_1")):
+        programs.io(
+            io(program="f", program_state="PLAYING", program_label=ProgramLabel(number=number, name=name))
+        )
+    programs.io(io(program="f"))
+    assert [(one.kind, one.values) for one in told(robot)] == [
+        (1, {"number": 1, "text": "Robot Program"}),
+        (1, {"number": 2, "text": "Waypoint_1"}),
+    ]
 
 
 def test_a_secondary_program_sends_no_key_messages(programs, robot):

@@ -1,12 +1,12 @@
 """Functions for messages to people, and for time."""
 
 from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import flag, number, readable
+from tvist_controller.programs.arguments import flag, integer, number, readable
 from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.popups import Popups
 from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import PopupKind
-from tvist_urscript import Array, Value, costs, to_str
+from tvist_urscript import Array, Fault, Struct, Value, costs, to_str
 
 LONGEST_TEXT = 350
 """Elements of a list that fit into a text."""
@@ -57,6 +57,17 @@ class MessageFunctions:
         if isinstance(value, Array):
             self._arm.spend(3 * min(value.size, LONGEST_TEXT))
         return to_str(value)
+
+    def time(self, mode: object = 0) -> Struct:
+        """Return the time since the robot's start as `struct(sec, nanosec)`; there is no clock of the day (`mode` 2).
+
+        Raises:
+            Fault: Another time is asked for.
+        """
+        if (which := integer("mode", mode, 0, 2)) != 0:
+            raise Fault(f"time: mode is {which}; this controller has no clock of the day, so it must be 0")
+        sec, nanosec = divmod(round(self._access.latest().timestamp * 1e9), 10**9)
+        return Struct(("sec", "nanosec"), (sec, nanosec))
 
     def sync(self) -> Turns:
         """Wait for the next tick."""

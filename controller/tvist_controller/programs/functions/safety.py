@@ -3,7 +3,9 @@
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import positive, shown
 from tvist_controller.programs.arm import ProgramArm, Turns
+from tvist_controller.programs.moves import OWN_TOKEN
 from tvist_controller.programs.watchdogs import Watchdogs
+from tvist_protocol.commands import PowerOff
 from tvist_urscript import Fault, costs
 
 
@@ -26,6 +28,13 @@ class SafetyFunctions:
         motion.protect("the program asked for a protective stop")
         while motion.activity.protective:
             yield
+
+    @costs(10)
+    def powerdown(self) -> Turns:
+        """Switch the arm's power off, which ends the program; the controller stays on."""
+        yield from self._arm.finish()
+        self._access.send(PowerOff(token=OWN_TOKEN), None)
+        yield
 
     @costs(5)
     def rtde_set_watchdog(

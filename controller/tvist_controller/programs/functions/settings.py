@@ -6,13 +6,19 @@ from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import number, numbers, pose
 from tvist_controller.programs.arm import DELAY, ProgramArm, Turns
 from tvist_controller.programs.moves import OWN_TOKEN
+from tvist_plant.robot_checks import lacking_inertia
+from tvist_plant.robot_tables import Tensor
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.io import SetTcp
-from tvist_urscript import Fault, costs
+from tvist_urscript import Array, Fault, costs
 
 GRAVITY = 9.82
 """Gravity that programs declare, within `TOLERANCE`; the simulated arm stands upright and knows no other [m/s^2]."""
 TOLERANCE = 0.05
+ROUNDED = 0.05
+"""Share of the largest moment of inertia that others may lack because a CAD system has rounded them."""
+ORDER = (0, 3, 5, 1, 2, 4)
+"""Places of Ixx Iyy Izz Ixy Ixz Iyz, as programs have them, in the order of robot files."""
 
 
 class SettingFunctions:
@@ -62,8 +68,22 @@ class SettingFunctions:
             number(name, value, 0.0, 133.0)
         for name, value in (("inertia[3]", xy), ("inertia[4]", xz), ("inertia[5]", yz)):
             number(name, value, -133.0, 133.0)
-        full = (xx, xy, xz, yy, yz, zz)
+        full = self._as_a_body((xx, xy, xz, yy, yz, zz))
         yield from self._declare(number("m", m, 0.0), numbers("cog", cog, 3), full, seconds)
+
+    def _as_a_body(self, inertia: Tensor) -> Tensor:
+        """Make the moments of a body of those that were rounded, with a warning; others are left to be refused."""
+        lack = lacking_inertia(inertia)
+        if not 0.0 < lack <= ROUNDED * max(inertia[0], inertia[3], inertia[5]):
+            return inertia
+        self._access.emit(
+            "warning",
+            why=f"set_target_payload: no body has the inertia {[inertia[k] for k in ORDER]}; taken for a rounded one, "
+            f"it gets {lack:.2g} kg m² more about each axis",
+        )
+        lack *= 1.0 + 1e-9
+        xx, xy, xz, yy, yz, zz = inertia
+        return xx + lack, xy, xz, yy + lack, yz, zz + lack
 
     def set_gravity(self, d: object) -> None:
         """Accept the gravity that the arm has, which is installed upright.
@@ -75,6 +95,10 @@ class SettingFunctions:
         if max(abs(x), abs(y), abs(z - GRAVITY)) > TOLERANCE:
             raise Fault(f"set_gravity: d is [{x:g}, {y:g}, {z:g}]; the simulated arm stands upright, so it must be "
                         f"[0, 0, {GRAVITY}]")  # fmt: skip
+
+    def get_gravity(self) -> Array:
+        """Return the gravity that the arm has, which is installed upright [m/s^2]."""
+        return Array((0.0, 0.0, GRAVITY))
 
     @costs(80)
     def zero_ftsensor(self) -> None:

@@ -5,14 +5,26 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tvist_controller.instruments.snapshot import VARIABLES, Instruments
 from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import a_list, a_pose, integer
+from tvist_controller.programs.arguments import a_list, a_pose, integer, text
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
 from tvist_protocol.stream import State
-from tvist_urscript import Array, Pose, costs
+from tvist_urscript import Array, Fault, Pose, Value, costs
+from tvist_urscript.values import whole
+
+INTEGRATED = frozenset(
+    (
+        "joint_temperatures",
+        "tool_temperature",
+        "actual_robot_energy_consumed",
+        "actual_robot_braking_energy_dissipated",
+    )
+)
+"""Variables of RTDE whose values need all ticks before."""
 
 
 class _Target(NamedTuple):
@@ -39,6 +51,8 @@ class StateFunctions:
 
     def __init__(self, access: Access, arm: ProgramArm, kinematics: ProgramKinematics) -> None:
         self._access, self._arm, self._kinematics = access, arm, kinematics
+        self._instruments: Instruments | None = None
+        """What computes RTDE's variables, made when the first is read."""
 
     def get_steptime(self) -> float:
         """Return the control period [s]."""
@@ -88,6 +102,21 @@ class StateFunctions:
         """Return the velocity of the tool that the program asks for at present [m/s, rad/s]."""
         target = _target(self._access.latest())
         return self._speed(target.q, target.qd)
+
+    @costs(50)
+    def tool_pose(self) -> Pose:
+        """Return `get_target_tcp_pose`: PolyScope's name for the feature Tool, where a program uses one."""
+        return self.get_target_tcp_pose()
+
+    @costs(50)
+    def get_target_tcp_pose_along_path(self) -> Pose:
+        """Return `get_target_tcp_pose`, since nothing offsets the path."""
+        return self.get_target_tcp_pose()
+
+    @costs(50)
+    def get_target_tcp_speed_along_path(self) -> Array:
+        """Return `get_target_tcp_speed`, since nothing offsets the path."""
+        return self.get_target_tcp_speed()
 
     @costs(50)
     def get_actual_tool_flange_pose(self) -> Pose:
@@ -140,9 +169,34 @@ class StateFunctions:
         """Return whether the target has been at rest for 500 ms."""
         return self._access.steadiness.steady
 
+    def get_tool_current(self) -> float:
+        """Return the current of the tool's supply [A]: 0, since nothing draws any."""
+        return 0.0
+
     def get_tool_accelerometer_reading(self) -> Array:
         """Return what the accelerometer in the flange measures, gravity included [m/s^2]."""
         return a_list(self._access.latest().actual_tool_accelerometer)
+
+    @costs(300)
+    def get_rtde_value(self, key: object) -> Value:
+        """Return an output variable of RTDE, as it was in the last tick.
+
+        Raises:
+            Fault: There is none of this name, or only clients get it, since it is integrated over all ticks.
+        """
+        name = text("key", key)
+        if name in INTEGRATED:
+            raise Fault(f'get_rtde_value: only clients get "{name}", which is integrated over time')
+        if self._instruments is None:
+            self._instruments = Instruments(self._access.description)
+        snapshot = self._instruments.snapshot(self._access.latest(), self._access.io())
+        try:
+            value = getattr(snapshot, name) if name in VARIABLES else snapshot.register(name)
+        except AttributeError:
+            raise Fault(f'get_rtde_value: RTDE has no output "{name[:60]}"') from None
+        if isinstance(value, list):
+            return a_list([whole(one) if type(one) is int else float(one) for one in value])
+        return whole(value) if type(value) is int else value
 
     @costs(4)
     def get_actual_joint_positions_history(self, steps: object = 0) -> Array:

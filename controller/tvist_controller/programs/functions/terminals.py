@@ -106,9 +106,15 @@ class TerminalFunctions:
         self._arm.then(lambda: self._terminals.choose_output(place, voltage=voltage))
 
     def set_analog_inputrange(self, port: object, range: object) -> None:
-        """Make an analogue input a current (0) or a voltage (1 to 3, all of 0 to 10 V)."""
-        place, voltage = integer("port", port, 0, 1), integer("range", range, 0, 3) > 0
-        self._arm.then(lambda: self._terminals.choose_input(place, voltage=voltage))
+        """Make ports 0 and 1 a voltage by ranges 0 and 2; those of the tool, 2 and 3, by 0 and 1, or a current by 2."""
+        place = integer("port", port, 0, 3)
+        which = integer("range", range, 0, 2)
+        if place > 1:
+            self._arm.then(lambda: self._terminals.choose_tool_input(place - 2, voltage=which < 2))
+        elif which == 1:
+            raise Fault("range is 1: a range from -5 to 5 V exists no more, so it must be 0 or 2")
+        else:
+            self._arm.then(lambda: self._terminals.choose_input(place, voltage=True))
 
     def set_standard_analog_input_domain(self, port: object, domain: object) -> None:
         """Make an analogue input a current (0) or a voltage (1)."""

@@ -25,6 +25,7 @@ _SAFETY = Struct(">iiBII")
 _PLACE = Struct(">ii")
 _KEY = Struct(">iiB")
 _POPUP = Struct(">IB???B")
+_NUMBER = Struct(">i")
 _VERSION = Struct(">BBii")
 
 
@@ -32,6 +33,7 @@ class MessageKind(IntEnum):
     """UR's numbers of the robot messages that are sent here."""
 
     TEXT = 0
+    LABEL = 1
     POPUP = 2
     VERSION = 3
     SAFETY_MODE = 5
@@ -66,6 +68,11 @@ def version(major: int, minor: int, bugfix: int, build: int, date: str) -> bytes
 def text(time: int, what: str) -> bytes:
     """Encode a line for the log."""
     return _message(time, MessageKind.TEXT, _text(what))
+
+
+def label(time: int, number: int, name: str) -> bytes:
+    """Encode the line of the program tree that a program has come to, by its number and its name."""
+    return _message(time, MessageKind.LABEL, _NUMBER.pack(number) + _text(name))
 
 
 def key(time: int, title: str, what: str) -> bytes:

@@ -10,6 +10,7 @@ from tvist_protocol.io import Io
 from tvist_protocol.programs import (
     Interpreter,
     ProgramClosePopup,
+    ProgramLabel,
     ProgramLoad,
     ProgramPause,
     ProgramPlay,
@@ -64,6 +65,8 @@ class Programs:
         self.state: ProgramState = "STOPPED"
         self.interpreter = Interpreter()
         """Statements of the interpreter mode, with those that were accepted since the robot has told of them."""
+        self._label: ProgramLabel | None = None
+        """Label that the clients were told last."""
         self._control: ControllerAccess | None = None
         """Access of the client that plays the program. It lasts as long as the program, even after the client
         disconnects.
@@ -230,6 +233,11 @@ class Programs:
         if io.program is not None and io.program != self.name:
             self.path = _path_of(io.program)
         self._become(io.program_state)
+        if io.program_label != self._label:
+            self._label = io.program_label
+            if self._label is not None:
+                stamp = messages.stamp(self._host.latest)
+                self._host.tell(messages.label(stamp, self._label.number, self._label.name))
         self.interpreter = io.interpreter or Interpreter()
 
     def event(self, event: Event) -> None:

@@ -144,5 +144,7 @@ class Intake:
 
 
 def _code(line: str) -> str:
-    """The line without comments, the contents of strings, and surrounding space."""
+    """The line without comments, the contents of strings, and surrounding space; nothing of a label."""
+    if line.lstrip().startswith("$"):  # its name may contain quotes, and words that open blocks
+        return ""
     return _STRING.sub('""', line).partition("#")[0].strip()

@@ -1,0 +1,233 @@
+"""Programs as PolyScope and others write them: the set-up before the program, what is not simulated, run states."""
+
+import pytest
+
+from tvist_controller.instruments.snapshot import Instruments
+from tvist_controller.programs.checking import check_program
+from tvist_protocol.programs import ProgramPause, ProgramPlay
+from tvist_protocol.replies import Done
+
+from .robots import UR5E
+from .scripts import URSIM, a_robot, failure, finish, playing, run, said, start
+
+PREAMBLE = """
+set_standard_analog_input_domain(0, 1)
+set_tool_analog_input_domain(0, 0)
+set_tool_analog_input_domain(1, 1)
+set_analog_outputdomain(0, 0)
+set_input_actions_to_default()
+set_standard_digital_input_action(7, "default")
+set_configurable_digital_input_action(7, "default")
+set_tool_digital_input_action(1, "default")
+set_gp_boolean_input_action(127, "default")
+set_tool_communication(False, 115200, 0, 1, 1.5, 3.5)
+set_tool_output_mode(1)
+set_tool_digital_output_mode(0, 2)
+set_tool_digital_output_mode(1, 3)
+set_tool_voltage(24)
+set_gravity([0.0, 0.0, 9.82])
+set_base_acceleration([0, 0, 0])
+set_safety_mode_transition_hardness(1)
+position_deviation_warning(False)
+reset_revolution_counter(qNear=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+high_holding_torque_enable()
+high_holding_torque_disable()
+global Plane_1 = p[0.1, 0.2, 0.3, 0.0, 0.0, 1.57]
+""".strip().splitlines()
+
+
+def warnings(robot):
+    return [event.why for event in robot.events if event.kind == "warning"]
+
+
+def test_a_preamble_is_accepted_and_what_it_sets_shows_in_rtde():
+    robot = run(
+        a_robot(),
+        *PREAMBLE,
+        '$ 1 "Robot Program"',
+        "textmsg([get_gravity(), get_base_acceleration(), get_tool_current()])",
+    )
+    assert failure(robot) is None
+    assert warnings(robot) == []
+    assert said(robot) == ["[[0, 0, 9.82], [0, 0, 0], 0]"]
+    snapshot = Instruments(UR5E).snapshot(robot.states[-1], robot.controller.io())
+    assert (snapshot.tool_analog_input_types, snapshot.tool_output_mode) == (2, 1)
+    assert (snapshot.tool_digital_output0_mode, snapshot.tool_digital_output1_mode) == (2, 3)
+
+
+def test_the_older_call_for_ranges_of_inputs_knows_those_of_the_tool():
+    robot = run(
+        a_robot(),
+        *[f"set_analog_inputrange({port}, {which})" for port, which in ((0, 0), (1, 2), (2, 2), (3, 0))],
+    )
+    io = robot.controller.io()
+    assert failure(robot) is None
+    assert (io.analog_io_types & 3, io.tool_analog_input_types) == (3, 2)
+    assert "must be 0 or 2" in failure(run(robot, "set_analog_inputrange(0, 1)")).why
+
+
+@pytest.mark.parametrize(
+    ("call", "why"),
+    [
+        ("set_tool_analog_input_domain(2, 0)", "port is 2: it must be from 0 to 1"),
+        ("set_tool_output_mode(2)", "mode is 2: it must be from 0 to 1"),
+        ("set_tool_digital_output_mode(0, 0)", "mode is 0: it must be from 1 to 3"),
+        ("set_tool_communication(True, 9601, 0, 1, 1.5, 3.5)", "baud_rate is 9601: it must be one of 9600"),
+        ("set_tool_communication(True, 9600, 3, 1, 1.5, 3.5)", "parity is 3"),
+        ("set_tool_communication(True, 9600, 0, 1, 0.5, 3.5)", "rx_idle_chars is 0.5: it must be from 1 to 40"),
+        ('set_gp_boolean_input_action(128, "default")', "port is 128: it must be from 0 to 127"),
+        ('set_standard_digital_input_action(0, "stop")', 'action is stop: it must be "default" or "freedrive"'),
+        ("set_safety_mode_transition_hardness(2)", "type is 2"),
+        ("set_base_acceleration([0.1, 0, 0])", "the simulated arm's base stands"),
+        ("set_runstate_tool_digital_output_to_value(2, 1)", "outputId is 2: it must be from 0 to 1"),
+        ("set_runstate_standard_digital_output_to_value(0, 6)", "whether the arm has power are not simulated"),
+        ("position_deviation_warning(True, 1.5)", "threshold is 1.5"),
+        ("time(2)", "mode is 2; this controller has no clock of the day"),
+        ('modbus_add_signal("1.2.3.4", 255, 0, 0, "x", True)', "does not simulate Modbus"),
+        ("x = struct(a=1)\n  x.go(1)", "go: this controller does not simulate remote procedure calls and Ethernet/IP"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_ends_the_program_with_name_value_and_limit(call, why):
+    assert why in failure(run(a_robot(), call)).why
+
+
+@pytest.mark.parametrize(
+    ("call", "why"),
+    [
+        ("set_tool_communication(True, 115200, 0, 1, 1.5, 3.5)", "no tool is connected"),
+        ('set_tool_digital_input_action(1, "freedrive")', "tool digital input 1 has the action freedrive"),
+        ("position_deviation_warning(True)", "does not warn of deviations"),
+    ],
+)
+def test_what_asks_for_something_that_is_not_there_is_said(call, why):
+    robot = run(a_robot(), call)
+    assert failure(robot) is None
+    assert [why in one for one in warnings(robot)] == [True]
+
+
+def test_time_is_the_robots_and_random_the_same_in_each_run():
+    lines = (
+        "a = time()",
+        "sleep(1.5)",
+        "b = time()",
+        "textmsg(b.sec - a.sec + (b.nanosec - a.nanosec) / 1000000000)",
+    )
+    robot = run(a_robot(), *lines, "textmsg([random(), random()])")
+    again = run(robot, "textmsg([random(), random()])")
+    apart, first, second = said(again)
+    assert (apart, first == second) == ("1.5", True)
+    one, other = map(float, first.strip("[]").split(","))
+    assert 0.0 <= one < 1.0 > other >= 0.0
+    assert one != other
+
+
+def test_variables_of_rtde_are_those_that_clients_get():
+    keys = (
+        "target_q",
+        "runtime_state",
+        "output_int_register_7",
+        "output_bit_register_64",
+        "tcp_offset",
+        "payload",
+    )
+    robot = a_robot()
+    start(robot, "write_output_integer_register(7, -9)", "write_output_boolean_register(64, True)", "sync()",
+          *(f'textmsg(get_rtde_value("{key}"))' for key in keys))  # fmt: skip
+    finish(robot)
+    assert failure(robot) is None
+    q, *others = said(robot)
+    assert [float(one) for one in q.strip("[]").split(", ")] == pytest.approx(URSIM, abs=1e-6)
+    assert others == ["2", "-9", "True", "[0, 0, 0, 0, 0, 0]", "5"]
+
+
+@pytest.mark.parametrize("key", ["joint_temperatures", "state", "_kept", "output_int_register_48"])
+def test_a_variable_that_programs_do_not_get_is_refused_by_its_name(key):
+    assert f'"{key}"' in failure(run(a_robot(), f'x = get_rtde_value("{key}")')).why
+
+
+def test_a_check_names_all_that_is_missing_at_once():
+    text = """
+def library():
+  h = rpc_factory("xmlrpc", "http://127.0.0.1:8080")
+  x = h.weigh(modbus_get_error("a")).mass
+end
+def other():
+  write_port_bit(3, nowhere)
+  get_conveyor_tick_count()
+end
+"""
+    found = [(one.line, one.column, one.level, one.text.partition(":")[0]) for one in check_program(text)]
+    assert found == [
+        (3, 7, "warning", "rpc_factory"),
+        (4, 9, "warning", "weigh"),
+        (4, 15, "warning", "modbus_get_error"),
+        (7, 3, "warning", "write_port_bit"),
+        (7, 21, "error", "compile_error_name_not_found"),
+        (8, 3, "warning", "get_conveyor_tick_count"),
+    ]
+
+
+def test_a_library_is_checked_with_a_warning_that_it_does_nothing():
+    library = "def a(x):\n  return b(x)\nend\ndef b(x):\n  return x\nend\n"
+    assert [(one.level, one.text) for one in check_program(library)] == [
+        ("warning", "the text only defines functions: as a program, it ends at once")
+    ]
+    assert check_program(library + "a(1)\n") == []
+
+
+def outputs(robot):
+    io = robot.controller.io()
+    return [bool(io.actual_digital_output_bits >> bit & 1) for bit in (0, 1, 2, 11, 17)]
+
+
+CHOICES = [
+    "set_runstate_standard_digital_output_to_value(0, 1)",
+    "set_runstate_standard_digital_output_to_value(1, 2)",
+    "set_runstate_standard_digital_output_to_value(2, 3)",
+    "set_runstate_configurable_digital_output_to_value(3, 4)",
+    "set_runstate_tool_digital_output_to_value(1, 5)",
+    "set_runstate_standard_analog_output_to_value(1, 3)",
+    "set_runstate_gp_boolean_output_to_value(100, 3)",
+    "set_standard_digital_out(0, True)",
+    "set_configurable_digital_out(3, True)",
+]
+
+
+def test_outputs_show_whether_the_program_runs_is_paused_or_has_ended():
+    robot = a_robot()
+    assert start(robot, *CHOICES, "sleep(1)") == Done()
+    robot.tick(3)
+    assert outputs(robot) == [True, False, True, True, True]
+    assert robot.controller.io().standard_analog_output[1] == 0.02
+    assert robot.controller.io().output_bit_register[3] == 1 << 4
+    robot.send(ProgramPause)
+    assert outputs(robot) == [False, True, False, True, True]
+    robot.send(ProgramPlay)
+    assert outputs(robot) == [False, True, True, True, True]
+    finish(robot)
+    assert outputs(robot) == [False, True, False, True, True]
+    assert robot.controller.io().standard_analog_output[1] == 0.004
+    assert robot.controller.io().output_bit_register[3] == 0
+
+
+@pytest.mark.parametrize("how", ["error", "protective stop"])
+def test_an_error_or_a_stop_shows_at_the_outputs_that_tell_of_it(how):
+    robot = a_robot()
+    assert (
+        start(robot, *CHOICES, "sleep(0.01)", "x = [][0]" if how == "error" else "protective_stop()")
+        == Done()
+    )
+    finish(robot)
+    assert outputs(robot) == [False, True, False, False, False]
+
+
+def test_outputs_are_left_alone_once_their_choice_is_taken_back():
+    robot = run(a_robot(), *CHOICES, *[one.replace(", 3)", ", 0)") for one in CHOICES if ", 3)" in one])
+    assert outputs(robot)[2] is True
+
+
+def test_powerdown_ends_the_program_and_the_power():
+    robot = run(a_robot(), "powerdown()", "textmsg(1)")
+    robot.tick(5)
+    assert (said(robot), playing(robot)) == ([], False)
+    assert robot.states[-1].robot_mode == 3
