@@ -21,7 +21,7 @@ from .robots import Q1, UR5E, Robot
 BITS18 = st.integers(0, 2**18 - 1)
 
 
-NO_PROGRAM = SimpleNamespace(name=None, state="STOPPED", line=0, watched=[], interpreter=None)
+NO_PROGRAM = SimpleNamespace(name=None, state="STOPPED", line=0, label=None, watched=[], interpreter=None)
 
 
 def bare():

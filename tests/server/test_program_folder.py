@@ -108,10 +108,11 @@ def expression(*parts):
 
 COUNT = "../../../../../../SpecialSequence/children/Assignment/variable"
 TREE = f"""<?xml version='1.0'?><URProgram><children>
-<SpecialSequence type='BeforeStart'><children>
+<InitVariablesNode><variables><variable name='place'>{expression("p[1,2,3,0,0,0]")}</variable></variables>
+</InitVariablesNode><SpecialSequence type='BeforeStart'><children>
   <Assignment valueSource='Expression'><variable name='count'/>{expression("1")}</Assignment>
 </children></SpecialSequence>
-<MainProgram runOnlyOnce='true'><children>
+<MainProgram runOnlyOnce='true' InitVariablesNode='true'><children>
   <Comment comment='nothing'/><SuppressedNode><suppressedNode class='Halt'/></SuppressedNode>
   <Loop type='While' checkContinuously='false'>
     {expression(f"<ExpressionVariable><ProgramVariable reference='{COUNT}'/></ExpressionVariable>", "≠3")}
@@ -138,7 +139,7 @@ TREE = f"""<?xml version='1.0'?><URProgram><children>
 def test_nodes_of_a_program_tree_become_lines_with_labels(folder):
     (folder.path / "tree.urp").write_text(TREE, encoding="utf-8")
     assert folder.read("tree.urp").split("\n") == [
-        "def tree():", "thread Thread_1():", "while True:", "sleep(0.5)", "end", "end",
+        "def tree():", "global place = p[1,2,3,0,0,0]", "thread Thread_1():", "while True:", "sleep(0.5)", "end", "end",
         '$ 1 "count"', "global count = 1", "run Thread_1()",
         "while count!=3:", '$ 2 "count"', "global count = count+1", "end",
         "if count== 3 :", '$ 3 "Way "1""', "movej([-1.5, -1.6, -2.2, -0.8, 1.6, 0], a=2, v=1.5)",
@@ -146,9 +147,7 @@ def test_nodes_of_a_program_tree_become_lines_with_labels(folder):
         "else:", '$ 5 "Popup"', 'popup("no", blocking=True)', "halt", "end",
         '$ 6 "Halt"', "halt", "end", "",
     ]  # fmt: skip
-    assert [one.text for one in check_program(folder.read("tree.urp"))] == [
-        "compile_error_name_not_found:place:"
-    ]
+    assert check_program(folder.read("tree.urp")) == []
 
 
 @pytest.mark.parametrize(

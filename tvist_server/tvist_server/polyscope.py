@@ -34,6 +34,8 @@ def script_of(name: str, data: bytes) -> str:
     nodes, root = Nodes(tree), tree.find("./children")
     assert root is not None, "the main program was found in it"
     lines: list[str] = []
+    if main.get("InitVariablesNode") == "true":
+        lines += nodes.values(root.findall("./InitVariablesNode/variables/variable"))
     for thread in root.findall("./Thread"):
         title = _name(thread.get("name") or "thread")
         body = "\n".join(nodes.lines(thread.findall("./children/*")))
@@ -42,8 +44,6 @@ def script_of(name: str, data: bytes) -> str:
         lines += nodes.lines(before.findall("./children/*"))
     lines += [f"run {_name(thread.get('name') or 'thread')}()" for thread in root.findall("./Thread")]
     body = "\n".join(nodes.lines(main.findall("./children/*")))
-    if main.get("InitVariablesNode") == "true":
-        nodes.missing.append("InitVariables")
     if nodes.missing:
         found = ", ".join(dict.fromkeys(nodes.missing))
         raise PolyscopeError(

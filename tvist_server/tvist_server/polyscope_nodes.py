@@ -42,6 +42,11 @@ class Nodes:
         for place, node in enumerate(nodes):
             yield from self._node(node, nodes[place + 1 : place + 2])
 
+    def values(self, variables: list[ET.Element]) -> Iterator[str]:
+        """Translate the values that variables have first."""
+        for variable in variables:
+            yield f"global {self._variable(variable)} = {self._expression(variable)}"
+
     def _node(self, node: ET.Element, after: list[ET.Element]) -> Iterator[str]:  # noqa: C901, PLR0912  one a kind
         kind = node.tag.lower(), node.get("type")
         match kind:
