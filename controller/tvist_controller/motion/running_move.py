@@ -8,6 +8,7 @@ import numpy as np
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import STILL
 from tvist_controller.line.limits import acceleration_on_way, rate_of
+from tvist_controller.planning.course import Course
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.trajectory import PlannedMotion
 
@@ -46,6 +47,7 @@ class RunningMove:
         self._window, self._peak = planned.window, planned.peak
         self._room, self._surplus = planned.room, planned.surplus
         self._held = False
+        self._course = planned.course
         self._parts = len(planned.parts)
         self._trajectory, *coming = planned.parts
         self.coming: tuple[PlannedMotion, ...] = tuple(coming)
@@ -58,6 +60,26 @@ class RunningMove:
         self.coming, self._held = tuple(coming), False
         self._trajectory.speed = self._rate(speed, slowest)
         self._begin()
+
+    @property
+    def course(self) -> tuple[Course | None, float]:
+        """What it may go on from, and its time [s]; None if it is not on the last of its parts, or cannot go on."""
+        return None if self.coming else self._course, self._trajectory.time
+
+    def extend(self, planned: PlannedMove, speed: float, slowest: float | None) -> None:
+        """Go on to further parts of the path.
+
+        Args:
+            planned: Their plan. Its first part is the present one, which is the same until now and for some ticks more.
+            speed: See `RunningMotion`.
+            slowest: See `RunningMotion`.
+        """
+        longer, *coming = planned.parts
+        self._trajectory.go_on(longer)
+        self._velocity, self._window, self._peak = planned.velocity, planned.window, planned.peak
+        self._course, self.coming, self._parts = planned.course, tuple(coming), self._parts + len(coming)
+        self._cycle.line.filter.limits = self._trajectory.limits
+        self.pace(speed, slowest)
 
     def _begin(self) -> None:
         self._cycle.begin(self._trajectory)

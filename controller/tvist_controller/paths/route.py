@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -59,22 +60,46 @@ class _Cut:
     """Way of the tool; None if the joints' way is the blend."""
 
 
-def runs_of(legs: Sequence[Leg], tracker: Tracker) -> tuple[list[Run], list[str]]:
+@dataclass(frozen=True)
+class Branch:
+    """Place of a run behind which further legs may change it."""
+
+    s: float
+    """Length of the run up to there [m]."""
+    legs: tuple[Leg, ...]
+    """The legs from there on."""
+    begun: float
+    """Length of the first of them that lies before the place [m]."""
+    q: Floats
+    """Joint positions there, shape (n,) [rad]."""
+
+
+class Route(NamedTuple):
+    """A path, divided into runs."""
+
+    runs: list[Run]
+    skipped: list[str]
+    """A sentence for each blend that is left out."""
+    branches: tuple[Branch, ...]
+    """Places at which its last run may go on otherwise than to the end of the last leg, in their order."""
+
+
+def route_of(legs: Sequence[Leg], tracker: Tracker, begun: float = 0.0, here: Floats | None = None) -> Route:
     """Divide a path into runs.
 
     Args:
         legs: The path.
         tracker: Kinematics of the arm.
-
-    Returns:
-        The runs, and a sentence for each blend that is left out.
+        begun: Length of the first leg that lies before the path [m].
+        here: Joint positions at the start, shape (n,) [rad]; None for those of the first leg.
 
     Raises:
         WayError: The joints cannot follow the path; beside a singular posture two ways lead on from it.
     """
-    runs, skipped, begun = [Run()], list[str](), 0.0
+    runs, skipped, branches = [Run()], list[str](), list[Branch]()
     cut: _Cut | None
-    here = legs[0].q if legs else np.empty(0)
+    if here is None:
+        here = legs[0].q if legs else np.empty(0)
     for number, leg in enumerate(legs):
         cut, length = None, leg.way.length
         if leg.blend > 0.0 and number + 1 < len(legs):
@@ -86,23 +111,32 @@ def runs_of(legs: Sequence[Leg], tracker: Tracker) -> tuple[list[Run], list[str]
             else:
                 cut = found
         end = length - (0.0 if cut is None else cut.before)
+        if number == len(legs) - 1:
+            branches.append(Branch(length_of(runs[-1]), (leg,), begun, here))
         if end - begun > 1e-9 * length:
             runs[-1].append(_rest_of(leg, begun, end, here, tracker))
             here = runs[-1][-1].knots.q[-1]
-        if cut is not None:
-            cut = _from(here, cut, tracker)
-            here = cut.piece.knots.q[-1]
         if cut is None:
-            runs.append(Run())
+            if number < len(legs) - 1:
+                runs.append(Run())
             begun = 0.0
-        else:
-            runs[-1].append(cut.piece)
-            begun = cut.after
+            continue
+        if number == len(legs) - 2:
+            branches.append(Branch(length_of(runs[-1]), tuple(legs[number:]), end, here))
+        cut = _from(here, cut, tracker)
+        here = cut.piece.knots.q[-1]
+        runs[-1].append(cut.piece)
+        begun = cut.after
     for run in runs:
         for one, other in pairwise(run):
             if np.abs(one.knots.q[-1] - other.knots.q[0]).max() > SAME:
                 raise WayError(0.0, tracker.pose(one.knots.q[-1]), one.knots.q[-1])
-    return [run for run in runs if run], skipped
+    return Route([run for run in runs if run], skipped, tuple(branches))
+
+
+def length_of(run: Run) -> float:
+    """Length of a run [m]."""
+    return sum(float(piece.knots.s[-1]) for piece in run)
 
 
 def _from(q: Floats, cut: _Cut, tracker: Tracker) -> _Cut:

@@ -1,6 +1,7 @@
 """Planning of motions of the tool and of paths of several parts."""
 
-from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,30 +10,23 @@ from tvist_controller.foresight.collision import CLEARANCE
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
-from tvist_controller.paths.pacing import JointLimits, fastest, joined, law_of, timed
-from tvist_controller.paths.poses import Placement, placement
-from tvist_controller.paths.route import Piece, Run, runs_of
-from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolLine, ToolWay
+from tvist_controller.paths.pacing import Ground, JointLimits, fastest, going_on, ground_of, joined, law_of
+from tvist_controller.paths.route import Piece, Route, Run, length_of, route_of
+from tvist_controller.paths.tool_curves import PER_RADIAN, ToolLine
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.basis import MotionBasis
+from tvist_controller.planning.course import Course
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitted, Slower
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove, limited
+from tvist_controller.planning.path_legs import PathLegs
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.setup import Setup
-from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, at_least, quickest_motion
-from tvist_controller.trajectory.spline import Knots, SplineCurve
+from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Way, at_least, quickest_motion
+from tvist_controller.trajectory.retiming import RetimedLaw
+from tvist_controller.trajectory.spline import SplineCurve
 from tvist_plant.plant import PERIOD
-from tvist_protocol.motions import (
-    ArcSegment,
-    JointSegment,
-    LineSegment,
-    MoveC,
-    MoveL,
-    MovePath,
-    ProcessSegment,
-    Segment,
-)
+from tvist_protocol.motions import MoveC, MoveL, MovePath
 from tvist_shaping.base import Filter
 
 POSTURES = 9
@@ -61,7 +55,7 @@ class PathPlanner:
         self, setup: Setup, filters: FilterPlanner, moves: MovePlanner, reachable: Reachable
     ) -> None:
         self._description, self._filters, self._moves = setup.description, filters, moves
-        self._reachable = reachable
+        self._reachable, self._legs = reachable, PathLegs(setup.description, reachable)
 
     def rehearse(self) -> None:
         """Compile what plans use, before any is needed."""
@@ -72,113 +66,130 @@ class PathPlanner:
         run = [Piece(JointWay(q, q + 0.1).part(0.0, 0.1 * PER_RADIAN), Pacing(1.0, 1.0), None, True, "")]
         limits = self._description.limits
         joints = JointLimits(np.array(limits.velocity), np.array(limits.acceleration), min(limits.jerk))
-        law_of(run, SplineCurve(joined(run)), joints, 60.0, LEAST_WINDOW)
+        curve = SplineCurve(joined(run))
+        law_of(run, curve, ground_of(run, curve), joints, 60.0, LEAST_WINDOW)
 
-    def plan(self, command: MoveL | MoveC | MovePath, basis: MotionBasis) -> PlannedMove:
-        """Plan a motion from rest; the command's content has been checked.
+    def plan(self, command: MoveL | MoveC | MovePath, basis: MotionBasis) -> PlannedMove | None:
+        """Plan a motion from rest, or the rest of one that goes on; the command's content has been checked.
+
+        Returns:
+            None if the running motion cannot go on any more, since its end is too near.
 
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
         """
         tracker = Tracker(self._description, basis.tcp)
-        legs = list(self._legs(command, tracker, basis))
-        try:
-            runs, skipped = runs_of(legs, tracker)
-        except WayError as error:
-            raise self._reachable.refusal(error, "segments", 1.0, legs[-1].corner, basis.tcp) from error
-        if not runs:
-            runs = [[]]
-        length = sum(map(_length, runs))
+        legs = list(self._legs.of(command, tracker, basis))
+        count = len(command.segments) if isinstance(command, MovePath) else 1
+        if basis.after is not None:
+            return self._further(command.jerk, legs, count, tracker, basis)
+        route = self._route(legs, tracker, basis)
+        runs = route.runs or [[]]
+        length = sum(map(length_of, runs))
         tvist, done, motions = self._filters.present(basis.filter), 0.0, list[PlannedMotion]()
         window, velocity, told = 0.0, 0.0, None
         for run in runs:
-            fitted, delay, highest = self._motion(run, command.jerk, tvist, basis)
-            motion, told = fitted.motion, told or limited(fitted)
-            velocity = max(velocity, highest)
-            self._check_clear(motion, run, (done, length), basis)
-            motions.append(motion)
-            window = max(window, delay)
-            done += _length(run)
+            found = self._motion(run, command.jerk, tvist, basis)
+            told = told or limited(found.fitted)
+            velocity = max(velocity, found.velocity)
+            self._check_clear(found.fitted.motion.path.whole, run, (done, length), basis)
+            motions.append(found.fitted.motion)
+            window = max(window, found.delay)
+            done += length_of(run)
         return PlannedMove(
             tuple(motions),
             velocity,
             told,
-            tuple(skipped),
+            tuple(route.skipped),
             window,
-            marks_of(runs, len(command.segments) if isinstance(command, MovePath) else 1),
+            marks_of(runs, range(count)),
             tvist.peak,
+            course=_course(found, runs[-1], route, count),
         )
 
-    # ------------------------------------------------------------------ geometry
-
-    def _legs(self, command: MoveL | MoveC | MovePath, tracker: Tracker, basis: MotionBasis) -> Iterator[Leg]:
-        frame, q = placement(command.frame), basis.q
-        for segment, where in _segments(command):
-            start = tracker.pose(q)
-            way: ToolWay | JointWay
-            match segment:
-                case JointSegment():
-                    way = JointWay(q, np.array(segment.q, dtype=float))
-                case ArcSegment():
-                    via = frame @ placement(segment.via)
-                    end = frame @ placement(segment.pose)
-                    way = self._arc(start, via.position, end, segment, where)
-                case _:
-                    way = ToolLine(start, frame @ placement(segment.pose))
-            if way.length < SHORTEST:
-                continue
-            knots = self._along(way, q, tracker, where, basis)
-            q = way.end if isinstance(way, JointWay) else knots.q[-1]
-            pacing = timed(_pacing(segment), way.length)
-            yield Leg(way, knots, tracker.pose(q), pacing, segment.blend, where)
-
-    @staticmethod
-    def _arc(start: Placement, via: Floats, end: Placement, segment: ArcSegment, where: str) -> ToolArc:
+    def _route(
+        self,
+        legs: list[Leg],
+        tracker: Tracker,
+        basis: MotionBasis,
+        begun: float = 0.0,
+        q: Floats | None = None,
+    ) -> Route:
         try:
-            return ToolArc(start, via, end, tangent=segment.orientation == "tangent")
-        except ValueError as error:
-            field = f"{where}.via".removeprefix(".")
-            why = f"{field}: no arc leads from the present position through it to pose: {error}"
-            raise RefusalError("out_of_range", field, why) from error
-
-    def _along(
-        self, way: ToolWay | JointWay, q: Floats, tracker: Tracker, where: str, basis: MotionBasis
-    ) -> Knots:
-        """The joints' way along a leg, which is within their range."""
-        if isinstance(way, JointWay):
-            return way.part(0.0, way.length)
-        field = f"{where}.pose".removeprefix(".")
-        try:
-            knots = tracker.follow(way, q)
+            return route_of(legs, tracker, begun, q)
         except WayError as error:
-            goal, share = way.at(way.length).pose, error.s / way.length
-            raise self._reachable.refusal(error, field, share, goal, basis.tcp) from error
-        self._check_range(knots.s / way.length, knots.q, field)
-        return knots
+            raise self._reachable.refusal(error, "segments", 1.0, legs[-1].corner, basis.tcp) from error
 
-    def _check_range(self, shares: Floats, q: Floats, field: str) -> None:
-        most = np.array(self._description.limits.position)
-        beyond = np.abs(q) > most
-        if not beyond.any():
-            return
-        first = int(np.flatnonzero(beyond.any(axis=1))[0])
-        joint = int(np.flatnonzero(beyond[first])[0])
-        name = self._description.robot.joints[joint]
-        why = (
-            f"{field}: joint {name} would be at {q[first, joint]:.3f} rad after {100.0 * shares[first]:.0f} % of the "
-            f"way; it goes to ±{most[joint]:g}"
+    def _further(
+        self, jerk: float, legs: list[Leg], count: int, tracker: Tracker, basis: MotionBasis
+    ) -> PlannedMove | None:
+        """Plan the rest of a motion that goes on to further legs; None if its end is too near."""
+        before, tvist = basis.after, self._filters.present(basis.filter)
+        assert before is not None
+        found = before.branch(basis.until)
+        if found is None:
+            return None
+        cuts, branch = found
+        route = self._route([*branch.legs, *legs], tracker, basis, branch.begun, branch.q)
+        run, *coming = route.runs
+        if len(branch.legs) + len(legs) > 1 and cuts.branch == cuts.known and coming:
+            return None  # the arm is so near the end that no blend fits
+        acceleration = np.array(self._description.limits.acceleration) * (1.0 - basis.excess)
+        knots = joined(run, before.knots(cuts))
+        self._legs.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
+        curve = SplineCurve(knots, acceleration)
+        ground = before.ground.then(cuts.first, cuts.branch, ground_of(run, curve, branch.s))
+        delay = max(self._delay(curve, tvist), before.window)
+        joints = self._joints(acceleration, tvist)
+
+        def make(slower: Slower) -> PlannedMotion:
+            law = going_on(
+                before.law,
+                (cuts.first, cuts.known - cuts.first),
+                ground,
+                curve,
+                joints,
+                jerk,
+                delay,
+                slower.rate,
+            )
+            if law is None:
+                raise _TooLateError
+            return self._planned(curve, law, 1.0)
+
+        try:
+            fitted = self._moves.fitter.fit(make, basis, None)
+        except _TooLateError:
+            return None
+        self._check_clear(curve.way(np.array([branch.s]), curve.end), run, (0.0, length_of(run)), basis)
+        motion = _Motion(fitted, delay, fastest(fitted.motion.law, curve), ground)
+        motions, highest, window = [fitted.motion], motion.velocity, delay
+        for further in coming:
+            motion = self._motion(further, jerk, tvist, basis)
+            self._check_clear(motion.fitted.motion.path.whole, further, (0.0, length_of(further)), basis)
+            motions.append(motion.fitted.motion)
+            highest, window = max(highest, motion.velocity), max(window, motion.delay)
+        last = before.segments - 1
+        return PlannedMove(
+            tuple(motions),
+            highest,
+            limited(fitted),
+            tuple(route.skipped),
+            window,
+            marks_of(route.runs, range(last, last + 1 + count), branch.s),
+            tvist.peak,
+            course=_course(
+                motion, route.runs[-1], route, before.segments + count, 0.0 if coming else branch.s
+            ),
         )
-        raise RefusalError("limit_position", field, why, float(most[joint]))
 
-    def _check_clear(
-        self, motion: PlannedMotion, run: Run, part: tuple[float, float], basis: MotionBasis
-    ) -> None:
-        """Refuse a motion that something is in the way of; `part` is its start on the whole path and that's length."""
-        found = self._moves.meeting(motion, basis)
+    def _check_clear(self, way: Way, run: Run, part: tuple[float, float], basis: MotionBasis) -> None:
+        """Refuse a way that something is in the way of; `part` is its start on the whole path and that's length."""
+        found = self._moves.meeting(way, basis)
         if found is None:
             return
         share, meeting = found
-        covered, where = share * _length(run), _field(run[-1].where)
+        covered, where = share * length_of(run), _field(run[-1].where)
         for piece, end in zip(run, np.cumsum([piece.knots.s[-1] for piece in run]), strict=True):
             if end >= covered:
                 where = _field(piece.where)
@@ -189,80 +200,87 @@ class PathPlanner:
 
     # ------------------------------------------------------------------ time
 
-    def _motion(
-        self, run: Run, jerk: float, tvist: Filter, basis: MotionBasis
-    ) -> tuple[Fitted, float, float]:
-        """A motion, the delay of the shaper on it [s], and the largest velocity of any joint [rad/s]."""
-        limits, spared = self._description.limits, 1.0 - basis.excess
+    def _motion(self, run: Run, jerk: float, tvist: Filter, basis: MotionBasis) -> "_Motion":
+        """A motion from rest along a run."""
         if not run:  # the arm is there already
             still = JointLine(basis.q, basis.q)
             motion = quickest_motion(still, arm_limits(self._description), PERIOD, basis.speed)
-            return Fitted(motion), 0.0, 0.0
+            return _Motion(Fitted(motion), 0.0, 0.0, None)
         knots = joined(run)
-        self._check_range(knots.s / knots.s[-1], knots.q, run[0].where)
-        acceleration = np.array(limits.acceleration) * spared
+        self._legs.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
+        acceleration = np.array(self._description.limits.acceleration) * (1.0 - basis.excess)
         curve = SplineCurve(knots, acceleration)
-        delay = self._delay(curve, tvist)
-        peak = tvist.peak
-        joints = JointLimits(
-            SPARED * np.array(limits.velocity) / peak, SPARED * acceleration / peak**2, min(limits.jerk)
-        )
-        law = law_of(run, curve, joints, jerk, delay)
+        delay, ground = self._delay(curve, tvist), ground_of(run, curve)
+        law = law_of(run, curve, ground, self._joints(acceleration, tvist), jerk, delay)
         highest = fastest(law, curve)
         rate = rate_of(basis.speed, highest, basis.slowest)
 
         def make(slower: Slower) -> PlannedMotion:
-            kept = law.slowed(law.duration / slower.rate)
-            return PlannedMotion(
-                curve, kept, PERIOD, rate, at_least(kept.limits, AGILE.acceleration, AGILE.jerk)
-            )
+            return self._planned(curve, law.slowed(law.duration / slower.rate), rate)
 
         fitted = self._moves.fitter.fit(make, basis, lambda: self._filters.present(basis.filter))
-        return fitted, delay, highest * fitted.slower.rate
+        return _Motion(fitted, delay, highest * fitted.slower.rate, ground)
+
+    def _joints(self, acceleration: Floats, tvist: Filter) -> JointLimits:
+        limits, peak = self._description.limits, tvist.peak
+        return JointLimits(
+            SPARED * np.array(limits.velocity) / peak, SPARED * acceleration / peak**2, min(limits.jerk)
+        )
+
+    @staticmethod
+    def _planned(curve: SplineCurve, law: RetimedLaw, rate: float) -> PlannedMotion:
+        agility = at_least(law.limits, AGILE.acceleration, AGILE.jerk)
+        return PlannedMotion(curve, law, PERIOD, rate, agility)
 
     @staticmethod
     def _delay(curve: SplineCurve, tvist: Filter) -> float:
         """Longest delay of a shaper on a curve [s]."""
         found = []
-        for s in np.linspace(0.0, float(curve.end[0]), POSTURES):
+        for s in np.linspace(float(curve.start[0]), float(curve.end[0]), POSTURES):
             tvist.reset(curve.posture(np.array([s])))
             found.append(tvist.delay)
         return max(VARIATION * max(found), LEAST_WINDOW)
 
 
-def _segments(command: MoveL | MoveC | MovePath) -> Iterator[tuple[Segment, str]]:
-    match command:
-        case MoveL():
-            yield (
-                LineSegment(
-                    pose=command.pose,
-                    velocity=command.velocity,
-                    acceleration=command.acceleration,
-                    duration=command.duration,
-                ),
-                "",
-            )
-        case MoveC():
-            yield (
-                ArcSegment(
-                    via=command.via,
-                    pose=command.pose,
-                    orientation=command.orientation,
-                    velocity=command.velocity,
-                    acceleration=command.acceleration,
-                ),
-                "",
-            )
-        case MovePath():
-            for number, segment in enumerate(command.segments):
-                yield segment, f"segments[{number}]"
+class _TooLateError(Exception):
+    """Raised if a running motion cannot go on within the limits any more."""
 
 
-def marks_of(runs: list[Run], segments: int) -> tuple[tuple[int, float], ...]:
-    """Where the blend at the end of each segment begins, see `PlannedMove.marks`."""
+class _Motion(NamedTuple):
+    """A motion along a run."""
+
+    fitted: Fitted
+    delay: float
+    """Delay of the shaper on it [s]."""
+    velocity: float
+    """Largest velocity of any joint [rad/s]."""
+    ground: Ground | None
+    """What limits it; None if nothing moves."""
+
+
+def _course(motion: _Motion, run: Run, route: Route, segments: int, start: float = 0.0) -> Course | None:
+    """What a motion may go on from; `start` is where its run begins on its curve [m]."""
+    path, law = motion.fitted.motion.path, motion.fitted.motion.law
+    durations = any(piece.pacing.duration is not None for piece in run)
+    if motion.ground is None or durations or not isinstance(path, SplineCurve):
+        return None
+    assert isinstance(law, RetimedLaw)
+    branches = tuple(replace(branch, s=start + branch.s) for branch in route.branches)
+    return Course(path, motion.ground, law, branches, segments, motion.delay)
+
+
+def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tuple[int, float], ...]:
+    """Where the blend at the end of each segment begins, see `PlannedMove.marks`.
+
+    Args:
+        runs: The path.
+        segments: Numbers of the segments.
+        start: Length of the first part at which its run begins [m].
+    """
     marks = dict[int, tuple[int, float]]()
     for part, run in enumerate(runs):
-        ends = np.cumsum([piece.knots.s[-1] for piece in run]).tolist()
+        lengths = [piece.knots.s[-1] for piece in run]
+        ends = ((0.0 if part else start) + np.cumsum(lengths)).tolist()
         for number, piece in enumerate(run):
             # On the way to another segment, the last piece of one is its blend.
             last = run[-1].where == piece.where
@@ -270,25 +288,11 @@ def marks_of(runs: list[Run], segments: int) -> tuple[tuple[int, float], ...]:
                 part,
                 ends[number] if last else ends[number] - float(piece.knots.s[-1]),
             )
-    found, here = [], (0, 0.0)
-    for segment in range(segments):
+    found, here = [], (0, start)
+    for segment in segments:
         here = marks.get(segment, here)
         found.append(here)
     return tuple(found)
-
-
-def _pacing(segment: Segment) -> Pacing:
-    match segment:
-        case JointSegment():
-            return Pacing(PER_RADIAN * segment.velocity, PER_RADIAN * segment.acceleration, segment.duration)
-        case LineSegment():
-            return Pacing(segment.velocity, segment.acceleration, segment.duration)
-        case ProcessSegment() | ArcSegment():
-            return Pacing(segment.velocity, segment.acceleration, even=True)
-
-
-def _length(run: Run) -> float:
-    return sum(float(piece.knots.s[-1]) for piece in run)
 
 
 def _number(where: str) -> int:
