@@ -11,7 +11,7 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
 from tvist_controller.paths.pacing import Ground, JointLimits, fastest, going_on, ground_of, joined, law_of
-from tvist_controller.paths.route import Piece, Route, Run, length_of, route_of
+from tvist_controller.paths.route import Branch, Piece, Route, Run, length_of, route_of
 from tvist_controller.paths.tool_curves import PER_RADIAN, ToolLine
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.basis import MotionBasis
@@ -108,15 +108,10 @@ class PathPlanner:
         )
 
     def _route(
-        self,
-        legs: list[Leg],
-        tracker: Tracker,
-        basis: MotionBasis,
-        begun: float = 0.0,
-        q: Floats | None = None,
+        self, legs: list[Leg], tracker: Tracker, basis: MotionBasis, start: Branch | None = None
     ) -> Route:
         try:
-            return route_of(legs, tracker, begun, q)
+            return route_of(legs, tracker, start)
         except WayError as error:
             raise self._reachable.refusal(error, "segments", 1.0, legs[-1].corner, basis.tcp) from error
 
@@ -130,7 +125,7 @@ class PathPlanner:
         if found is None:
             return None
         cuts, branch = found
-        route = self._route([*branch.legs, *legs], tracker, basis, branch.begun, branch.q)
+        route = self._route([*branch.legs, *legs], tracker, basis, branch)
         run, *coming = route.runs
         if len(branch.legs) + len(legs) > 1 and cuts.branch == cuts.known and coming:
             return None  # the arm is so near the end that no blend fits
@@ -162,7 +157,9 @@ class PathPlanner:
         except _TooLateError:
             return None
         self._check_clear(curve.way(np.array([branch.s]), curve.end), run, (0.0, length_of(run)), basis)
-        motion = _Motion(fitted, delay, fastest(fitted.motion.law, curve), ground)
+        law = fitted.motion.law
+        assert isinstance(law, RetimedLaw)
+        motion = _Motion(fitted, delay, fastest(law, curve), ground)
         motions, highest, window = [fitted.motion], motion.velocity, delay
         for further in coming:
             motion = self._motion(further, jerk, tvist, basis)

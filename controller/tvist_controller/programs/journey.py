@@ -22,12 +22,14 @@ DELAY, DELAY_PER_PART = 10, 4
 """Ticks from the call of a move along a line or path to its start, and ticks more for each further part of a path:
 time to plan it beside the ticks. They do not depend on how long planning takes, so equal programs move alike.
 """
-FURTHER, FURTHER_PER_PART = 12, 2
+FURTHER, FURTHER_PER_PART = 12, 1
 """Ticks from the order of a plan by which the running motion goes on to further moves until it does so, and ticks more
 for each of them.
 """
 MAX_PARTS = 50
-"""Number of moves that are planned at once. As many wait at most: then the program waits, too."""
+"""Number of moves that are planned at once from rest. As many wait at most: then the program waits, too."""
+MAX_FURTHER = 25
+"""Number of moves to which a running motion goes on at once."""
 AHEAD = 150
 """Number of moves ahead of the arm from which on no further ones are planned."""
 SPARE = 4
@@ -196,7 +198,7 @@ class Journey:
         if self._further is not None and not self._take():
             return
         under_way = len(self._marks)
-        legs = self.legs[under_way : under_way + MAX_PARTS]
+        legs = self.legs[under_way : under_way + MAX_FURTHER]
         if not legs or under_way >= AHEAD or self._ends or self.legs[under_way - 1].blend == 0.0:
             return
         ticks = FURTHER + FURTHER_PER_PART * len(legs)

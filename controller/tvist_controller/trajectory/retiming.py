@@ -26,8 +26,6 @@ LEAST = 1e-9
 """Smallest value that is divided by."""
 ROUNDING = 1e-9
 """Share by which rounding may exceed a limit [-]."""
-GENTLER = 4
-"""How often a motion that goes on is planned with less acceleration, since its ramp is given."""
 AT_REST: Floats = np.zeros(1)
 """What is known of ṡ² of a motion from rest."""
 SHORTLY = 1e-9
@@ -127,6 +125,40 @@ def widened(
             for row in range(rows):
                 if (values[other, row] < out[number, row]) == lowest:
                     out[number, row] = values[other, row]
+    return out
+
+
+@compiled
+def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragma: no cover  compiled
+    """Let a motion go on evenly for a ramp between speeding up and braking, so that its jerk is not twice that of both.
+
+    Args:
+        edges: Ends of the cells, shape (c + 1,).
+        b: ṡ² there, shape (c + 1,).
+        ramp: The ramp [s].
+        known: Number of the edge up to which the motion stays as it is; if it brakes there, it first goes on evenly.
+    """
+    out, last = b.copy(), len(b) - 1
+    number = known + 1
+    if known > 0 and b[known] < b[known - 1]:
+        way = np.sqrt(b[known]) * ramp
+        while number < last and edges[number] - edges[known] < way:
+            out[number] = min(out[number], b[known])
+            number += 1
+    for top in range(known + 1, last):
+        if out[top] < out[top - 1] or out[top] <= out[top + 1]:
+            continue
+        low, high = top - 1, top + 1  # the last of the highest edges, which need not be one
+        while edges[high] - edges[low] < np.sqrt(max(out[low], out[high])) * ramp:
+            if low > known and (out[low] >= out[high] or high == last):
+                low -= 1
+            elif high < last:
+                high += 1
+            else:
+                break
+        most = max(out[low], out[high])
+        for number in range(low + 1, high):
+            out[number] = min(out[number], most)
     return out
 
 
@@ -265,25 +297,16 @@ def longer_law(
         None if it cannot keep the limits from there on.
     """
     fixed, ramp, start = before.b[first : first + known + 1], before.ramp, float(before.times[first])
-    share = 1.0
-    for _ in range(GENTLER):
-        # The ramp being given, it is the acceleration that has to keep the jerk.
-        joints = replace(
-            way.joints, p=np.maximum(way.joints.p, way.slope[:, None] / (share * way.jerk * ramp))
-        )
-        tool = replace(way.tool, p=np.maximum(way.tool.p, 1.0 / (share * jerk * ramp)))
-        gentle = replace(way, joints=joints, tool=tool)
-        b = _passed(way.edges, joints, tool, fixed)
-        if b[0] >= 0.0:
-            b = _lastingly(gentle, b, ramp, window, fixed)
-        if b[0] < 0.0:
-            return None
-        law = RetimedLaw(way.edges, b, ramp, before.rate, start)
-        most = law.jerk_from(float(law.times[known]))
-        if most <= jerk * (1.0 + 1e-6):
-            return law
-        share *= jerk / most
-    return law
+    # The ramp being given, it is the acceleration that has to keep the jerk.
+    joints = replace(way.joints, p=np.maximum(way.joints.p, way.slope[:, None] / (way.jerk * ramp)))
+    tool = replace(way.tool, p=np.maximum(way.tool.p, 1.0 / (jerk * ramp)))
+    way = replace(way, joints=joints, tool=tool)
+    b = _passed(way.edges, joints, tool, fixed)
+    if b[0] >= 0.0:
+        b = _lastingly(way, b, ramp, window, fixed)
+    if b[0] < 0.0:
+        return None
+    return RetimedLaw(way.edges, level(way.edges, b, ramp, known), ramp, before.rate, start)
 
 
 def _lastingly(way: Way, b: Floats, ramp: float, window: float, known: Floats) -> Floats:
