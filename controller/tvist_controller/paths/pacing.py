@@ -157,11 +157,16 @@ class Ground(NamedTuple):
     third: Floats
     """Bound of |d³q/ds³| of any joint, shape (c,) [rad/m^3]."""
 
-    def then(self, first: int, last: int, further: "Ground") -> "Ground":
-        """Return the part between two edges, and behind it what limits further pieces."""
+    def then(self, first: int, last: int, run: Run, curve: SplineCurve) -> "Ground":
+        """Return what limits a run behind the part between two edges, and that part, on a curve."""
+        further = ground_of(run, curve, float(self.places[last]))
         places = np.concatenate((self.places[first : last + 1], further.places[1:]))
         pairs = zip(self[1:], further[1:], strict=True)
-        return Ground(places, *(np.concatenate((own[first:last], other)) for own, other in pairs))
+        ground = Ground(places, *(np.concatenate((own[first:last], other)) for own, other in pairs))
+        if last > first:  # a spline's third derivative at a knot is that behind it, which is another one now
+            looks = _looks(self.places[last - 1 : last + 1])
+            ground.third[last - first - 1] = _largest(np.abs(curve.third(looks))).max()
+        return ground
 
     def way(self, limits: JointLimits, hurry: float) -> Way:
         """Return the limits of the motion that is faster than asked for by a factor."""

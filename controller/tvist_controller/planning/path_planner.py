@@ -133,7 +133,7 @@ class PathPlanner:
         knots = joined(run, before.knots(cuts))
         self._legs.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
         curve = SplineCurve(knots, acceleration)
-        ground = before.ground.then(cuts.first, cuts.branch, ground_of(run, curve, branch.s))
+        ground = before.ground.then(cuts.first, cuts.branch, run, curve)
         delay = max(self._delay(curve, tvist), before.window)
         joints = self._joints(acceleration, tvist)
 
