@@ -56,7 +56,14 @@ def joined(run: Run, before: Knots | None = None) -> Knots:
 
 
 def law_of(
-    run: Run, curve: SplineCurve, ground: "Ground", limits: JointLimits, jerk: float, window: float
+    run: Run,
+    curve: SplineCurve,
+    ground: "Ground",
+    limits: JointLimits,
+    jerk: float,
+    window: float,
+    *,
+    goes_on: bool = False,
 ) -> RetimedLaw:
     """Return the quickest time law of a run, or the one of the duration that was asked for.
 
@@ -67,11 +74,12 @@ def law_of(
         limits: Limits of the joints.
         jerk: Largest jerk along the path [m/s^3].
         window: Time over which the shaper mixes moments of the motion [s].
+        goes_on: Whether others may continue it.
     """
     asked = [piece.pacing.duration for piece in run]
     if all(asked):
         jerk = FASTEST * limits.jerk  # durations leave the jerk to the joints
-    law = quickest_law(ground.way(limits, 1.0), jerk, window)
+    law = quickest_law(ground.way(limits, 1.0), jerk, window, goes_on=goes_on)
     if all(asked):
         wanted, hurry = sum({piece.where: piece.pacing.duration or 0.0 for piece in run}.values()), 1.0
         while law.duration > wanted * (1.0 + CLOSE) and hurry < FASTEST:

@@ -89,7 +89,8 @@ class PathPlanner:
         tvist, done, motions = self._filters.present(basis.filter), 0.0, list[PlannedMotion]()
         window, velocity, told = 0.0, 0.0, None
         for run in runs:
-            found = self._motion(run, command.jerk, tvist, basis)
+            goes_on = run is runs[-1] and bool(legs) and legs[-1].blend > 0.0
+            found = self._motion(run, command.jerk, tvist, basis, goes_on=goes_on)
             told = told or limited(found.fitted)
             velocity = max(velocity, found.velocity)
             self._check_clear(found.fitted.motion.path.whole, run, (done, length), basis)
@@ -197,7 +198,9 @@ class PathPlanner:
 
     # ------------------------------------------------------------------ time
 
-    def _motion(self, run: Run, jerk: float, tvist: Filter, basis: MotionBasis) -> "_Motion":
+    def _motion(
+        self, run: Run, jerk: float, tvist: Filter, basis: MotionBasis, *, goes_on: bool = False
+    ) -> "_Motion":
         """A motion from rest along a run."""
         if not run:  # the arm is there already
             still = JointLine(basis.q, basis.q)
@@ -208,7 +211,7 @@ class PathPlanner:
         acceleration = np.array(self._description.limits.acceleration) * (1.0 - basis.excess)
         curve = SplineCurve(knots, acceleration)
         delay, ground = self._delay(curve, tvist), ground_of(run, curve)
-        law = law_of(run, curve, ground, self._joints(acceleration, tvist), jerk, delay)
+        law = law_of(run, curve, ground, self._joints(acceleration, tvist), jerk, delay, goes_on=goes_on)
         highest = fastest(law, curve)
         rate = rate_of(basis.speed, highest, basis.slowest)
 

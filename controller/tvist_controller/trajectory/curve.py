@@ -51,7 +51,7 @@ class Curve(Path):
 
     def __init__(self, end: float, bends: Bends, most: Floats | None = None, *, start: float = 0.0) -> None:
         if not start < end < np.inf:
-            raise ValueError(f"end is {end}: must be more than {start}")
+            raise ValueError(f"length is {end - start}: must be more than 0")
         if not 0.0 < float(bends.slope.max()) < np.inf:
             raise ValueError(f"slope is {bends.slope.tolist()}: must be finite, and of one joint more than 0")
         if not (0.0 <= bends.second < np.inf and 0.0 <= bends.third < np.inf):

@@ -24,6 +24,8 @@ shaped tool exceeds its acceleration in a bend by a hundredth. The whole window 
 """
 LEAST = 1e-9
 """Smallest value that is divided by."""
+ROUNDS = 3
+"""How often limits that last for a window of time are put on a motion, an odd number."""
 ROUNDING = 1e-9
 """Share by which rounding may exceed a limit [-]."""
 AT_REST: Floats = np.zeros(1)
@@ -71,8 +73,7 @@ def passes(
         highest: Largest b in each cell, shape (c,).
         p: See `Cells`.
         q: See `Cells`.
-        known: Values of b at the first edges, which stay as they are, shape (k,): only a 0 for a motion from rest. If
-            no motion goes on from the last of them within the limits, the first value that is returned is -1.
+        known: Values of b at the first edges, which stay as they are, shape (k,): only a 0 for a motion from rest.
     """
     count, rows = p.shape
     begun = len(known)
@@ -86,12 +87,6 @@ def passes(
             share = p[number, row] / twice
             if share + q[number, row] > 0.0:
                 b[number] = min(b[number], (1.0 + share * b[number + 1]) / (share + q[number, row]))
-    twice = 2.0 * (edges[begun] - edges[begun - 1])
-    for row in range(rows):
-        share = p[begun - 1, row] / twice
-        if b[begun - 1] * (share + q[begun - 1, row]) > (1.0 + share * b[begun]) * (1.0 + ROUNDING):
-            b[0] = -1.0
-            return b
     for number in range(begun - 1, count):
         twice = 2.0 * (edges[number + 1] - edges[number])
         for row in range(rows):
@@ -261,18 +256,23 @@ def arrivals(edges: Floats, b: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(2.0 * np.diff(edges) / (speeds[:-1] + speeds[1:]))))
 
 
-def quickest_law(way: Way, jerk: float, window: float) -> RetimedLaw:
+def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False) -> RetimedLaw:
     """Return the quickest law within the limits along a curve.
 
     Args:
         way: The limits.
         jerk: Jerk limit of s [1/s^3].
         window: Time over which a shaper mixes moments of the motion [s].
+        goes_on: Whether others may continue it, with its ramp.
     """
     lengths = np.diff(way.edges)
     b = _passed(way.edges, way.joints, way.tool, AT_REST)
     accelerations = np.abs(0.5 * np.diff(b) / lengths)
     ramp = float(max(accelerations.max() / jerk, (way.slope * accelerations).max() / way.jerk))
+    if goes_on:
+        return RetimedLaw(
+            way.edges, level(way.edges, _lastingly(way, b, ramp, window, AT_REST), ramp, 0), ramp
+        )
     law = RetimedLaw(way.edges, _lastingly(way, b, ramp, window, AT_REST), ramp)
     if law.limits.jerk > jerk * (1.0 + 1e-6):  # it changes from speeding up to braking within a ramp
         ramp *= law.limits.jerk / jerk
@@ -301,19 +301,24 @@ def longer_law(
     joints = replace(way.joints, p=np.maximum(way.joints.p, way.slope[:, None] / (way.jerk * ramp)))
     tool = replace(way.tool, p=np.maximum(way.tool.p, 1.0 / (jerk * ramp)))
     way = replace(way, joints=joints, tool=tool)
-    b = _passed(way.edges, joints, tool, fixed)
-    if b[0] >= 0.0:
-        b = _lastingly(way, b, ramp, window, fixed)
-    if b[0] < 0.0:
-        return None
-    return RetimedLaw(way.edges, level(way.edges, b, ramp, known), ramp, before.rate, start)
+    b = _lastingly(way, _passed(way.edges, joints, tool, fixed), ramp, window, fixed)
+    b = level(way.edges, b, ramp, known)
+    return RetimedLaw(way.edges, b, ramp, before.rate, start) if _goes_on(way, b, known) else None
 
 
 def _lastingly(way: Way, b: Floats, ramp: float, window: float, known: Floats) -> Floats:
-    """Largest ṡ² at the edges within the limits that hold within a window of time; b is that without a window."""
-    times, around = arrivals(way.edges, b), window + ramp
-    joints, tool = _lasting(way.joints, times, around), _lasting(way.tool, times, TOOL_SHARE * around)
-    return _passed(way.edges, joints, tool, known)
+    """Largest ṡ² at the edges within the limits that hold within a window of time; b is that without a window.
+
+    The faster a motion is, the farther it comes within the window, and the longer limits hold on its way. So a motion
+    that is planned on the times of a faster one is too slow; one on the times of that, too fast; and one on the times
+    of the latter is between both, so that it keeps the limits that hold on its own times.
+    """
+    around = window + ramp
+    for _ in range(ROUNDS):
+        times = arrivals(way.edges, b)
+        joints, tool = _lasting(way.joints, times, around), _lasting(way.tool, times, TOOL_SHARE * around)
+        b = _passed(way.edges, joints, tool, known)
+    return b
 
 
 def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
@@ -322,6 +327,16 @@ def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
         widened(times, window, cells.fastest[:, None], True)[:, 0],
         widened(times, window, cells.p, False),
         widened(times, window, cells.q, False),
+    )
+
+
+def _goes_on(way: Way, b: Floats, known: int) -> bool:
+    """Return whether a motion keeps the limits in the cell behind an edge, though it is given up to there."""
+    cell = slice(known, known + 1)
+    acceleration = 0.5 * (b[known + 1] - b[known]) / (way.edges[known + 1] - way.edges[known])
+    return all(
+        bool((cells.p[cell] * abs(acceleration) + cells.q[cell] * b[known] <= 1.0 + ROUNDING).all())
+        for cells in (way.joints, way.tool)
     )
 
 
