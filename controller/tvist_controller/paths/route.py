@@ -245,8 +245,10 @@ def _blend(
         state if meeting is None else state._replace(second=meeting.bend)
         for state, meeting in zip((leg.way.at(start), then.way.at(after)), meets, strict=True)
     )
-    share = _rounding(leg, first, last, drawn_out=meets != (None, None))
-    curve = evenly(ToolBlend(first, last, leg.corner.rotation, share * (before + after)))
+    drawn_out = meets != (None, None)
+    share = _rounding(leg, first, last, drawn_out=drawn_out)
+    blend = ToolBlend(first, last, leg.corner.rotation, share * (before + after))
+    curve = blend if drawn_out else evenly(blend)  # one that is drawn out is even by itself
     if meets[0] is None:
         q, _, _ = _joints(leg, start, tracker, from_end=True)
     return Piece(tracker.follow(curve, q), pacing, None if pacing.even else curve, False, leg.where), curve

@@ -27,10 +27,13 @@ from tvist_controller.trajectory.retiming import RetimedLaw
 from tvist_controller.trajectory.spline import SplineCurve
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import MoveC, MoveL, MovePath
+from tvist_protocol.replies import Code
 from tvist_shaping.base import Filter
 
 POSTURES = 9
 """Number of postures of a run at which the shaper's delay is looked up."""
+LOOKS = 1000
+"""Number of places of a run at which the one is sought that is hardest for a joint."""
 SPARED = 0.99
 """Share of the joints' limits that paths use: a shaper whose weights vary may exceed its reference a little [-]."""
 LEAST_WINDOW = 0.08
@@ -91,7 +94,7 @@ class PathPlanner:
         for run in runs:
             goes_on = run is runs[-1] and bool(legs) and legs[-1].blend > 0.0
             found = self._motion(run, command.jerk, tvist, basis, goes_on=goes_on)
-            told = told or limited(found.fitted)
+            told = told or _told(found.fitted, run)
             velocity = max(velocity, found.velocity)
             self._check_clear(found.fitted.motion.path.whole, run, (done, length), basis)
             motions.append(found.fitted.motion)
@@ -171,7 +174,7 @@ class PathPlanner:
         return PlannedMove(
             tuple(motions),
             highest,
-            limited(fitted),
+            _told(fitted, run, branch.s),
             tuple(route.skipped),
             window,
             marks_of(route.runs, range(last, last + 1 + count), branch.s),
@@ -240,6 +243,18 @@ class PathPlanner:
             tvist.reset(curve.posture(np.array([s])))
             found.append(tvist.delay)
         return max(VARIATION * max(found), LEAST_WINDOW)
+
+
+def _told(fitted: Fitted, run: Run, start: float = 0.0) -> tuple[Code, str] | None:
+    """Say what made a motion slower, and on which part of a path; `start` is where its run begins on its curve [m]."""
+    told, need, path = limited(fitted), fitted.need, fitted.motion.path
+    if told is None or need is None or not isinstance(path, SplineCurve) or not run[0].where:
+        return told
+    s = np.linspace(start, float(path.end[0]), LOOKS)
+    at = float(s[int(np.argmin(np.abs(path.derivatives(s)[0] - need.q).max(axis=1)))])
+    ends = start + np.cumsum([piece.knots.s[-1] for piece in run])
+    piece = run[min(int(np.searchsorted(ends, at)), len(run) - 1)]
+    return told[0], f"{told[1]}: on {piece.where}, {at:.3f} m from the start of this part of the path"
 
 
 class _TooLateError(Exception):
