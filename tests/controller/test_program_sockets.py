@@ -406,7 +406,7 @@ def test_a_target_that_comes_soon_is_waited_for_and_one_that_comes_on_the_way_is
 def test_a_target_that_comes_when_the_arm_has_stopped_begins_another_motion():
     robot, far = opened(*MOVES)
     far.tell("received", ints(1))
-    robot.tick(400)
+    robot.tick(600)
     assert motions(robot) == 1
     assert far.sent == ints(0)
     far.tell("received", ints(1, 1))
