@@ -63,22 +63,28 @@ class RunningMove:
 
     @property
     def course(self) -> tuple[Course | None, float]:
-        """What it may go on from, and its time [s]; None if it is not on the last of its parts, or cannot go on."""
-        return None if self.coming else self._course, self._trajectory.time
+        """What its last part may go on from, and the time of that part, 0 before it begins [s]; None if it cannot."""
+        return self._course, 0.0 if self.coming else self._trajectory.time
 
     def extend(self, planned: PlannedMove, speed: float, slowest: float | None) -> None:
         """Go on to further parts of the path.
 
         Args:
-            planned: Their plan. Its first part is the present one, which is the same until now and for some ticks more.
+            planned: Their plan. Its first part is the last one so far, which is the same until now and some ticks more.
             speed: See `RunningMotion`.
             slowest: See `RunningMotion`.
         """
         longer, *coming = planned.parts
-        self._trajectory.go_on(longer)
-        self._velocity, self._window, self._peak = planned.velocity, planned.window, planned.peak
-        self._course, self.coming, self._parts = planned.course, tuple(coming), self._parts + len(coming)
-        self._cycle.line.filter.limits = self._trajectory.limits
+        if self.coming:
+            self.coming = (*self.coming[:-1], longer, *coming)
+            self._velocity = max(self._velocity, planned.velocity)
+            self._window = min(self._window, planned.window)
+        else:
+            self._trajectory.go_on(longer)
+            self._cycle.line.filter.limits = self._trajectory.limits
+            self._velocity, self._window, self.coming = planned.velocity, planned.window, tuple(coming)
+        self._peak, self._course = planned.peak, planned.course
+        self._parts += len(coming)
         self.pace(speed, slowest)
 
     def _begin(self) -> None:

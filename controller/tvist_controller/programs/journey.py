@@ -218,8 +218,7 @@ class Journey:
         if not isinstance(plan.found, PlannedMove):  # the moves begin anew where the motion ends
             self._ends, self._refuses = True, plan.found is not None
             return False
-        assert self._motion.motions.progress is not None
-        part = self._motion.motions.progress[0]
+        part = self._marks[-1][0]
         self._motion.motions.extend(plan.found)
         self._marks[-1:] = [(part + number, place) for number, place in plan.found.marks]
         self._count += count

@@ -144,16 +144,19 @@ def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragm
         if out[top] < out[top - 1] or out[top] <= out[top + 1]:
             continue
         low, high = top - 1, top + 1  # the last of the highest edges, which need not be one
-        while edges[high] - edges[low] < np.sqrt(max(out[low], out[high])) * ramp:
+        most = max(out[low], out[high])
+        while most > 0.0 and edges[high] - edges[low] < np.sqrt(most) * ramp:
             if low > known and (out[low] >= out[high] or high == last):
                 low -= 1
             elif high < last:
                 high += 1
             else:
                 break
-        most = max(out[low], out[high])
+            if max(out[low], out[high]) <= 0.0:  # it is as short as a ramp
+                break
+            most = max(out[low], out[high])
         for number in range(low + 1, high):
-            out[number] = min(out[number], most)
+            out[number] = min(out[number], most) if most > 0.0 else out[number]
     return out
 
 
@@ -269,11 +272,8 @@ def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False)
     b = _passed(way.edges, way.joints, way.tool, AT_REST)
     accelerations = np.abs(0.5 * np.diff(b) / lengths)
     ramp = float(max(accelerations.max() / jerk, (way.slope * accelerations).max() / way.jerk))
-    if goes_on:
-        return RetimedLaw(
-            way.edges, level(way.edges, _lastingly(way, b, ramp, window, AT_REST), ramp, 0), ramp
-        )
-    law = RetimedLaw(way.edges, _lastingly(way, b, ramp, window, AT_REST), ramp)
+    b = _lastingly(way, b, ramp, window, AT_REST)
+    law = RetimedLaw(way.edges, level(way.edges, b, ramp, 0) if goes_on else b, ramp)
     if law.limits.jerk > jerk * (1.0 + 1e-6):  # it changes from speeding up to braking within a ramp
         ramp *= law.limits.jerk / jerk
         law = RetimedLaw(way.edges, _lastingly(way, b, ramp, window, AT_REST), ramp)
