@@ -77,7 +77,7 @@ class Controller(WholeRobot):
         planner = Planner(setup)
         self._next_timeout = -math.inf
         """Time at which something may time out next [s]."""
-        self.plans = Plans(planner, lambda: self.basis, order)
+        self.plans = Plans(planner, self._basis, order)
         """The way to plans."""
         first = planner.filters.first()
         self.cycle = ControlCycle(
@@ -144,9 +144,14 @@ class Controller(WholeRobot):
     @property
     def basis(self) -> PlanBasis:
         """The present state that plans for commands depend on."""
-        on = self.filters.basis
-        tool = ToolBasis(self.motion.tcp, self.cycle.sample.reference)
-        return PlanBasis(on, self.motion.basis(on), tool, self.programs.statements.basis)
+        return self._basis()
+
+    def _basis(self, time: float | None = None) -> PlanBasis:
+        """The same; for a time, that of a path that goes on from the running motion, see `Plans`."""
+        on, motion = self.filters.basis, self.motion
+        tool = ToolBasis(motion.tcp, self.cycle.sample.reference)
+        moves = motion.basis(on) if time is None else motion.further_basis(on, time)
+        return PlanBasis(on, moves, tool, self.programs.statements.basis)
 
     def receive(
         self,

@@ -71,7 +71,7 @@ def there_and_back(limits: MotionLimits, way=(1.4, -1.0, 0.8, -0.5, 0.3, 2.0), d
     def at(time):
         time = max(time, 0.0) % cycle
         motion, since = (go, time) if time < turn else (back, time - turn)
-        return motion._law.at(min(since, motion.duration))[0]
+        return motion.law.at(min(since, motion.duration))[0]
 
     return lambda times: np.array([at(time) for time in times])
 

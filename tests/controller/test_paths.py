@@ -343,7 +343,7 @@ def test_any_duration_is_planned_within_a_moment(duration):
     )
     assert isinstance(robot.send(MovePath, segments=segments), Accepted)
     assert isinstance(begun().send(MoveL, pose=away((0.1, 0.0, 0.0)), duration=duration), Accepted)
-    law = robot.controller.cycle.trajectory._law
+    law = robot.controller.cycle.trajectory.law
     assert len(law.moments) < 5000
 
 

@@ -402,7 +402,7 @@ def test_moves_whose_targets_have_arrived_are_one_path_and_what_is_sent_between_
     assert far.sent == ints(0, 1, 2)
 
 
-def test_a_target_that_comes_soon_is_waited_for_and_one_that_does_not_lets_the_moves_before_it_start():
+def test_a_target_that_comes_soon_is_waited_for_and_one_that_comes_on_the_way_is_blended_too():
     robot, far = opened(*MOVES)
     far.tell("received", ints(1))
     robot.tick(20)
@@ -412,6 +412,18 @@ def test_a_target_that_comes_soon_is_waited_for_and_one_that_does_not_lets_the_m
     robot.tick(60)
     assert motions(robot) == 1
     far.tell("received", ints(1))
+    finish(robot)
+    assert motions(robot) == 1
+    assert far.sent == ints(0, 1, 2)
+
+
+def test_a_target_that_comes_when_the_arm_has_stopped_begins_another_motion():
+    robot, far = opened(*MOVES)
+    far.tell("received", ints(1))
+    robot.tick(600)
+    assert motions(robot) == 1
+    assert far.sent == ints(0)
+    far.tell("received", ints(1, 1))
     finish(robot)
     assert motions(robot) == 2
     assert far.sent == ints(0, 1, 2)

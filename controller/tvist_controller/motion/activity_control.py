@@ -6,6 +6,7 @@
 from typing import Unpack
 
 import numpy as np
+from msgspec.structs import replace
 
 from tvist_controller.commands.events import Emit, Told
 from tvist_controller.commands.refusal import RefusalError, out_of_turn
@@ -14,6 +15,7 @@ from tvist_controller.foresight.rest_of_motion import WayAhead
 from tvist_controller.foresight.stopper import Outlook
 from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import StreamTorqueRoom
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
@@ -96,9 +98,24 @@ class MotionControl:
         """
         if after(self.activity, "move_j") is None:
             return None
+        return self._basis(on, self.cycle.sample.reference)
+
+    def further_basis(self, on: FilterBasis, time: float) -> MotionBasis | None:
+        """What a path depends on that goes on from the running motion; None if that cannot go on.
+
+        Args:
+            on: Basis of the present filter.
+            time: Time in which the running motion stays as it is [s].
+        """
+        course, now = self.motions.course
+        if course is None or self.activity not in {Activity.MOVING, Activity.PAUSED}:
+            return None
+        return replace(self._basis(on, course.end), speed=1.0, slowest=None, after=course, until=now + time)
+
+    def _basis(self, on: FilterBasis, q: Floats) -> MotionBasis:
         cycle = self.cycle
         return MotionBasis(
-            q=cycle.sample.reference,
+            q=q,
             speed=self.motions.wanted_speed,
             slowest=self.motions.slowest,
             excess=cycle.line.filter.tvist.excess,

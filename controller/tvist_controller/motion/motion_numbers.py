@@ -7,6 +7,7 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.limits import REDUCED_SHARE
 from tvist_controller.motion.running_move import RunningMotion, RunningMove
 from tvist_controller.motion.safety_system import SafetySystem
+from tvist_controller.planning.course import Course
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.trajectory import Guided, PlannedMotion
 from tvist_protocol.replies import Code
@@ -47,12 +48,21 @@ class Motions:
     def begin(self, planned: PlannedMove) -> int:
         """Start a planned motion and return its number."""
         number = self._begin(RunningMove(planned, self._cycle))
+        self._warn(planned)
+        return number
+
+    def extend(self, planned: PlannedMove) -> None:
+        """Let the running motion go on to further parts of its path; the plan holds for the present state."""
+        assert isinstance(self._running, RunningMove)
+        self._running.extend(planned, self.wanted_speed, self.slowest)
+        self._warn(planned)
+
+    def _warn(self, planned: PlannedMove) -> None:
         for why in planned.skipped:
-            self._emit("warning", id=number, code="blend_skipped", why=why)
+            self._emit("warning", id=self._started, code="blend_skipped", why=why)
         if planned.limited is not None:
             code, why = planned.limited
-            self._emit("warning", id=number, code=code, why=why)
-        return number
+            self._emit("warning", id=self._started, code=code, why=why)
 
     def guide(self, trajectory: Guided) -> int:
         """Return the number of a guided motion, which is that of its predecessor if there is one."""
@@ -80,6 +90,11 @@ class Motions:
     def coming(self) -> tuple[PlannedMotion, ...]:
         """Parts of the running motion that have not begun."""
         return self._running.coming if isinstance(self._running, RunningMove) else ()
+
+    @property
+    def course(self) -> tuple[Course | None, float]:
+        """What the running motion may go on from, and its time [s]; None if it cannot go on."""
+        return self._running.course if isinstance(self._running, RunningMove) else (None, 0.0)
 
     @property
     def progress(self) -> tuple[int, float] | None:

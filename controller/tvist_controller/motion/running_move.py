@@ -8,6 +8,7 @@ import numpy as np
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import STILL
 from tvist_controller.line.limits import acceleration_on_way, rate_of
+from tvist_controller.planning.course import Course
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.trajectory import PlannedMotion
 
@@ -46,6 +47,7 @@ class RunningMove:
         self._window, self._peak = planned.window, planned.peak
         self._room, self._surplus = planned.room, planned.surplus
         self._held = False
+        self._course = planned.course
         self._parts = len(planned.parts)
         self._trajectory, *coming = planned.parts
         self.coming: tuple[PlannedMotion, ...] = tuple(coming)
@@ -58,6 +60,32 @@ class RunningMove:
         self.coming, self._held = tuple(coming), False
         self._trajectory.speed = self._rate(speed, slowest)
         self._begin()
+
+    @property
+    def course(self) -> tuple[Course | None, float]:
+        """What its last part may go on from, and the time of that part, 0 before it begins [s]; None if it cannot."""
+        return self._course, 0.0 if self.coming else self._trajectory.time
+
+    def extend(self, planned: PlannedMove, speed: float, slowest: float | None) -> None:
+        """Go on to further parts of the path.
+
+        Args:
+            planned: Their plan. Its first part is the last one so far, which is the same until now and some ticks more.
+            speed: See `RunningMotion`.
+            slowest: See `RunningMotion`.
+        """
+        longer, *coming = planned.parts
+        if self.coming:
+            self.coming = (*self.coming[:-1], longer, *coming)
+            self._velocity = max(self._velocity, planned.velocity)
+            self._window = min(self._window, planned.window)
+        else:
+            self._trajectory.go_on(longer)
+            self._cycle.line.filter.limits = self._trajectory.limits
+            self._velocity, self._window, self.coming = planned.velocity, planned.window, tuple(coming)
+        self._peak, self._course = planned.peak, planned.course
+        self._parts += len(coming)
+        self.pace(speed, slowest)
 
     def _begin(self) -> None:
         self._cycle.begin(self._trajectory)

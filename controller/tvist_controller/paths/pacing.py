@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from tvist_controller.paths.legs import Pacing
 from tvist_controller.paths.route import Piece, Run
 from tvist_controller.paths.tool_curves import PER_RADIAN
 from tvist_controller.trajectory.limits import Floats
-from tvist_controller.trajectory.retiming import Cells, RetimedLaw, Way, quickest_law
+from tvist_controller.trajectory.retiming import Cells, RetimedLaw, Way, longer_law, quickest_law
 from tvist_controller.trajectory.spline import Knots, SplineCurve
 
 FINEST, CELLS = 5e-4, 400
@@ -22,6 +23,8 @@ JOLT_SHARE = 0.3
 """Share of the joints' jerk that each effect of the curve may use [-]."""
 BRIEFEST = 1e-3
 """Shortest duration that is planned for: shorter ones are as impossible [s]."""
+TRIES = 4
+"""How often a motion that goes on is planned more slowly, for the per mille by which limits may be exceeded."""
 MOMENTS = 500
 """Number of moments at which a motion's velocity is looked at."""
 LEAST = 1e-3
@@ -42,9 +45,9 @@ class JointLimits:
     """Smallest of all joints [rad/s^3]."""
 
 
-def joined(run: Run) -> Knots:
-    """Return the knots of a whole run."""
-    first, *rest = (piece.knots for piece in run)
+def joined(run: Run, before: Knots | None = None) -> Knots:
+    """Return the knots of a whole run, or of one that goes on behind others."""
+    first, *rest = ([] if before is None else [before]) + [piece.knots for piece in run]
     s, parts = [first.s], list[tuple[Floats, ...]]([first[1:]])
     for knots in rest:
         s.append(s[-1][-1] + knots.s[1:])
@@ -52,21 +55,31 @@ def joined(run: Run) -> Knots:
     return Knots(np.concatenate(s), *(np.concatenate(values) for values in zip(*parts, strict=True)))
 
 
-def law_of(run: Run, curve: SplineCurve, limits: JointLimits, jerk: float, window: float) -> RetimedLaw:
+def law_of(
+    run: Run,
+    curve: SplineCurve,
+    ground: "Ground",
+    limits: JointLimits,
+    jerk: float,
+    window: float,
+    *,
+    goes_on: bool = False,
+) -> RetimedLaw:
     """Return the quickest time law of a run, or the one of the duration that was asked for.
 
     Args:
         run: The run.
         curve: The joints' way along it.
+        ground: What limits it.
         limits: Limits of the joints.
         jerk: Largest jerk along the path [m/s^3].
         window: Time over which the shaper mixes moments of the motion [s].
+        goes_on: Whether others may continue it.
     """
     asked = [piece.pacing.duration for piece in run]
     if all(asked):
         jerk = FASTEST * limits.jerk  # durations leave the jerk to the joints
-    ground = _ground(run, curve)
-    law = quickest_law(ground.way(limits, 1.0), jerk, window)
+    law = quickest_law(ground.way(limits, 1.0), jerk, window, goes_on=goes_on)
     if all(asked):
         wanted, hurry = sum({piece.where: piece.pacing.duration or 0.0 for piece in run}.values()), 1.0
         while law.duration > wanted * (1.0 + CLOSE) and hurry < FASTEST:
@@ -76,24 +89,65 @@ def law_of(run: Run, curve: SplineCurve, limits: JointLimits, jerk: float, windo
     return _kept(law, curve, limits)
 
 
+def going_on(
+    before: RetimedLaw,
+    edges: tuple[int, int],
+    ground: "Ground",
+    curve: SplineCurve,
+    limits: JointLimits,
+    jerk: float,
+    window: float,
+    slower: float,
+) -> RetimedLaw | None:
+    """Return the quickest law that goes on from another one; see `longer_law`, and `law_of` for the other arguments.
+
+    Args:
+        before: The law before.
+        edges: Number of its edge with which the law begins, and how many edges behind that they are equal.
+        ground: What limits it from that edge on.
+        curve: The joints' way.
+        limits: Limits of the joints.
+        jerk: Largest jerk along the path [m/s^3].
+        window: Time over which the shaper mixes moments of the motion [s].
+        slower: Factor of its speed, at most 1 [-].
+    """
+    first, known = edges
+    for _ in range(TRIES):
+        slowed = JointLimits(
+            limits.velocity * slower, limits.acceleration * slower**2, limits.jerk * slower**3
+        )
+        law = longer_law(ground.way(slowed, slower), jerk, window, before, first, known)
+        if law is None:
+            return None
+        moments = law.moments
+        excess = _excess(law, moments[moments >= law.times[known] / law.rate], curve, limits)
+        if excess <= 1.0:
+            return law
+        slower /= excess * MARGIN
+    return None
+
+
 def _kept(law: RetimedLaw, curve: SplineCurve, limits: JointLimits) -> RetimedLaw:
     """The law, slowed down by the per mille by which limits may be exceeded between the samples of a cell."""
-    s, sd, sdd = law.states(law.moments)
+    return law.slowed(law.duration * max(_excess(law, law.moments, curve, limits), 1.0))
+
+
+def _excess(law: RetimedLaw, moments: Floats, curve: SplineCurve, limits: JointLimits) -> float:
+    """Largest ratio of a speed to the one with which the joints keep their limits, at some moments [-]."""
+    s, sd, sdd = law.states(moments)
     _, slope, second = curve.derivatives(s)
     qd = np.abs(slope * sd[:, None])
     qdd = np.abs(slope * sdd[:, None] + second * (sd**2)[:, None])
-    excess = max(float((qd / limits.velocity).max()), float(np.sqrt((qdd / limits.acceleration).max())))
-    return law.slowed(law.duration * max(excess, 1.0))
+    return max(float((qd / limits.velocity).max()), float(np.sqrt((qdd / limits.acceleration).max())))
 
 
 def fastest(law: RetimedLaw, curve: SplineCurve) -> float:
     """Largest velocity of any joint in a motion at full rate [rad/s]."""
-    s, sd, _ = law.states(np.linspace(0.0, law.duration, MOMENTS))
+    s, sd, _ = law.states(np.linspace(law.begins, law.duration, MOMENTS))
     return float(np.abs(curve.derivatives(s)[1] * sd[:, None]).max())
 
 
-@dataclass(frozen=True)
-class _Ground:
+class Ground(NamedTuple):
     """What limits a run, cell by cell, before it is hurried."""
 
     places: Floats
@@ -110,6 +164,17 @@ class _Ground:
     """Bound of |d²q/ds²|, shape (c, n) [rad/m^2]."""
     third: Floats
     """Bound of |d³q/ds³| of any joint, shape (c,) [rad/m^3]."""
+
+    def then(self, first: int, last: int, run: Run, curve: SplineCurve) -> "Ground":
+        """Return what limits a run behind the part between two edges, and that part, on a curve."""
+        further = ground_of(run, curve, float(self.places[last]))
+        places = np.concatenate((self.places[first : last + 1], further.places[1:]))
+        pairs = zip(self[1:], further[1:], strict=True)
+        ground = Ground(places, *(np.concatenate((own[first:last], other)) for own, other in pairs))
+        if last > first:  # a spline's third derivative at a knot is that behind it, which is another one now
+            looks = _looks(self.places[last - 1 : last + 1])
+            ground.third[last - first - 1] = _largest(np.abs(curve.third(looks))).max()
+        return ground
 
     def way(self, limits: JointLimits, hurry: float) -> Way:
         """Return the limits of the motion that is faster than asked for by a factor."""
@@ -131,15 +196,16 @@ class _Ground:
         )
 
 
-def _ground(run: Run, curve: SplineCurve) -> _Ground:
-    largest = max(float(curve.end[0]) / CELLS, FINEST)
-    starts = np.concatenate(([0.0], np.cumsum([piece.knots.s[-1] for piece in run])))
-    edges, tool = [np.zeros(1)], []
-    for piece, (start, end) in zip(run, pairwise(starts.tolist()), strict=True):
-        count = max(int(np.ceil((end - start) / largest)), 2)
-        places = np.linspace(0.0, end - start, count + 1)
-        edges.append(start + places[1:])
-        along, bent = _joints(curve, start + places) if piece.by_joints else _tool(piece, places)
+def ground_of(run: Run, curve: SplineCurve, start: float = 0.0) -> Ground:
+    """Return what limits a run that begins at a place of a curve [m]."""
+    largest = max((float(curve.end[0]) - start) / CELLS, FINEST)
+    starts = start + np.concatenate(([0.0], np.cumsum([piece.knots.s[-1] for piece in run])))
+    edges, tool = [np.array([start])], []
+    for piece, (here, end) in zip(run, pairwise(starts.tolist()), strict=True):
+        count = max(int(np.ceil((end - here) / largest)), 2)
+        places = np.linspace(0.0, end - here, count + 1)
+        edges.append(here + places[1:])
+        along, bent = _joints(curve, here + places) if piece.by_joints else _tool(piece, places)
         pacing = piece.pacing
         tool.append((pacing.velocity / along, along / pacing.acceleration, bent / pacing.acceleration))
     places = np.concatenate(edges)
@@ -147,7 +213,7 @@ def _ground(run: Run, curve: SplineCurve) -> _Ground:
     slope, second = (_largest(np.abs(values)) for values in curve.derivatives(looks)[1:])
     third = _largest(np.abs(curve.third(looks))).max(axis=1)
     speed, p, q = (np.concatenate(values) for values in zip(*tool, strict=True))
-    return _Ground(places, speed, p, q, slope, second, third)
+    return Ground(places, speed, p, q, slope, second, third)
 
 
 def _tool(piece: Piece, places: Floats) -> tuple[Floats, Floats]:

@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from tvist_controller.paths.by_length import EvenBlend, evenly
+from tvist_controller.paths.fairing import Meeting, meetings
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
 from tvist_controller.paths.tool_curves import ToolBlend, ToolCurve, ToolPart, ToolState
 from tvist_controller.paths.tracking import Tracker, WayError
@@ -59,50 +61,111 @@ class _Cut:
     """Way of the tool; None if the joints' way is the blend."""
 
 
-def runs_of(legs: Sequence[Leg], tracker: Tracker) -> tuple[list[Run], list[str]]:
+@dataclass(frozen=True)
+class Branch:
+    """Place of a run behind which further legs may change it."""
+
+    s: float
+    """Length of the run up to there [m]."""
+    legs: tuple[Leg, ...]
+    """The legs from there on."""
+    begun: float
+    """Length of the first of them that lies before the place [m]."""
+    q: Floats
+    """Joint positions there, shape (n,) [rad]."""
+    bend: Floats | None = None
+    """Curvature with which two blends meet there, see `Meeting`; None if they do not."""
+
+
+class Route(NamedTuple):
+    """A path, divided into runs."""
+
+    runs: list[Run]
+    skipped: list[str]
+    """A sentence for each blend that is left out."""
+    branches: list[Branch]
+    """Places at which its last run may go on otherwise than to the end of the last leg, in their order."""
+
+
+def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None) -> Route:
     """Divide a path into runs.
 
     Args:
         legs: The path.
         tracker: Kinematics of the arm.
-
-    Returns:
-        The runs, and a sentence for each blend that is left out.
+        start: Where the path begins on its first leg; None for that leg's start.
 
     Raises:
         WayError: The joints cannot follow the path; beside a singular posture two ways lead on from it.
     """
-    runs, skipped, begun = [Run()], list[str](), 0.0
-    cut: _Cut | None
-    here = legs[0].q if legs else np.empty(0)
+    route, last = Route([Run()], [], []), len(legs) - 1
+    meets = meetings(legs)
+    here = start
     for number, leg in enumerate(legs):
-        cut, length = None, leg.way.length
-        if leg.blend > 0.0 and number + 1 < len(legs):
-            found = _cut(leg, legs[number + 1], length - begun, tracker)
-            if isinstance(found, str):
-                skipped.append(
-                    f"{leg.where}: the arm stops there, since the blend of {leg.blend:g} m {found}"
-                )
-            else:
-                cut = found
-        end = length - (0.0 if cut is None else cut.before)
-        if end - begun > 1e-9 * length:
-            runs[-1].append(_rest_of(leg, begun, end, here, tracker))
-            here = runs[-1][-1].knots.q[-1]
-        if cut is not None:
-            cut = _from(here, cut, tracker)
-            here = cut.piece.knots.q[-1]
+        if here is None:
+            here = Branch(0.0, (leg,), 0.0, leg.q)
+        elif here.bend is not None:
+            meets[number] = Meeting(here.begun, here.bend)
+        cut = _cut_at(number, legs, meets, here, route, tracker)
+        if number == last:
+            route.branches.append(replace(here, s=length_of(route.runs[-1])))
+        end, q = leg.way.length - (0.0 if cut is None else cut.before), here.q
+        if end - here.begun > 1e-9 * leg.way.length:
+            route.runs[-1].append(_rest_of(leg, here.begun, end, here.q, tracker))
+            q = route.runs[-1][-1].knots.q[-1]
+        if number == last:
+            break
         if cut is None:
-            runs.append(Run())
-            begun = 0.0
-        else:
-            runs[-1].append(cut.piece)
-            begun = cut.after
+            route.runs.append(Run())
+            route.branches.clear()
+            here = Branch(0.0, (legs[number + 1],), 0.0, q)
+            continue
+        if number == last - 1:
+            meeting = meets[number]
+            bend = None if meeting is None else meeting.bend
+            route.branches.append(Branch(length_of(route.runs[-1]), tuple(legs[number:]), end, q, bend))
+        cut = _from(q, cut, tracker)
+        route.runs[-1].append(cut.piece)
+        here = Branch(0.0, (legs[number + 1],), cut.after, cut.piece.knots.q[-1])
+    _check_joined(route.runs, tracker)
+    return route._replace(runs=[run for run in route.runs if run])
+
+
+def _cut_at(
+    number: int,
+    legs: Sequence[Leg],
+    meets: list[Meeting | None],
+    here: Branch,
+    route: Route,
+    tracker: Tracker,
+) -> _Cut | None:
+    """The blend behind a leg, if there is one; why there is none is noted."""
+    leg = legs[number]
+    if leg.blend == 0.0 or number + 1 == len(legs):
+        return None
+    try:
+        return _cut(leg, legs[number + 1], (meets[number], meets[number + 1]), here, tracker)
+    except _NoBlendError as error:
+        why = f"{leg.where}: the arm stops there, since the blend of {leg.blend:g} m {error}"
+        route.skipped.append(why)
+        meets[number + 1] = None
+        return None
+
+
+class _NoBlendError(Exception):
+    """There is no blend, for a reason in words."""
+
+
+def _check_joined(runs: list[Run], tracker: Tracker) -> None:
     for run in runs:
         for one, other in pairwise(run):
             if np.abs(one.knots.q[-1] - other.knots.q[0]).max() > SAME:
                 raise WayError(0.0, tracker.pose(one.knots.q[-1]), one.knots.q[-1])
-    return [run for run in runs if run], skipped
+
+
+def length_of(run: Run) -> float:
+    """Length of a run [m]."""
+    return sum(float(piece.knots.s[-1]) for piece in run)
 
 
 def _from(q: Floats, cut: _Cut, tracker: Tracker) -> _Cut:
@@ -123,51 +186,78 @@ def _rest_of(leg: Leg, start: float, end: float, q: Floats, tracker: Tracker) ->
     return Piece(tracker.follow(ToolPart(leg.way, start, end), q), leg.pacing, None, False, leg.where)
 
 
-def _cut(leg: Leg, then: Leg, left: float, tracker: Tracker) -> _Cut | str:
-    """The blend between two legs, or why there is none."""
-    radius = leg.blend
+def _cut(
+    leg: Leg, then: Leg, meets: tuple[Meeting | None, Meeting | None], here: Branch, tracker: Tracker
+) -> _Cut:
+    """The blend between two legs.
+
+    Raises:
+        _NoBlendError: There is none.
+    """
+    radius, left = leg.blend, leg.way.length - here.begun
     if radius < SMALLEST:
-        return f"is below the smallest one of {SMALLEST:g} m: give a larger radius"
+        raise _NoBlendError(f"is below the smallest one of {SMALLEST:g} m: give a larger radius")
     for _ in range(TRIES):
         before = _within(leg, radius, tracker, from_end=True)
         after = _within(then, radius, tracker, from_end=False)
         if np.isinf(before) or np.isinf(after):
-            return "is larger than the part before or after it: give a smaller radius"
+            raise _NoBlendError("is larger than the part before or after it: give a smaller radius")
         if before > left * INSIDE or after > then.way.length * INSIDE:
-            return "overlaps the blend beside it: give a smaller radius to one of them"
+            raise _NoBlendError("overlaps the blend beside it: give a smaller radius to one of them")
         before, after = min(before, left), min(after, then.way.length)
-        if 1e-9 * left < left - before < SLIVER and before > SLIVER:
+        if meets[0] is None and 1e-9 * left < left - before < SLIVER and before > SLIVER:
             radius *= 1.0 - (SLIVER - (left - before)) / before
             continue
+        before = before if meets[0] is None else leg.way.length - meets[0].s
+        after = after if meets[1] is None else meets[1].s
         try:
-            piece, curve = _blend(leg, then, before, after, tracker)
-        except WayError:
-            return "passes a singular posture: give a smaller radius, or move the corner"
+            piece, curve = _blend(leg, then, (before, after), meets, here.q, tracker)
+        except WayError as error:
+            why = "passes a singular posture: give a smaller radius, or move the corner"
+            raise _NoBlendError(why) from error
+        if meets != (None, None):
+            return _Cut(before, after, piece, curve)
         postures = _middle(piece.knots)
         off = [np.linalg.norm(tracker.pose(q).position - leg.corner.position) for q in postures]
         if max(off) <= leg.blend * INSIDE + CLOSE:
             return _Cut(before, after, piece, curve)
         radius *= SHRINK
-    return "would leave the sphere of its radius: give a smaller one"
+    raise _NoBlendError("would leave the sphere of its radius: give a smaller one")
 
 
 def _blend(
-    leg: Leg, then: Leg, before: float, after: float, tracker: Tracker
+    leg: Leg,
+    then: Leg,
+    lengths: tuple[float, float],
+    meets: tuple[Meeting | None, Meeting | None],
+    q: Floats,
+    tracker: Tracker,
 ) -> tuple[Piece, ToolCurve | None]:
-    pacing, start = leg.pacing.meeting(then.pacing), leg.way.length - before
+    """A blend that replaces lengths of two legs, and the tool's way on it; q are the joints where the path has come."""
+    pacing, (before, after) = leg.pacing.meeting(then.pacing), lengths
+    start = leg.way.length - before
     if isinstance(leg.way, JointWay) or isinstance(then.way, JointWay):
         ends = (_joints(leg, start, tracker, from_end=True), _joints(then, after, tracker, from_end=False))
         s = np.array([0.0, before + after])
         knots = Knots(s, *(np.array(pair) for pair in zip(*ends, strict=True)))
         return Piece(knots, pacing, None, True, leg.where), None
-    states = leg.way.at(start), then.way.at(after)
-    curve = evenly(ToolBlend(*states, leg.corner.rotation, _rounding(leg, *states) * (before + after)))
-    q, _, _ = _joints(leg, start, tracker, from_end=True)
+    first, last = (
+        state if meeting is None else state._replace(second=meeting.bend)
+        for state, meeting in zip((leg.way.at(start), then.way.at(after)), meets, strict=True)
+    )
+    drawn_out = meets != (None, None)
+    share = _rounding(leg, first, last, drawn_out=drawn_out)
+    blend = ToolBlend(first, last, leg.corner.rotation, share * (before + after))
+    curve = blend if drawn_out else evenly(blend)  # one that is drawn out is even by itself
+    if meets[0] is None:
+        q, _, _ = _joints(leg, start, tracker, from_end=True)
     return Piece(tracker.follow(curve, q), pacing, None if pacing.even else curve, False, leg.where), curve
 
 
-def _rounding(leg: Leg, start: ToolState, end: ToolState) -> float:
+def _rounding(leg: Leg, start: ToolState, end: ToolState, *, drawn_out: bool) -> float:
     """Length of a blend, as a share of what it replaces, with which its polynomial is curved least.
+
+    One that is drawn out to meet another is that of an arc.
 
     Found by trial for corners of 20° to 170°: its largest curvature is then 1.1 to 1.2 times that of an arc.
     """
@@ -176,6 +266,8 @@ def _rounding(leg: Leg, start: ToolState, end: ToolState) -> float:
     chord = float(np.linalg.norm(places[1] - places[0]))
     if away <= 0.0:
         return 1.0
+    if drawn_out:
+        return float((chord / away) ** (2.0 / 3.0))
     ratio = max(2.0 * chord / away, SHARPEST)
     return float(0.625 * ratio**0.55)
 

@@ -64,18 +64,19 @@ class ToolLine(ToolWay):
         self._start, self._end = start, end
         way, angle = end.position - start.position, turn(start.rotation, end.rotation)
         self.length = max(float(np.linalg.norm(way)), PER_RADIAN * float(np.linalg.norm(angle)))
-        self._first = np.concatenate((way, angle)) / max(self.length, SHORTEST)
+        self.first: Floats = np.concatenate((way, angle)) / max(self.length, SHORTEST)
+        """Velocity and angular velocity per unit of length, base frame, shape (6,) [-, rad/m]."""
 
     def within(self, radius: float) -> float:
         """Return the length from either end within which the tool is no farther from that end than this [m]."""
-        speed = float(np.linalg.norm(self._first[:3]))
+        speed = float(np.linalg.norm(self.first[:3]))
         return radius / speed if speed > 0.0 else np.inf
 
     def at(self, s: float) -> ToolState:
         """Return the state at a length from the start [m]."""
-        moved = s * self._first
+        moved = s * self.first
         pose = Placement(turned(self._start.rotation, moved[3:]), self._start.position + moved[:3])
-        return ToolState(pose, self._first, np.zeros(6))
+        return ToolState(pose, self.first, np.zeros(6))
 
 
 class ToolArc(ToolWay):
@@ -213,5 +214,8 @@ def _at_corner(state: ToolState, corner: Floats) -> tuple[Floats, Floats, Floats
 
     On lines and arcs the tool turns evenly about one axis, so the turn from the corner is about that axis, too.
     """
-    value = np.concatenate((state.pose.position, turn(corner, state.pose.rotation)))
-    return value, state.first, np.concatenate((state.second[:3], np.zeros(3)))
+    turned_by, angular = turn(corner, state.pose.rotation), state.second[3:]
+    if angular.any():
+        angular = np.linalg.solve(np.asarray(pin.Jexp3(-turned_by)), angular)
+    value = np.concatenate((state.pose.position, turned_by))
+    return value, state.first, np.concatenate((state.second[:3], angular))

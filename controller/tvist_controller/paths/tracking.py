@@ -13,6 +13,8 @@ from tvist_plant.description import RobotDescription
 
 SPACING = 0.03
 """Largest distance of two knots [m]."""
+SHORT = 0.003
+"""Length below which a way needs no knot but its ends [m]."""
 CLOSEST = 1e-5
 """Smallest distance of two knots; a way that needs closer ones passes a singular posture [m]."""
 TOLERANCE = 1e-6
@@ -89,7 +91,8 @@ class Tracker:
         Raises:
             WayError: A singular posture is on the way, or its poses cannot be reached.
         """
-        places = np.linspace(0.0, curve.length, max(int(np.ceil(curve.length / SPACING)), 2) + 1)
+        pieces = 1 if curve.length < SHORT else max(int(np.ceil(curve.length / SPACING)), 2)
+        places = np.linspace(0.0, curve.length, pieces + 1)
         knots = [self._knot(curve, 0.0, q)]
         for place in places[1:].tolist():
             knots += self._between(curve, knots[-1], place)

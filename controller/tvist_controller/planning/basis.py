@@ -6,6 +6,7 @@ import numpy as np
 from msgspec import Struct
 
 from tvist_controller.line.differentiator import Floats
+from tvist_controller.planning.course import Course
 from tvist_controller.sources.mode_source import ModeSource
 from tvist_plant.description import Payload as Body
 from tvist_protocol.values import Payload
@@ -45,6 +46,10 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
     bodies: tuple[Floats, ...]
     """Possible inertial parameters of the last link, see `InverseDynamics.bodies`."""
     filter: FilterBasis
+    after: Course | None = None
+    """The running motion that it goes on from; None for a motion from rest."""
+    until: float = 0.0
+    """Time of that motion up to which it stays the same [s]."""
 
     def agrees(self, other: "MotionBasis") -> bool:
         """Return whether a plan made on one basis holds on the other."""
@@ -57,6 +62,8 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
             and len(self.bodies) == len(other.bodies)
             and all(own is another for own, another in zip(self.bodies, other.bodies, strict=True))
             and self.filter == other.filter
+            and self.after is other.after
+            and self.until >= other.until
         )
 
 

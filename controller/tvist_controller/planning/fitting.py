@@ -56,6 +56,8 @@ class Need:
     """The limit, for programs."""
     keeps: str
     """What is achieved, for people."""
+    q: Floats
+    """Posture in which the limit would be exceeded most, shape (n,) [rad]."""
 
 
 @dataclass(frozen=True)
@@ -129,10 +131,10 @@ class Fitter:
         if ahead is None:
             q, qd, qdd = _states(motion)
             faster, harder = (1.0 + more for more in basis.surplus)
-            kinematic, blunted = self._kinematic(faster * qd, harder * qdd), max(BLUNTED, harder)
+            kinematic, blunted = self._kinematic(q, faster * qd, harder * qdd), max(BLUNTED, harder)
         else:
             q, qd, qdd = central_differences(ahead, PERIOD)
-            kinematic, blunted = self._kinematic(np.diff(ahead, axis=0) / PERIOD, qdd), 1.0
+            kinematic, blunted = self._kinematic(q, np.diff(ahead, axis=0) / PERIOD, qdd), 1.0
         torque = self._dynamic(q, qd, qdd, blunted, basis)
         if isinstance(torque, str):
             return torque
@@ -166,7 +168,7 @@ class Fitter:
         effort = np.max([dynamics.effort(*state) for state in zip(*_states(motion), strict=True)], axis=0)
         return bool((max(BLUNTED, 1.0 + acceleration) * effort > self._torque).any())
 
-    def _kinematic(self, qd: Floats, qdd: Floats) -> Need | None:
+    def _kinematic(self, q: Floats, qd: Floats, qdd: Floats) -> Need | None:
         """How much slower a motion has to be for the joints' velocities and accelerations."""
         fast = np.abs(qd).max(axis=0, initial=0.0) / self._velocity
         hard = np.abs(qdd).max(axis=0, initial=0.0) / self._acceleration
@@ -177,10 +179,12 @@ class Fitter:
         if slower.velocity <= math.sqrt(slower.acceleration):
             joint = int(np.argmax(fast))
             within = f"{self._velocity[joint]:.4g} rad/s"
-            return Need(slower, "limit_velocity", f"joint {self._names[joint]} stays within {within}")
+            keeps, at = f"joint {self._names[joint]} stays within {within}", _place(qd[:, joint], q)
+            return Need(slower, "limit_velocity", keeps, at)
         joint = int(np.argmax(hard))
         within = f"{self._acceleration[joint]:.4g} rad/s²"
-        return Need(slower, "limit_acceleration", f"joint {self._names[joint]} stays within {within}")
+        keeps, at = f"joint {self._names[joint]} stays within {within}", _place(qdd[:, joint], q)
+        return Need(slower, "limit_acceleration", keeps, at)
 
     def _dynamic(
         self, q: Floats, qd: Floats, qdd: Floats, blunted: float, basis: MotionBasis
@@ -190,7 +194,7 @@ class Fitter:
         Where a torque is mainly that of the velocities, these are reduced, elsewhere the acceleration.
         """
         dynamics, limits, factors = self._dynamics, self._torque, [1.0, 1.0]
-        worst, need = 1.0, None
+        worst, need, at = 1.0, None, q[0]
         for believed in basis.bodies:
             dynamics.believe((believed,))
             gravity, turning = dynamics.gravities(q), dynamics.torques(q, qd, np.zeros_like(qdd))
@@ -219,9 +223,16 @@ class Fitter:
                     factors[number], SHARE * (lowest ** (0.5, 1.0)[number]) if lowest < 1.0 else 1.0
                 )
             if least < worst:
+                at = q[int(np.argmin(share[:, joint]))]
                 worst, need = least, f"the torque of joint {name} stays within {limit:g} N m"
         dynamics.believe(basis.bodies)
-        return None if need is None else Need(Slower(*factors), "limit_torque", need)
+        return None if need is None else Need(Slower(*factors), "limit_torque", need, at)
+
+
+def _place(values: Floats, q: Floats) -> Floats:
+    """Posture, of those in shape (k, n), in which a value is largest; there may be one more value."""
+    at: Floats = q[min(int(np.argmax(np.abs(values))), len(q) - 1)]
+    return at
 
 
 def _states(motion: PlannedMotion) -> tuple[Floats, ...]:

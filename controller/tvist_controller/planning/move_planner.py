@@ -10,6 +10,7 @@ from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meet
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.planning.asked_speed import LATE, REACHED
 from tvist_controller.planning.basis import FilterBasis, MotionBasis
+from tvist_controller.planning.course import Course
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitted, Fitter, Slower
 from tvist_controller.planning.keeping import keeping_motion
@@ -21,6 +22,7 @@ from tvist_controller.trajectory import (
     MotionLimits,
     Path,
     PlannedMotion,
+    Way,
     at_least,
     quickest_motion,
 )
@@ -54,6 +56,8 @@ class PlannedMove:
     """Largest `Filter.peak` with which they do [-]."""
     room: tuple[float, float] = (math.inf, math.inf)
     """Ratios of the arm's velocity and acceleration to the motion's [-]."""
+    course: Course | None = None
+    """What its last part may go on from while it runs; None if it cannot."""
     surplus: tuple[float, float] = (0.0, 0.0)
     """`Filter.surplus` of the filter that it was planned for [-]."""
 
@@ -158,7 +162,7 @@ class MovePlanner:
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
         motion, slower = fitted.motion, fitted.slower
-        found = self.meeting(motion, basis)
+        found = self.meeting(path.whole, basis)
         if found is not None:
             share, meeting = found
             time = motion.time_at(share)
@@ -179,11 +183,11 @@ class MovePlanner:
             return None
         return ElasticArm(self._description, calibration, basis.declared)
 
-    def meeting(self, motion: PlannedMotion, basis: MotionBasis) -> tuple[float, Meeting] | None:
-        """Return the share of a motion's way after which two bodies would meet, and which; None if it is clear."""
+    def meeting(self, way: Way, basis: MotionBasis) -> tuple[float, Meeting] | None:
+        """Return the share of a way after which two bodies would meet, and which; None if it is clear."""
         if self._collisions.declared is not basis.declared_body:
             self._collisions.declare(basis.declared_body)
-        return self._collisions.on_way(motion.path.whole)
+        return self._collisions.on_way(way)
 
 
 def limited(fitted: Fitted, asked: MotionLimits | None = None) -> tuple[Code, str] | None:

@@ -1,6 +1,7 @@
 """Planning of motions of the tool and of paths of several parts."""
 
-from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,36 +10,31 @@ from tvist_controller.foresight.collision import CLEARANCE
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
-from tvist_controller.paths.pacing import JointLimits, fastest, joined, law_of, timed
-from tvist_controller.paths.poses import Placement, placement
-from tvist_controller.paths.route import Piece, Run, runs_of
-from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolLine, ToolWay
+from tvist_controller.paths.pacing import Ground, JointLimits, fastest, going_on, ground_of, joined, law_of
+from tvist_controller.paths.route import Branch, Piece, Route, Run, length_of, route_of
+from tvist_controller.paths.tool_curves import PER_RADIAN, ToolLine
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.asked_speed import slower_than_asked
 from tvist_controller.planning.basis import MotionBasis
+from tvist_controller.planning.course import Course
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitted, Slower
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove, limited
+from tvist_controller.planning.path_legs import PathLegs
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.setup import Setup
-from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, at_least, quickest_motion
-from tvist_controller.trajectory.spline import Knots, SplineCurve
+from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Way, at_least, quickest_motion
+from tvist_controller.trajectory.retiming import RetimedLaw
+from tvist_controller.trajectory.spline import SplineCurve
 from tvist_plant.plant import PERIOD
-from tvist_protocol.motions import (
-    ArcSegment,
-    JointSegment,
-    LineSegment,
-    MoveC,
-    MoveL,
-    MovePath,
-    ProcessSegment,
-    Segment,
-)
+from tvist_protocol.motions import MoveC, MoveL, MovePath
 from tvist_protocol.replies import Code
 from tvist_shaping.base import Filter
 
 POSTURES = 9
 """Number of postures of a run at which the shaper's delay is looked up."""
+LOOKS = 1000
+"""Number of places of a run at which the one is sought that is hardest for a joint."""
 SPARED = 0.99
 """Share of the joints' limits that paths use: a shaper whose weights vary may exceed its reference a little [-]."""
 LEAST_WINDOW = 0.08
@@ -63,7 +59,7 @@ class PathPlanner:
         self, setup: Setup, filters: FilterPlanner, moves: MovePlanner, reachable: Reachable
     ) -> None:
         self._description, self._filters, self._moves = setup.description, filters, moves
-        self._reachable = reachable
+        self._reachable, self._legs = reachable, PathLegs(setup.description, reachable)
 
     def rehearse(self) -> None:
         """Compile what plans use, before any is needed."""
@@ -74,115 +70,131 @@ class PathPlanner:
         run = [Piece(JointWay(q, q + 0.1).part(0.0, 0.1 * PER_RADIAN), Pacing(1.0, 1.0), None, True, "")]
         limits = self._description.limits
         joints = JointLimits(np.array(limits.velocity), np.array(limits.acceleration), min(limits.jerk))
-        law_of(run, SplineCurve(joined(run)), joints, 60.0, LEAST_WINDOW)
+        curve = SplineCurve(joined(run))
+        law_of(run, curve, ground_of(run, curve), joints, 60.0, LEAST_WINDOW)
 
-    def plan(self, command: MoveL | MoveC | MovePath, basis: MotionBasis) -> PlannedMove:
-        """Plan a motion from rest; the command's content has been checked.
+    def plan(self, command: MoveL | MoveC | MovePath, basis: MotionBasis) -> PlannedMove | None:
+        """Plan a motion from rest, or the rest of one that goes on; the command's content has been checked.
+
+        Returns:
+            None if the running motion cannot go on any more, since its end is too near.
 
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
         """
         tracker = Tracker(self._description, basis.tcp)
-        legs = list(self._legs(command, tracker, basis))
-        try:
-            runs, skipped = runs_of(legs, tracker)
-        except WayError as error:
-            raise self._reachable.refusal(error, "segments", 1.0, legs[-1].corner, basis.tcp) from error
-        if not runs:
-            runs = [[]]
-        length = sum(map(_length, runs))
+        legs = list(self._legs.of(command, tracker, basis))
+        count = len(command.segments) if isinstance(command, MovePath) else 1
+        if basis.after is not None:
+            return self._further(command.jerk, legs, count, tracker, basis)
+        route = self._route(legs, tracker, basis)
+        runs = route.runs or [[]]
+        length = sum(map(length_of, runs))
         tvist, done, motions = self._filters.present(basis.filter), 0.0, list[PlannedMotion]()
         window, velocity, told = 0.0, 0.0, None
         for run in runs:
-            fitted, delay, highest, slower = self._motion(run, command.jerk, tvist, basis)
+            goes_on = run is runs[-1] and bool(legs) and legs[-1].blend > 0.0
+            found = self._motion(run, command.jerk, tvist, basis, goes_on=goes_on)
+            slower = found.slower
             if slower is not None and len(legs) > 1:
                 slower = slower[0], f"{run[0].where}: {slower[1]}"
-            motion, told = fitted.motion, told or limited(fitted) or slower
-            velocity = max(velocity, highest)
-            self._check_clear(motion, run, (done, length), basis)
-            motions.append(motion)
-            window = max(window, delay)
-            done += _length(run)
+            told = told or _told(found.fitted, run) or slower
+            velocity = max(velocity, found.velocity)
+            self._check_clear(found.fitted.motion.path.whole, run, (done, length), basis)
+            motions.append(found.fitted.motion)
+            window = max(window, found.delay)
+            done += length_of(run)
         return PlannedMove(
             tuple(motions),
             velocity,
             told,
-            tuple(skipped),
+            tuple(route.skipped),
             window,
-            marks_of(runs, len(command.segments) if isinstance(command, MovePath) else 1),
+            marks_of(runs, range(count)),
             tvist.peak,
+            course=_course(found, runs[-1], route, count),
         )
 
-    # ------------------------------------------------------------------ geometry
-
-    def _legs(self, command: MoveL | MoveC | MovePath, tracker: Tracker, basis: MotionBasis) -> Iterator[Leg]:
-        frame, q = placement(command.frame), basis.q
-        for segment, where in _segments(command):
-            start = tracker.pose(q)
-            way: ToolWay | JointWay
-            match segment:
-                case JointSegment():
-                    way = JointWay(q, np.array(segment.q, dtype=float))
-                case ArcSegment():
-                    via = frame @ placement(segment.via)
-                    end = frame @ placement(segment.pose)
-                    way = self._arc(start, via.position, end, segment, where)
-                case _:
-                    way = ToolLine(start, frame @ placement(segment.pose))
-            if way.length < SHORTEST:
-                continue
-            knots = self._along(way, q, tracker, where, basis)
-            q = way.end if isinstance(way, JointWay) else knots.q[-1]
-            pacing = timed(_pacing(segment), way.length)
-            yield Leg(way, knots, tracker.pose(q), pacing, segment.blend, where)
-
-    @staticmethod
-    def _arc(start: Placement, via: Floats, end: Placement, segment: ArcSegment, where: str) -> ToolArc:
+    def _route(
+        self, legs: list[Leg], tracker: Tracker, basis: MotionBasis, start: Branch | None = None
+    ) -> Route:
         try:
-            return ToolArc(start, via, end, tangent=segment.orientation == "tangent")
-        except ValueError as error:
-            field = f"{where}.via".removeprefix(".")
-            why = f"{field}: no arc leads from the present position through it to pose: {error}"
-            raise RefusalError("out_of_range", field, why) from error
-
-    def _along(
-        self, way: ToolWay | JointWay, q: Floats, tracker: Tracker, where: str, basis: MotionBasis
-    ) -> Knots:
-        """The joints' way along a leg, which is within their range."""
-        if isinstance(way, JointWay):
-            return way.part(0.0, way.length)
-        field = f"{where}.pose".removeprefix(".")
-        try:
-            knots = tracker.follow(way, q)
+            return route_of(legs, tracker, start)
         except WayError as error:
-            goal, share = way.at(way.length).pose, error.s / way.length
-            raise self._reachable.refusal(error, field, share, goal, basis.tcp) from error
-        self._check_range(knots.s / way.length, knots.q, field)
-        return knots
+            raise self._reachable.refusal(error, "segments", 1.0, legs[-1].corner, basis.tcp) from error
 
-    def _check_range(self, shares: Floats, q: Floats, field: str) -> None:
-        most = np.array(self._description.limits.position)
-        beyond = np.abs(q) > most
-        if not beyond.any():
-            return
-        first = int(np.flatnonzero(beyond.any(axis=1))[0])
-        joint = int(np.flatnonzero(beyond[first])[0])
-        name = self._description.robot.joints[joint]
-        why = (
-            f"{field}: joint {name} would be at {q[first, joint]:.3f} rad after {100.0 * shares[first]:.0f} % of the "
-            f"way; it goes to ±{most[joint]:g}"
+    def _further(
+        self, jerk: float, legs: list[Leg], count: int, tracker: Tracker, basis: MotionBasis
+    ) -> PlannedMove | None:
+        """Plan the rest of a motion that goes on to further legs; None if its end is too near."""
+        before, tvist = basis.after, self._filters.present(basis.filter)
+        assert before is not None
+        found = before.branch(basis.until)
+        if found is None:
+            return None
+        cuts, branch = found
+        route = self._route([*branch.legs, *legs], tracker, basis, branch)
+        run, *coming = route.runs
+        if len(branch.legs) + len(legs) > 1 and cuts.branch == cuts.known and coming:
+            return None  # the arm is so near the end that no blend fits
+        acceleration = np.array(self._description.limits.acceleration) * (1.0 - basis.excess)
+        knots = joined(run, before.knots(cuts))
+        self._legs.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
+        curve = SplineCurve(knots, acceleration)
+        ground = before.ground.then(cuts.first, cuts.branch, run, curve)
+        delay = max(self._delay(curve, tvist), before.window)
+        joints = self._joints(acceleration, tvist)
+
+        def make(slower: Slower) -> PlannedMotion:
+            law = going_on(
+                before.law,
+                (cuts.first, cuts.known - cuts.first),
+                ground,
+                curve,
+                joints,
+                jerk,
+                delay,
+                slower.rate,
+            )
+            if law is None:
+                raise _TooLateError
+            return self._planned(curve, law, 1.0)
+
+        try:
+            fitted = self._moves.fitter.fit(make, basis, None)
+        except _TooLateError:
+            return None
+        self._check_clear(curve.way(np.array([branch.s]), curve.end), run, (0.0, length_of(run)), basis)
+        law = fitted.motion.law
+        assert isinstance(law, RetimedLaw)
+        motion = _Motion(fitted, delay, fastest(law, curve), ground)
+        motions, highest, window = [fitted.motion], motion.velocity, delay
+        for further in coming:
+            motion = self._motion(further, jerk, tvist, basis)
+            self._check_clear(motion.fitted.motion.path.whole, further, (0.0, length_of(further)), basis)
+            motions.append(motion.fitted.motion)
+            highest, window = max(highest, motion.velocity), max(window, motion.delay)
+        last = before.segments - 1
+        return PlannedMove(
+            tuple(motions),
+            highest,
+            _told(fitted, run, branch.s),
+            tuple(route.skipped),
+            window,
+            marks_of(route.runs, range(last, last + 1 + count), branch.s),
+            tvist.peak,
+            course=_course(
+                motion, route.runs[-1], route, before.segments + count, 0.0 if coming else branch.s
+            ),
         )
-        raise RefusalError("limit_position", field, why, float(most[joint]))
 
-    def _check_clear(
-        self, motion: PlannedMotion, run: Run, part: tuple[float, float], basis: MotionBasis
-    ) -> None:
-        """Refuse a motion that something is in the way of; `part` is its start on the whole path and that's length."""
-        found = self._moves.meeting(motion, basis)
+    def _check_clear(self, way: Way, run: Run, part: tuple[float, float], basis: MotionBasis) -> None:
+        """Refuse a way that something is in the way of; `part` is its start on the whole path and that's length."""
+        found = self._moves.meeting(way, basis)
         if found is None:
             return
         share, meeting = found
-        covered, where = share * _length(run), _field(run[-1].where)
+        covered, where = share * length_of(run), _field(run[-1].where)
         for piece, end in zip(run, np.cumsum([piece.knots.s[-1] for piece in run]), strict=True):
             if end >= covered:
                 where = _field(piece.where)
@@ -194,86 +206,105 @@ class PathPlanner:
     # ------------------------------------------------------------------ time
 
     def _motion(
-        self, run: Run, jerk: float, tvist: Filter, basis: MotionBasis
-    ) -> tuple[Fitted, float, float, tuple[Code, str] | None]:
-        """A motion, and what is known of it.
-
-        Returns:
-            The motion, the delay of the shaper on it [s], the largest velocity of any joint [rad/s], and of a run along
-            one segment what makes it slower than asked, see `slower_than_asked`.
-        """
-        limits, spared = self._description.limits, 1.0 - basis.excess
+        self, run: Run, jerk: float, tvist: Filter, basis: MotionBasis, *, goes_on: bool = False
+    ) -> "_Motion":
+        """A motion from rest along a run."""
         if not run:  # the arm is there already
             still = JointLine(basis.q, basis.q)
             motion = quickest_motion(still, arm_limits(self._description), PERIOD, basis.speed)
-            return Fitted(motion), 0.0, 0.0, None
+            return _Motion(Fitted(motion), 0.0, 0.0, None)
         knots = joined(run)
-        self._check_range(knots.s / knots.s[-1], knots.q, run[0].where)
-        acceleration = np.array(limits.acceleration) * spared
+        self._legs.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
+        acceleration = np.array(self._description.limits.acceleration) * (1.0 - basis.excess)
         curve = SplineCurve(knots, acceleration)
-        delay = self._delay(curve, tvist)
-        peak = tvist.peak
-        joints = JointLimits(
-            SPARED * np.array(limits.velocity) / peak, SPARED * acceleration / peak**2, min(limits.jerk)
-        )
-        law = law_of(run, curve, joints, jerk, delay)
-        alone = all(piece.where == run[0].where for piece in run)
-        slower = slower_than_asked(run, curve, law, joints, self._description) if alone else None
+        delay, ground = self._delay(curve, tvist), ground_of(run, curve)
+        joints = self._joints(acceleration, tvist)
+        law = law_of(run, curve, ground, joints, jerk, delay, goes_on=goes_on)
+        alone = not goes_on and all(piece.where == run[0].where for piece in run)
+        told = slower_than_asked(run, curve, law, joints, self._description) if alone else None
         highest = fastest(law, curve)
         rate = rate_of(basis.speed, highest, basis.slowest)
 
         def make(slower: Slower) -> PlannedMotion:
-            kept = law.slowed(law.duration / slower.rate)
-            return PlannedMotion(
-                curve, kept, PERIOD, rate, at_least(kept.limits, AGILE.acceleration, AGILE.jerk)
-            )
+            return self._planned(curve, law.slowed(law.duration / slower.rate), rate)
 
         fitted = self._moves.fitter.fit(make, basis, lambda: self._filters.present(basis.filter))
-        return fitted, delay, highest * fitted.slower.rate, slower
+        return _Motion(fitted, delay, highest * fitted.slower.rate, ground, told)
+
+    def _joints(self, acceleration: Floats, tvist: Filter) -> JointLimits:
+        limits, peak = self._description.limits, tvist.peak
+        return JointLimits(
+            SPARED * np.array(limits.velocity) / peak, SPARED * acceleration / peak**2, min(limits.jerk)
+        )
+
+    @staticmethod
+    def _planned(curve: SplineCurve, law: RetimedLaw, rate: float) -> PlannedMotion:
+        agility = at_least(law.limits, AGILE.acceleration, AGILE.jerk)
+        return PlannedMotion(curve, law, PERIOD, rate, agility)
 
     @staticmethod
     def _delay(curve: SplineCurve, tvist: Filter) -> float:
         """Longest delay of a shaper on a curve [s]."""
         found = []
-        for s in np.linspace(0.0, float(curve.end[0]), POSTURES):
+        for s in np.linspace(float(curve.start[0]), float(curve.end[0]), POSTURES):
             tvist.reset(curve.posture(np.array([s])))
             found.append(tvist.delay)
         return max(VARIATION * max(found), LEAST_WINDOW)
 
 
-def _segments(command: MoveL | MoveC | MovePath) -> Iterator[tuple[Segment, str]]:
-    match command:
-        case MoveL():
-            yield (
-                LineSegment(
-                    pose=command.pose,
-                    velocity=command.velocity,
-                    acceleration=command.acceleration,
-                    duration=command.duration,
-                ),
-                "",
-            )
-        case MoveC():
-            yield (
-                ArcSegment(
-                    via=command.via,
-                    pose=command.pose,
-                    orientation=command.orientation,
-                    velocity=command.velocity,
-                    acceleration=command.acceleration,
-                ),
-                "",
-            )
-        case MovePath():
-            for number, segment in enumerate(command.segments):
-                yield segment, f"segments[{number}]"
+def _told(fitted: Fitted, run: Run, start: float = 0.0) -> tuple[Code, str] | None:
+    """Say what made a motion slower, and on which part of a path; `start` is where its run begins on its curve [m]."""
+    told, need, path = limited(fitted), fitted.need, fitted.motion.path
+    if told is None or need is None or not isinstance(path, SplineCurve) or not run[0].where:
+        return told
+    s = np.linspace(start, float(path.end[0]), LOOKS)
+    at = float(s[int(np.argmin(np.abs(path.derivatives(s)[0] - need.q).max(axis=1)))])
+    ends = start + np.cumsum([piece.knots.s[-1] for piece in run])
+    piece = run[min(int(np.searchsorted(ends, at)), len(run) - 1)]
+    return told[0], f"{told[1]}: on {piece.where}, {at:.3f} m from the start of this part of the path"
 
 
-def marks_of(runs: list[Run], segments: int) -> tuple[tuple[int, float], ...]:
-    """Where the blend at the end of each segment begins, see `PlannedMove.marks`."""
+class _TooLateError(Exception):
+    """Raised if a running motion cannot go on within the limits any more."""
+
+
+class _Motion(NamedTuple):
+    """A motion along a run."""
+
+    fitted: Fitted
+    delay: float
+    """Delay of the shaper on it [s]."""
+    velocity: float
+    """Largest velocity of any joint [rad/s]."""
+    ground: Ground | None
+    """What limits it; None if nothing moves."""
+    slower: tuple[Code, str] | None = None
+    """What makes a motion along one segment slower than asked, see `slower_than_asked`."""
+
+
+def _course(motion: _Motion, run: Run, route: Route, segments: int, start: float = 0.0) -> Course | None:
+    """What a motion may go on from; `start` is where its run begins on its curve [m]."""
+    path, law = motion.fitted.motion.path, motion.fitted.motion.law
+    durations = any(piece.pacing.duration is not None for piece in run)
+    if motion.ground is None or durations or not isinstance(path, SplineCurve):
+        return None
+    assert isinstance(law, RetimedLaw)
+    branches = tuple(replace(branch, s=start + branch.s) for branch in route.branches)
+    return Course(path, motion.ground, law, branches, segments, motion.delay)
+
+
+def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tuple[int, float], ...]:
+    """Where the blend at the end of each segment begins, see `PlannedMove.marks`.
+
+    Args:
+        runs: The path.
+        segments: Numbers of the segments.
+        start: Length of the first part at which its run begins [m].
+    """
     marks = dict[int, tuple[int, float]]()
     for part, run in enumerate(runs):
-        ends = np.cumsum([piece.knots.s[-1] for piece in run]).tolist()
+        lengths = [piece.knots.s[-1] for piece in run]
+        ends = ((0.0 if part else start) + np.cumsum(lengths)).tolist()
         for number, piece in enumerate(run):
             # On the way to another segment, the last piece of one is its blend.
             last = run[-1].where == piece.where
@@ -281,25 +312,11 @@ def marks_of(runs: list[Run], segments: int) -> tuple[tuple[int, float], ...]:
                 part,
                 ends[number] if last else ends[number] - float(piece.knots.s[-1]),
             )
-    found, here = [], (0, 0.0)
-    for segment in range(segments):
+    found, here = [], (0, start)
+    for segment in segments:
         here = marks.get(segment, here)
         found.append(here)
     return tuple(found)
-
-
-def _pacing(segment: Segment) -> Pacing:
-    match segment:
-        case JointSegment():
-            return Pacing(PER_RADIAN * segment.velocity, PER_RADIAN * segment.acceleration, segment.duration)
-        case LineSegment():
-            return Pacing(segment.velocity, segment.acceleration, segment.duration)
-        case ProcessSegment() | ArcSegment():
-            return Pacing(segment.velocity, segment.acceleration, even=True)
-
-
-def _length(run: Run) -> float:
-    return sum(float(piece.knots.s[-1]) for piece in run)
 
 
 def _number(where: str) -> int:

@@ -1,49 +1,21 @@
 """The arm as programs move it: one thread at a time, moves that are blended, and motions that outlast their call."""
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import Access
-from tvist_controller.programs.moves import command_of
+from tvist_controller.programs.allowance import Allowance
+from tvist_controller.programs.journey import Journey, Turns
 from tvist_plant.plant import PERIOD
-from tvist_protocol.commands import MoveJ
 from tvist_protocol.motions import Segment
-from tvist_protocol.replies import Accepted
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity, after
 from tvist_urscript import Fault
 
-Turns = Generator[None, None, None]
-"""Course of a function that lets time pass: it yields once a tick."""
-
-DELAY, DELAY_PER_PART = 10, 4
-"""Ticks from the call of a move along a line or path to its start, and ticks more for each further part of a path:
-time to plan it beside the ticks. They do not depend on how long planning takes, so equal programs move alike.
-"""
-PAUSE = 300
-"""Ticks that a stop, or a plan of a `movej` within a tick, is paid with. These two take longer than all else in a tick,
-so fewer than one tick in a hundred may have one.
-"""
-MAX_PARTS = 50
-"""Number of moves after which a path ends though its last move has a blend."""
 BRAKING = 2.0
 """Deceleration of the fastest joint where a move follows a motion that has not ended [rad/s^2]."""
 TAKEN = "another thread is controlling the robot: only one thread of a program can move it at a time"
-_UNREACHABLE = frozenset({"no_solution", "singular", "collision", "limit_position"})
-"""Reasons for which a motion that a program has begun ends in a protective stop."""
-
-
-@dataclass
-class _Path:
-    """Moves that are blended into one motion."""
-
-    legs: list[Segment] = field(default_factory=list)
-    effects: list[list[Callable[[], None]]] = field(default_factory=list)
-    """What the program does after each move, until the next."""
 
 
 class ProgramArm:
@@ -52,29 +24,31 @@ class ProgramArm:
     Args:
         access: The robot.
         thread: Returns what identifies the thread that runs now.
+        lives: Returns whether a thread still runs.
         spend: Takes evaluations from the budget of the program that runs.
     """
 
-    def __init__(self, access: Access, thread: Callable[[], object], spend: Callable[[int], None]) -> None:
+    def __init__(
+        self,
+        access: Access,
+        thread: Callable[[], object],
+        lives: Callable[[object], bool],
+        spend: Callable[[int], None],
+    ) -> None:
         self._access, self._motion, self._thread, self.spend = access, access.motion, thread, spend
+        self._lives = lives
+        self._allowance = Allowance(access.motion, access.latest)
         self._inside: object | None = None
         """Thread whose move has not returned."""
         self._driver: object | None = None
         """Thread that began the guided motion."""
-        self._paths: dict[object, _Path] = {}
-        """Path of each thread whose last move is blended into a next one that has not come yet."""
-        self._number: int | None = None
-        """Number of the planned motion, while the program waits for its end."""
+        self._journeys: dict[object, Journey] = {}
+        """Moves of each thread that are blended, until the last of them is done."""
+        self._journey: Journey | None = None
+        """The one that is under way."""
         self._guided: int | None = None
-        self._outcome: str | None = None
         self._abandoned = False
         self._own = False
-        self._planning = 0
-        """Ticks for which the last plan that was ordered is still being made."""
-        self._paid = 0
-        """Tick at which all stops and plans are paid."""
-        self._skipped = False
-        """True after a call of `abort`; a motion that was being planned then is not started."""
         self.waypoint: Segment | None = None
         """Target of the present move, or of the last one."""
 
@@ -87,116 +61,81 @@ class ProgramArm:
             Fault: Another thread moves the arm, or there is no such motion.
         """
         self._check_alone()
-        path = self._paths.setdefault(self._thread(), _Path())
-        path.legs.append(segment)
-        path.effects.append([])
-        if segment.blend == 0.0 or len(path.legs) >= MAX_PARTS:
+        journey = self._present()
+        if journey is None:
+            journey = Journey(self._access, self._thread(), self._allowance, self._come_to_rest)
+            self._journeys[self._thread()] = journey
+        journey.add(segment)
+        if journey.begun:
+            self.waypoint = segment
+        if segment.blend == 0.0:
             yield from self.finish()
+        elif journey.full:
+            yield from self._until(journey, lambda: not journey.full)
+
+    def begin(self) -> None:
+        """Begin the moves of this thread that wait for a further one, which may still come while they are under way.
+
+        Raises:
+            Fault: Another thread moves the arm, or there is no such motion.
+        """
+        journey = self._present()
+        if journey is not None and not journey.begun:
+            self._check_alone()
+            self._begin(journey)
 
     def finish(self) -> Turns:
-        """Carry out the moves of this thread that wait for a further one."""
-        path = self._paths.pop(self._thread(), None)
-        if path is not None:
-            with self._moving():
-                yield from self._travel(path)
+        """Carry out the moves of this thread to the end: no further one is blended with them."""
+        journey = self._present()
+        if journey is not None:
+            journey.closed = True
+            yield from self._until(journey, lambda: False)
+
+    def _until(self, journey: Journey, done: Callable[[], bool]) -> Turns:
+        """Carry out a journey until it is over or something is done."""
+        with self._moving():
+            self._begin(journey)
+            while not (journey.over or done()):
+                yield
+        self._present()
+
+    def _present(self) -> Journey | None:
+        """Return the moves of this thread that may be blended with a further one.
+
+        Raises:
+            Fault: One of them could not be made.
+        """
+        journey = self._journeys.get(self._thread())
+        if journey is None or not journey.over:
+            return journey
+        del self._journeys[self._thread()]
+        journey.raise_fault()
+        return None
+
+    def _begin(self, journey: Journey) -> None:
+        self._journey = journey
+        if not journey.begun:
+            self.waypoint = journey.legs[-1]
+            journey.step()
+
+    def advance(self) -> None:
+        """Carry on the moves that are under way; called first in every tick in which the program is not held."""
+        if self._journey is not None and self._journey.begun:
+            self._journey.step()
 
     def then(self, effect: Callable[[], None]) -> None:
         """Do something now, or where the blend after the last move begins if moves of this thread are waiting."""
-        path = self._paths.get(self._thread())
-        if path is None:
+        journey = self._present()
+        if journey is None:
             effect()
         else:
-            path.effects[-1].append(effect)
+            journey.then(effect)
 
     @property
     def end(self) -> Segment | None:
         """Last of the waiting moves of this thread."""
-        path = self._paths.get(self._thread())
-        return None if path is None else path.legs[-1]
-
-    def _travel(self, path: _Path) -> Turns:
-        while path.legs:
-            self.waypoint, self._skipped = path.legs[-1], False
-            yield from self._come_to_rest()
-            self._check_ready()
-            plan = yield from self._planned(path.legs)
-            if self._motion.activity.protective:
-                continue
-            if self._skipped:
-                for effects in path.effects:
-                    self._pass(effects)
-                return
-            if isinstance(plan.found, RefusalError):
-                self._refused(
-                    plan.found, path.legs
-                )  # in a protective stop, it tries again when it is resumed
-                continue
-            marks = self._start(path.legs, plan)
-            passed = 0
-            while self._outcome is None:
-                yield
-                while passed < len(path.legs) - 1 and self._beyond(marks, passed):
-                    self._pass(path.effects[passed])
-                    passed += 1
-            if self._outcome == "motion_done":
-                for effects in path.effects[passed:]:
-                    self._pass(effects)
-                passed = len(path.legs)
-            del path.legs[:passed], path.effects[:passed]
-
-    def _start(self, legs: list[Segment], plan: Plan) -> tuple[tuple[int, float], ...]:
-        """Start a planned motion; return where its blends begin, see `PlannedMove.marks`."""
-        try:
-            reply = self._access.send(command_of(legs), plan)
-        except RefusalError as refusal:
-            raise Fault(refusal.reply.why) from refusal
-        assert isinstance(reply, Accepted)
-        assert isinstance(plan.found, PlannedMove)
-        self._number, self._outcome = reply.id, None
-        return plan.found.marks
-
-    def _planned(self, legs: list[Segment]) -> Generator[None, None, Plan]:
-        """The plan of a move. Lines and paths, and joint moves in debt, begin a fixed time after it is ordered."""
-        plans, command = self._access.plans, command_of(legs)
-        if isinstance(command, MoveJ) and self._debt < PAUSE:
-            self._owe()
-            return plans.now(command, within_tick=True)
-        while True:
-            while self._planning > 0:  # of a thread that was killed meanwhile: one after the other
-                yield
-            self._planning = DELAY + DELAY_PER_PART * (len(legs) - 1)
-            ordered = plans.later(command)
-            for _ in range(self._planning):
-                yield
-            yield from self._come_to_rest()  # a client may have moved the arm meanwhile
-            self._check_ready()
-            plan = ordered()
-            if plans.hold(plan):
-                return plan
-
-    def _beyond(self, marks: tuple[tuple[int, float], ...], leg: int) -> bool:
-        """Return whether the arm has begun the blend at the end of a leg."""
-        progress = self._motion.motions.progress
-        return progress is not None and leg < len(marks) and progress > marks[leg]
-
-    @staticmethod
-    def _pass(effects: list[Callable[[], None]]) -> None:
-        for effect in effects:
-            effect()
-        effects.clear()
-
-    def _check_ready(self) -> None:
-        try:
-            self._motion.check("move_j")
-        except RefusalError as refusal:
-            raise Fault(refusal.reply.why) from refusal
-
-    def _refused(self, refusal: RefusalError, legs: list[Segment]) -> None:
-        """End a program whose move is impossible, or stop the robot if it is a line or path that leads nowhere."""
-        reply = refusal.reply
-        if isinstance(command_of(legs), MoveJ) or reply.code not in _UNREACHABLE:
-            raise Fault(reply.why)
-        self._motion.protect(f"the program's move was refused: {reply.why}", reply.code)
+        journey = self._present()
+        return None if journey is None else journey.legs[-1]
 
     def _come_to_rest(self) -> Turns:
         """Stop what still moves. In a protective stop of this tick the program is paused here."""
@@ -205,7 +144,7 @@ class ProgramArm:
             raise Fault("a client streams set-points to the arm, so the program cannot move it")
         if motion.activity in {Activity.GUIDED, Activity.MOVING, Activity.PAUSED}:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
-        while motion.activity.moving or motion.activity.protective or self._waits:
+        while motion.activity.moving or motion.activity.protective or self._allowance.waits:
             yield
 
     # ------------------------------------------------------------------ guided motions
@@ -222,7 +161,7 @@ class ProgramArm:
         """
         yield from self.finish()
         with self._moving():
-            while self.stopping or self._waits:
+            while self.stopping or self._allowance.waits:
                 yield
             self.steer(start)
             yield from wait()
@@ -233,19 +172,6 @@ class ProgramArm:
         activity = self._motion.activity
         return (activity.moving or activity.protective) and after(activity, "speed_j") is None
 
-    @property
-    def _debt(self) -> int:
-        """Ticks until all stops and plans are paid."""
-        return max(self._paid - self._access.latest().tick, 0)
-
-    def _owe(self) -> None:
-        self._paid = self._access.latest().tick + self._debt + PAUSE
-
-    @property
-    def _waits(self) -> bool:
-        """Whether the next motion has to wait, since stops and plans were too close to each other."""
-        return self._motion.activity is Activity.REST and self._debt > 2 * PAUSE
-
     def steer(self, start: Callable[[bool], int | None]) -> None:
         """Begin or change a guided motion within a call of `guide`; see there. In a protective stop nothing happens."""
         motion = self._motion
@@ -255,7 +181,7 @@ class ProgramArm:
             motion.activity is Activity.REST
             or (motion.activity is Activity.GUIDED and motion.cycle.mode.shaped)
         )
-        self._number, self._outcome, self._own = None, None, True
+        self._journey, self._own = None, True
         try:
             self._guided = start(shaped)
             self._driver = None if self._guided is None else self._thread()
@@ -291,72 +217,82 @@ class ProgramArm:
 
     def abort(self) -> None:
         """Stop the planned move that the program makes now, if there is one; it goes on as if the move had ended."""
-        self._skipped = True
-        if self._number is not None:
+        journey = self._journey
+        if journey is None:
+            return
+        journey.skipped = True
+        if journey.number is not None:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
-            self._outcome = "motion_done"
+            journey.outcome = "motion_done"
 
     def brake(self, stop: Callable[[], None]) -> None:
         """Begin a stop of what moves, which is the program's own will."""
         if self._motion.activity.moving:
-            self._owe()
+            self._allowance.owe()
         self._own = True  # so that `hear` does not take this stop for one that ends the program
         try:
             stop()
         finally:
             self._own = self._abandoned = False
-            self._number = self._guided = self._driver = None
+            self._guided = self._driver = None
+            if self._journey is not None:
+                self._journey.number = None
 
     # ------------------------------------------------------------------ threads and events
 
     @property
     def moves(self) -> bool:
         """Whether a planned motion of the program is running."""
-        return self._number is not None
+        return self._journey is not None and self._journey.number is not None
 
     @property
     def guides(self) -> bool:
         """Whether a guided motion of the program is running."""
         return self._guided is not None
 
-    def settle(self, lives: Callable[[object], bool]) -> None:
-        """Stop a motion whose thread has ended without another that took it over; called at the end of each turn.
-
-        Args:
-            lives: Returns whether a thread still runs.
-        """
-        self._planning = max(self._planning - 1, 0)
-        if self._driver is not None and not lives(self._driver):
+    def settle(self) -> None:
+        """Stop a motion whose thread has ended without another that took it over; called at the end of each turn."""
+        self._allowance.planning = max(self._allowance.planning - 1, 0)
+        journey = self._journey
+        if journey is not None and not (journey.over or self._lives(journey.owner)):
+            self._abandoned |= journey.number is not None
+            self._journey = None
+        if self._driver is not None and not self._lives(self._driver):
             self._abandoned = True
         if self._abandoned:
             self.brake(lambda: self._motion.stop(None, "the thread that moved the arm has ended"))
-        for thread in [thread for thread in self._paths if not lives(thread)]:
-            del self._paths[thread]
+        for thread in [thread for thread in self._journeys if not self._lives(thread)]:
+            del self._journeys[thread]
 
     def forget(self) -> None:
         """Forget all motions, since the program has ended."""
-        self._inside = self._driver = self._number = self._guided = None
-        self._paths.clear()
-        self._abandoned, self._planning = False, 0
+        self._inside = self._driver = self._journey = self._guided = None
+        self._journeys.clear()
+        self._abandoned, self._allowance.planning = False, 0
 
     def hear(self, event: Event) -> bool:
         """Handle an event of the robot; return whether it ended a motion of the program against its will."""
+        journey = self._journey
+        moving = None if journey is None else journey.number
         if event.kind == "protective_stop":
             self._guided = self._driver = None
-            if self._number is not None:
-                self._outcome = event.kind
-        if event.id is None or self._own or event.id not in {self._number, self._guided}:
+            if journey is not None and moving is not None:
+                journey.outcome = event.kind
+        if event.id is None or self._own or event.id not in {moving, self._guided}:
             return False
-        if event.kind == "motion_done":
-            self._outcome, self._number = event.kind, None
-        if event.kind != "motion_stopped":
-            return False
-        stopped = self._outcome is None and event.code != "plant_failure"
-        self._outcome, self._number, self._guided = event.kind, None, None
+        stopped = event.kind == "motion_stopped" and event.code != "plant_failure"
+        if event.id == moving and journey is not None:
+            stopped = stopped and journey.outcome is None
+            if event.kind in {"motion_done", "motion_stopped"}:
+                journey.outcome, journey.number = event.kind, None
+        if event.kind == "motion_stopped":
+            self._guided = None
         return stopped
 
     def _check_alone(self) -> None:
-        if self._inside not in {None, self._thread()}:
+        journey = self._journey
+        moves = journey is not None and not journey.over and self._lives(journey.owner)
+        if {self._inside, journey.owner if moves and journey is not None else None} - {None, self._thread()}:
             raise Fault(TAKEN)
 
     @contextmanager

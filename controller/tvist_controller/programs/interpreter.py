@@ -8,7 +8,8 @@ from tvist_controller.commands.events import Emit
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.planning.basis import StatementBasis
-from tvist_controller.programs.arm import ProgramArm, Turns
+from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.journey import Turns
 from tvist_protocol.programs import MAX_SCRIPT, Interpreter
 from tvist_urscript import Fault, Machine, Script
 

@@ -7,10 +7,15 @@ OWN_TOKEN = "program"  # noqa: S105  the lease was checked when the program was 
 """Token in the commands that a program makes, which are not sent to clients."""
 
 
-def command_of(legs: list[Segment]) -> MoveJ | MoveL | MovePath:
-    """Return the command for moves that are blended into one motion: the simplest that does."""
+def command_of(legs: list[Segment], *, goes_on: bool = False) -> MoveJ | MoveL | MovePath:
+    """Return the command for moves that are blended into one motion: the simplest that does.
+
+    Args:
+        legs: The moves.
+        goes_on: Whether further moves may come while the motion runs, which only a path has room for.
+    """
     token = OWN_TOKEN
-    match legs:
+    match [] if goes_on else legs:
         case [JointSegment() as leg]:
             return MoveJ(
                 token=token,

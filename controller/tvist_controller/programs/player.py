@@ -53,7 +53,7 @@ class ProgramPlayer:
 
     def __init__(self, access: Access, safety: SafetyControl) -> None:
         self._access, self._motion, self._safety, self._emit = access, access.motion, safety, access.emit
-        self.arm = ProgramArm(access, self._thread, lambda work: self._machine().charge(work))
+        self.arm = ProgramArm(access, self._thread, self._lives, lambda work: self._machine().charge(work))
         self.popups = Popups(access.emit, self._machine)
         self._watchdogs = Watchdogs(access.peripherals)
         self.sockets = Sockets(
@@ -132,6 +132,10 @@ class ProgramPlayer:
             return
         if self.state == "PLAYING":
             self._watch(tick)
+        if self._main is not None and not self._held:
+            self._now = self._main  # what it does behind a blend is done by this program
+            self.arm.advance()
+            self._now = None
         left -= GUIDED if self.arm.guides else 0
         # Whoever got nothing of the last tick's evaluations comes first, else the oldest.
         for running in sorted(self._all, key=lambda one: one not in self._starved) if left > 0 else ():
@@ -143,7 +147,7 @@ class ProgramPlayer:
             else:
                 self._starved.add(running)
         self._left = left
-        self.arm.settle(self._lives)
+        self.arm.settle()
         if self._main is not None and (self.line == 0 or tick % TOLD_EVERY == 0):
             self._find_line(self._main.machine)
 

@@ -27,6 +27,8 @@ class QuietLaw:
     ) -> None:
         self.limits = limits
         """Limits that it keeps."""
+        self.begins = 0.0
+        """Time from which on it is known [s]."""
         self._start, self._end, self._step = start, end, step
         self._count = len(velocities) + 2
         self.duration = self._count * step

@@ -27,7 +27,7 @@ class Bends:
 
 
 class Curve(Path):
-    """A path with one parameter s, from 0 to its length, in any unit.
+    """A path with one parameter s, from 0 or another start to an end, in any unit.
 
     Interpolation may pass either end by a thousandth of a tick's step, so the curve has to continue smoothly beyond
     them.
@@ -39,7 +39,8 @@ class Curve(Path):
     so bounds of the derivatives convert limits of the joints into limits of s.
 
     Args:
-        length: Value of s at the end, above 0.
+        start: Value of s at the start.
+        end: Value of s at the end, above that.
         bends: Bounds of the derivatives on the whole curve.
         most: Largest acceleration of each joint while the motion's rate changes, shape (n,) [rad/s^2]; None if the
             limit of the parameter suffices.
@@ -48,14 +49,14 @@ class Curve(Path):
         ValueError: An argument is out of range.
     """
 
-    def __init__(self, length: float, bends: Bends, most: Floats | None = None) -> None:
-        if not 0.0 < length < np.inf:
-            raise ValueError(f"length is {length}: must be more than 0")
+    def __init__(self, end: float, bends: Bends, most: Floats | None = None, *, start: float = 0.0) -> None:
+        if not start < end < np.inf:
+            raise ValueError(f"length is {end - start}: must be more than 0")
         if not 0.0 < float(bends.slope.max()) < np.inf:
             raise ValueError(f"slope is {bends.slope.tolist()}: must be finite, and of one joint more than 0")
         if not (0.0 <= bends.second < np.inf and 0.0 <= bends.third < np.inf):
             raise ValueError(f"second is {bends.second} and third {bends.third}: both must be finite")
-        super().__init__(np.zeros(1), np.array([length]))
+        super().__init__(np.array([start]), np.array([end]))
         self.bends = bends
         """Bounds of its derivatives."""
         self._most = most

@@ -39,6 +39,8 @@ class DoubleS:
             ) from error
         self.limits = limits
         """Limits that it keeps."""
+        self.begins = 0.0
+        """Time from which on it is known [s]."""
         self.duration = float(self._trajectory.duration)
         """Duration from rest to rest [s]."""
         # The motion from rest to rest is symmetric in time: it brakes for as long as it accelerates.

@@ -11,6 +11,7 @@ from tvist_controller.trajectory.double_s import DoubleS
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.pace import Pace
 from tvist_controller.trajectory.path import Path
+from tvist_controller.trajectory.spline import SplineCurve
 
 LOOK_AHEAD = 2.0
 """Ticks that a change of the pace looks ahead on the path."""
@@ -33,6 +34,8 @@ class TimeLaw(Protocol):
     """Duration from rest to rest [s]."""
     brakes_at: float
     """Time at which it begins to slow down [s]."""
+    begins: float
+    """Time from which on it is known: above 0 for one whose beginning has been forgotten [s]."""
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], with m numbers each."""
@@ -67,7 +70,9 @@ class PlannedMotion(Trajectory):
     ) -> None:
         self.quiet = quiet
         """Whether the law leaves no vibration without a filter."""
-        self.path, self._law, self._period = path, law, period
+        self.path, self._period = path, period
+        self.law = law
+        """Its time law."""
         self.agility = law.limits if agility is None else agility
         """Limits that a change of the rate keeps."""
         self.limits = law.limits
@@ -86,14 +91,16 @@ class PlannedMotion(Trajectory):
 
     def time_at(self, share: float) -> float:
         """Time at full speed at which a share of the way, 0 to 1, is completed [s]."""
-        early, late = 0.0, self.duration
+        early, late = self.law.begins, self.duration
         for _ in range(40):
             middle = 0.5 * (early + late)
             early, late = (middle, late) if self._share_at(middle) < share else (early, middle)
         return late
 
     def _share_at(self, time: float) -> float:
-        (start, *_), (now, *_), (end, *_) = (self._law.at(moment) for moment in (0.0, time, self.duration))
+        (start, *_), (now, *_), (end, *_) = (
+            self.law.at(moment) for moment in (self.law.begins, time, self.duration)
+        )
         leading = self.path.leading
         way = end[leading] - start[leading]
         return (now[leading] - start[leading]) / way if way != 0.0 else 1.0
@@ -104,8 +111,8 @@ class PlannedMotion(Trajectory):
         Args:
             count: Number of states; each has position, velocity and acceleration, arrays of shape (n,).
         """
-        for time in np.linspace(0.0, self.duration, count).tolist():
-            x, xd, xdd = (np.array(values) for values in self._law.at(time))
+        for time in np.linspace(self.law.begins, self.duration, count).tolist():
+            x, xd, xdd = (np.array(values) for values in self.law.at(time))
             yield self.path.states(x, xd, xdd)
 
     def next(self) -> Floats:
@@ -120,10 +127,19 @@ class PlannedMotion(Trajectory):
             self._since, self._ticks = time + step, 0
         if self.finished:
             return self.path.end
-        return np.array(self._law.at(self.time)[0])
+        return np.array(self.law.at(self.time)[0])
+
+    def go_on(self, longer: "PlannedMotion") -> None:
+        """Go on as a longer motion, which is the same until now and for some ticks more, along a `SplineCurve`."""
+        assert isinstance(self.path, SplineCurve)
+        assert isinstance(longer.path, SplineCurve)
+        self.path.become(longer.path)
+        self.law, self.agility = longer.law, longer.agility
+        self.limits, self.duration = longer.limits, longer.duration
+        self._pace.limits = self.agility
 
     def _paced(self, time: float) -> Floats:
-        x, xd, xdd = (np.array(values) for values in self._law.at(time))
+        x, xd, xdd = (np.array(values) for values in self.law.at(time))
         return self.path.paced(x, xd, xdd, self.agility.acceleration)
 
     @property
@@ -147,7 +163,7 @@ class PlannedMotion(Trajectory):
             self.path.end,
             limits.acceleration,
             limits.jerk,
-            max(self._law.brakes_at - time, 0.0) / rate if known else 0.0,
+            max(self.law.brakes_at - time, 0.0) / rate if known else 0.0,
         )
 
     @property
@@ -158,7 +174,7 @@ class PlannedMotion(Trajectory):
     @property
     def velocity(self) -> float:
         """Present velocity of the leading entry of the parameter [rad/s]."""
-        return float(np.abs(self._law.at(self.time)[1]).max()) * self._pace.rate
+        return float(np.abs(self.law.at(self.time)[1]).max()) * self._pace.rate
 
     def hold(self, acceleration: float) -> bool:
         """Pause the motion, if it then stands noticeably sooner than by continuing.

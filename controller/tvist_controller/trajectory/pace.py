@@ -28,7 +28,8 @@ class Pace:
     """
 
     def __init__(self, limits: MotionLimits, period: float, rate: float) -> None:
-        self._limits, self._period = limits, period
+        self.limits, self._period = limits, period
+        """Limits for every joint."""
         self.acceleration = limits.acceleration
         """Acceleration limit for every joint [rad/s^2]: the motion's, or less."""
         self.rate, self._slope = rate, 0.0
@@ -67,7 +68,7 @@ class Pace:
         request.target_velocity, request.target_acceleration = [target], [0.0]
         request.max_acceleration, request.min_acceleration = [highest], [lowest]
         fastest = max(float(np.abs(qd).max()) for qd, _ in curve)
-        request.max_jerk = [self._limits.jerk / max(fastest, 0.05)]
+        request.max_jerk = [self.limits.jerk / max(fastest, 0.05)]
         self._generator.update(request, self._result)
         self.rate = min(max(self._result.new_velocity[0], 0.0), 1.0)
         self._slope = self._result.new_acceleration[0]

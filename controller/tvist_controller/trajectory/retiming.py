@@ -11,7 +11,7 @@ time.
 """
 
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,12 @@ shaped tool exceeds its acceleration in a bend by a hundredth. The whole window 
 """
 LEAST = 1e-9
 """Smallest value that is divided by."""
+ROUNDS = 3
+"""How often limits that last for a window of time are put on a motion, an odd number."""
+ROUNDING = 1e-9
+"""Share by which rounding may exceed a limit [-]."""
+AT_REST: Floats = np.zeros(1)
+"""What is known of ṡ² of a motion from rest."""
 SHORTLY = 1e-9
 """Time before and after a change of the acceleration at which it is looked at [s]."""
 
@@ -57,26 +63,31 @@ class Way:
 
 
 @compiled
-def passes(edges: Floats, highest: Floats, p: Floats, q: Floats) -> Floats:  # pragma: no cover  compiled
-    """Return the largest b = ṡ² at the edges, zero at both ends.
+def passes(
+    edges: Floats, highest: Floats, p: Floats, q: Floats, known: Floats
+) -> Floats:  # pragma: no cover  compiled
+    """Return the largest b = ṡ² at the edges, zero at the last one.
 
     Args:
         edges: Ends of the cells, shape (c + 1,).
         highest: Largest b in each cell, shape (c,).
         p: See `Cells`.
         q: See `Cells`.
+        known: Values of b at the first edges, which stay as they are, shape (k,): only a 0 for a motion from rest.
     """
     count, rows = p.shape
+    begun = len(known)
     b = np.zeros(count + 1)
-    for number in range(1, count):
+    b[:begun] = known
+    for number in range(begun, count):
         b[number] = min(highest[number - 1], highest[number])
-    for number in range(count - 1, 0, -1):
+    for number in range(count - 1, begun - 1, -1):
         twice = 2.0 * (edges[number + 1] - edges[number])
         for row in range(rows):
             share = p[number, row] / twice
             if share + q[number, row] > 0.0:
                 b[number] = min(b[number], (1.0 + share * b[number + 1]) / (share + q[number, row]))
-    for number in range(count):
+    for number in range(begun - 1, count):
         twice = 2.0 * (edges[number + 1] - edges[number])
         for row in range(rows):
             share = p[number, row] / twice
@@ -112,66 +123,119 @@ def widened(
     return out
 
 
+@compiled
+def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragma: no cover  compiled
+    """Let a motion go on evenly for a ramp between speeding up and braking, so that its jerk is not twice that of both.
+
+    Args:
+        edges: Ends of the cells, shape (c + 1,).
+        b: ṡ² there, shape (c + 1,).
+        ramp: The ramp [s].
+        known: Number of the edge up to which the motion stays as it is; if it brakes there, it first goes on evenly.
+    """
+    out, last = b.copy(), len(b) - 1
+    number = known + 1
+    if known > 0 and b[known] < b[known - 1]:
+        way = np.sqrt(b[known]) * ramp
+        while number < last and edges[number] - edges[known] < way:
+            out[number] = min(out[number], b[known])
+            number += 1
+    for top in range(known + 1, last):
+        if out[top] < out[top - 1] or out[top] <= out[top + 1]:
+            continue
+        low, high = top - 1, top + 1  # the last of the highest edges, which need not be one
+        most = max(out[low], out[high])
+        while most > 0.0 and edges[high] - edges[low] < np.sqrt(most) * ramp:
+            if low > known and (out[low] >= out[high] or high == last):
+                low -= 1
+            elif high < last:
+                high += 1
+            else:
+                break
+            if max(out[low], out[high]) <= 0.0:  # it is as short as a ramp
+                break
+            most = max(out[low], out[high])
+        for number in range(low + 1, high):
+            out[number] = min(out[number], most) if most > 0.0 else out[number]
+    return out
+
+
 class RetimedLaw:
     """The time law of a curve's parameter: the mean over `ramp` seconds of a motion with constant accelerations.
 
     Args:
         edges: Places at which the acceleration may change, shape (c + 1,).
-        b: ṡ² there, shape (c + 1,), zero at both ends only.
+        b: ṡ² there, shape (c + 1,), zero at the last one, and nowhere else but at the first one.
         ramp: Time over which the mean is taken [s].
         rate: Rate of its time relative to the clock's, above 0 [-].
+        start: Time at the first edge, before the mean and at a rate of 1 [s]. If b is not 0 there, the motion is known
+            only from a ramp later on.
     """
 
-    def __init__(self, edges: Floats, b: Floats, ramp: float, rate: float = 1.0) -> None:
-        self._edges, self._b, self._ramp, self._rate = edges, b, ramp, rate
-        speeds, times = np.sqrt(b), arrivals(edges, b)
-        spans = np.diff(times)
+    def __init__(self, edges: Floats, b: Floats, ramp: float, rate: float = 1.0, start: float = 0.0) -> None:
+        self.edges, self.b = edges, b
+        """Places at which the acceleration may change, and ṡ² there, each of shape (c + 1,)."""
+        self.ramp, self.rate = ramp, rate
+        """Time over which the mean is taken, at a rate of 1 [s], and rate of its time [-]."""
+        speeds, times = np.sqrt(b), start + arrivals(edges, b)
+        self.times: Floats = times
+        """Times at the edges before the mean and at a rate of 1, shape (c + 1,) [s]."""
+        spans, here = np.diff(times), edges - edges[0]
         accelerations = 0.5 * np.diff(b) / np.diff(edges)
-        areas = np.cumsum(spans * (edges[:-1] + spans * (speeds[:-1] / 2.0 + spans * accelerations / 6.0)))
-        # The motion before the mean: its integral, s, ṡ and s̈ when each cell begins; before the first and behind the
-        # last, it is at rest.
+        areas = np.cumsum(spans * (here[:-1] + spans * (speeds[:-1] / 2.0 + spans * accelerations / 6.0)))
+        # The motion before the mean, from the first edge on: its integral, s, ṡ and s̈ when each cell begins; before the
+        # first and behind the last, it is at rest.
         self._times = np.concatenate(([-np.inf], times))
-        self._begun = np.concatenate(([0.0], times))
+        self._begun = np.concatenate(([start], times))
         self._pieces = np.zeros((4, len(edges) + 1))
-        self._pieces[:, 1:-1] = np.concatenate(([0.0], areas[:-1])), edges[:-1], speeds[:-1], accelerations
-        self._pieces[:2, -1] = areas[-1], edges[-1]
+        self._pieces[:, 1:-1] = np.concatenate(([0.0], areas[:-1])), here[:-1], speeds[:-1], accelerations
+        self._pieces[:2, -1] = areas[-1], here[-1]
+        self._origin = float(edges[0])
         self._rows = list(zip(self._begun.tolist(), *self._pieces.tolist(), strict=True))
         self._starts = self._times.tolist()
         self.duration = float(times[-1] + ramp) / rate
         """Duration from rest to rest [s]."""
+        self.begins = 0.0 if b[0] == 0.0 else (start + ramp) / rate
+        """Time from which on it is known [s]."""
         braking = int(np.flatnonzero(accelerations < 0.0)[0])
         self.brakes_at = float(times[braking]) / rate
         """Time at which it begins to slow down [s]."""
-        changes = np.concatenate((times + SHORTLY, times + ramp - SHORTLY))
-        jerk = float(np.abs(self._before(changes)[3] - self._before(changes - ramp)[3]).max()) / ramp
+        jerk = self.jerk_from(-np.inf if b[0] == 0.0 else start + ramp)
         most = float(np.abs(accelerations).max())
         self.limits = MotionLimits(float(speeds.max()) * rate, most * rate**2, jerk * rate**3)
         """Limits that it keeps."""
+
+    def jerk_from(self, time: float) -> float:
+        """Largest jerk from a time on, at a rate of 1 [1/s^3]."""
+        changes = np.concatenate((self.times + SHORTLY, self.times + self.ramp - SHORTLY))
+        changes = changes[changes >= time]
+        late, early = self._before(changes)[3], self._before(changes - self.ramp)[3]
+        return float(np.abs(late - early).max(initial=0.0)) / self.ramp
 
     @property
     def moments(self) -> Floats:
         """Times at which velocity or acceleration may be largest: where a cell begins, half a ramp and a ramp later."""
         times = self._times[1:]
-        return np.concatenate((times, times + 0.5 * self._ramp, times + self._ramp)) / self._rate
+        return np.concatenate((times, times + 0.5 * self.ramp, times + self.ramp)) / self.rate
 
     def slowed(self, duration: float) -> "RetimedLaw":
         """Return the same law in a longer duration [s]; this one if it takes as long already."""
         if duration <= self.duration:
             return self
-        return RetimedLaw(self._edges, self._b, self._ramp, self._rate * self.duration / duration)
+        return RetimedLaw(self.edges, self.b, self.ramp, self.rate * self.duration / duration)
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Parameter, its velocity [1/s] and its acceleration [1/s^2] at a time [s]."""
-        rate, ramp = self._rate, self._ramp
+        rate, ramp = self.rate, self.ramp
         late, early = self._moment(time * rate), self._moment(time * rate - ramp)
         s, sd, sdd = ((after - before) / ramp for after, before in zip(late, early, strict=True))
-        return [s], [sd * rate], [sdd * rate * rate]
+        return [self._origin + s], [sd * rate], [sdd * rate * rate]
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
         """Evaluate `at` at k times [s]; each result has shape (k,)."""
-        rate, ramp = self._rate, self._ramp
+        rate, ramp = self.rate, self.ramp
         s, sd, sdd = (self._before(times * rate) - self._before(times * rate - ramp))[:3] / ramp
-        return s, sd * rate, sdd * rate**2
+        return self._origin + s, sd * rate, sdd * rate**2
 
     def _moment(self, time: float) -> tuple[float, float, float]:
         """∫s, s and ṡ of the motion before the mean."""
@@ -195,28 +259,66 @@ def arrivals(edges: Floats, b: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(2.0 * np.diff(edges) / (speeds[:-1] + speeds[1:]))))
 
 
-def quickest_law(way: Way, jerk: float, window: float) -> RetimedLaw:
+def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False) -> RetimedLaw:
     """Return the quickest law within the limits along a curve.
 
     Args:
         way: The limits.
         jerk: Jerk limit of s [1/s^3].
         window: Time over which a shaper mixes moments of the motion [s].
+        goes_on: Whether others may continue it, with its ramp.
     """
     lengths = np.diff(way.edges)
-    b = _passed(way.edges, way.joints, way.tool)
+    b = _passed(way.edges, way.joints, way.tool, AT_REST)
     accelerations = np.abs(0.5 * np.diff(b) / lengths)
     ramp = float(max(accelerations.max() / jerk, (way.slope * accelerations).max() / way.jerk))
-    law = _law(way, b, ramp, window)
+    b = _lastingly(way, b, ramp, window, AT_REST)
+    law = RetimedLaw(way.edges, level(way.edges, b, ramp, 0) if goes_on else b, ramp)
     if law.limits.jerk > jerk * (1.0 + 1e-6):  # it changes from speeding up to braking within a ramp
-        law = _law(way, b, ramp * law.limits.jerk / jerk, window)
+        ramp *= law.limits.jerk / jerk
+        law = RetimedLaw(way.edges, _lastingly(way, b, ramp, window, AT_REST), ramp)
     return law
 
 
-def _law(way: Way, b: Floats, ramp: float, window: float) -> RetimedLaw:
-    times, around = arrivals(way.edges, b), window + ramp
-    joints, tool = _lasting(way.joints, times, around), _lasting(way.tool, times, TOOL_SHARE * around)
-    return RetimedLaw(way.edges, _passed(way.edges, joints, tool), ramp)
+def longer_law(
+    way: Way, jerk: float, window: float, before: RetimedLaw, first: int, known: int
+) -> RetimedLaw | None:
+    """Return the quickest law that is equal to another one up to an edge, and goes on behind the end of that.
+
+    Args:
+        way: The limits. It begins with edge `first` of the law before; its edges up to `known` are those of that law.
+        jerk: See `quickest_law`.
+        window: See `quickest_law`.
+        before: The law that it continues; it gives the ramp, too.
+        first: Number of the edge of that law with which this one begins.
+        known: Number of the edge of this law up to which they are equal.
+
+    Returns:
+        None if it cannot keep the limits from there on.
+    """
+    fixed, ramp, start = before.b[first : first + known + 1], before.ramp, float(before.times[first])
+    # The ramp being given, it is the acceleration that has to keep the jerk.
+    joints = replace(way.joints, p=np.maximum(way.joints.p, way.slope[:, None] / (way.jerk * ramp)))
+    tool = replace(way.tool, p=np.maximum(way.tool.p, 1.0 / (jerk * ramp)))
+    way = replace(way, joints=joints, tool=tool)
+    b = _lastingly(way, _passed(way.edges, joints, tool, fixed), ramp, window, fixed)
+    b = level(way.edges, b, ramp, known)
+    return RetimedLaw(way.edges, b, ramp, before.rate, start) if _goes_on(way, b, known) else None
+
+
+def _lastingly(way: Way, b: Floats, ramp: float, window: float, known: Floats) -> Floats:
+    """Largest ṡ² at the edges within the limits that hold within a window of time; b is that without a window.
+
+    The faster a motion is, the farther it comes within the window, and the longer limits hold on its way. So a motion
+    that is planned on the times of a faster one is too slow; one on the times of that, too fast; and one on the times
+    of the latter is between both, so that it keeps the limits that hold on its own times.
+    """
+    around = window + ramp
+    for _ in range(ROUNDS):
+        times = arrivals(way.edges, b)
+        joints, tool = _lasting(way.joints, times, around), _lasting(way.tool, times, TOOL_SHARE * around)
+        b = _passed(way.edges, joints, tool, known)
+    return b
 
 
 def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
@@ -228,8 +330,18 @@ def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
     )
 
 
-def _passed(edges: Floats, joints: Cells, tool: Cells) -> Floats:
-    """Largest ṡ² at the edges within the limits of joints and tool."""
+def _goes_on(way: Way, b: Floats, known: int) -> bool:
+    """Return whether a motion keeps the limits in the cell behind an edge, though it is given up to there."""
+    cell = slice(known, known + 1)
+    acceleration = 0.5 * (b[known + 1] - b[known]) / (way.edges[known + 1] - way.edges[known])
+    return all(
+        bool((cells.p[cell] * abs(acceleration) + cells.q[cell] * b[known] <= 1.0 + ROUNDING).all())
+        for cells in (way.joints, way.tool)
+    )
+
+
+def _passed(edges: Floats, joints: Cells, tool: Cells, known: Floats) -> Floats:
+    """Largest ṡ² at the edges within the limits of joints and tool; see `passes`."""
     p, q = np.hstack((joints.p, tool.p)), np.hstack((joints.q, tool.q))
     highest = np.minimum(joints.fastest, tool.fastest) ** 2
-    return passes(edges, np.minimum(highest, 1.0 / np.maximum(q.max(axis=1), LEAST)), p, q)
+    return passes(edges, np.minimum(highest, 1.0 / np.maximum(q.max(axis=1), LEAST)), p, q, known)

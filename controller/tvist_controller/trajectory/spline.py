@@ -18,7 +18,7 @@ class Knots(NamedTuple):
     """Places of a curve with its first two derivatives there."""
 
     s: Floats
-    """Parameters, rising from 0, shape (k,)."""
+    """Parameters, rising, of a part of a path from 0, shape (k,)."""
     q: Floats
     """Joint positions, shape (k, n) [rad]."""
     slope: Floats
@@ -96,6 +96,8 @@ class SplineCurve(Curve):
     """
 
     def __init__(self, knots: Knots, most: Floats | None = None) -> None:
+        self.knots = knots
+        """The knots."""
         self._knots = np.ascontiguousarray(knots.s)
         ends = [
             (knots.q[part], knots.slope[part], knots.second[part]) for part in (slice(-1), slice(1, None))
@@ -108,7 +110,14 @@ class SplineCurve(Curve):
         sizes = np.abs(self._evaluate(s)).reshape(4, len(lengths), len(SAMPLES), -1).max(axis=2)
         self._slope = ENOUGH * sizes[1]
         self._second, self._third = ENOUGH * sizes[2].max(axis=1), ENOUGH * sizes[3].max(axis=1)
-        super().__init__(float(knots.s[-1]), self._bends(0, len(lengths)), most)
+        super().__init__(float(knots.s[-1]), self._bends(0, len(lengths)), most, start=float(knots.s[0]))
+
+    def become(self, other: "SplineCurve") -> None:
+        """Go on as another curve, which is the same between where this one is used now and its end."""
+        posture_of = self.posture_of  # what shapes on this curve keeps it
+        self.__dict__.update(other.__dict__)
+        self.posture_of = posture_of
+        self._one = np.empty_like(self._one)
 
     def third(self, s: Floats) -> Floats:
         """Return d³q/ds³ at k points, shape (k, n); it may have steps at the knots."""

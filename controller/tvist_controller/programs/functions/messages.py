@@ -2,7 +2,8 @@
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number, readable
-from tvist_controller.programs.arm import ProgramArm, Turns
+from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.journey import Turns
 from tvist_controller.programs.popups import Popups
 from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import PopupKind

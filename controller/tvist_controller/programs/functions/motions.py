@@ -9,7 +9,8 @@ from tvist_controller.commands.refusal import SLOWEST, RefusalError, check_joint
 from tvist_controller.line.differentiator import STILL, Floats
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import integer, is_pose, number, numbers, pose, positive, shown
-from tvist_controller.programs.arm import ProgramArm, Turns
+from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.journey import Turns
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.trajectory import Guided, JointSpeed, ToolSpeed
 from tvist_plant.plant import PERIOD

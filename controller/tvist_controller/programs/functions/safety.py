@@ -2,7 +2,8 @@
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import positive, shown
-from tvist_controller.programs.arm import ProgramArm, Turns
+from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.journey import Turns
 from tvist_controller.programs.moves import OWN_TOKEN
 from tvist_controller.programs.watchdogs import Watchdogs
 from tvist_protocol.commands import PowerOff

@@ -4,7 +4,8 @@ from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import number, numbers, pose
-from tvist_controller.programs.arm import DELAY, ProgramArm, Turns
+from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.journey import DELAY, Turns
 from tvist_controller.programs.moves import OWN_TOKEN
 from tvist_plant.robot_checks import lacking_inertia
 from tvist_plant.robot_tables import Tensor

@@ -166,9 +166,10 @@ class SocketFunctions:
         return self._sockets.read(name, take, longest, self._go_on)
 
     def _go_on(self, waited: int) -> Generator[None, None, None]:
-        """Carry out the moves that wait for a further one, if its data have not come by now."""
-        if waited == MORE:
-            yield from self._arm.finish()
+        """Begin the moves that wait for a further one, if its data have not come by now; it may come under way."""
+        if waited >= MORE:
+            self._arm.begin()
+        yield from ()
 
 
 def _idle(_: int) -> Generator[None, None, None]:

@@ -1,8 +1,9 @@
 """Functions with which a program waits for statements from clients."""
 
 from tvist_controller.programs.arguments import flag
-from tvist_controller.programs.arm import ProgramArm, Turns
+from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.interpreter import StatementQueue
+from tvist_controller.programs.journey import Turns
 
 
 class StatementFunctions:

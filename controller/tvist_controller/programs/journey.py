@@ -1,0 +1,256 @@
+"""Moves of a program that are blended into one motion, which goes on while further ones come."""
+
+from collections.abc import Callable, Generator
+
+from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.planning.move_planner import PlannedMove
+from tvist_controller.planning.plan import Plan
+from tvist_controller.programs.access import Access
+from tvist_controller.programs.allowance import PAUSE, Allowance
+from tvist_controller.programs.moves import command_of
+from tvist_plant.plant import PERIOD
+from tvist_protocol.commands import MoveJ
+from tvist_protocol.motions import MoveL, MovePath, Segment
+from tvist_protocol.replies import Accepted
+from tvist_urscript import Fault
+
+Turns = Generator[None, None, None]
+"""Course of a function that lets time pass: it yields once a tick."""
+Effect = Callable[[], None]
+
+DELAY, DELAY_PER_PART = 10, 4
+"""Ticks from the call of a move along a line or path to its start, and ticks more for each further part of a path:
+time to plan it beside the ticks. They do not depend on how long planning takes, so equal programs move alike.
+"""
+FURTHER, FURTHER_PER_PART = 12, 1
+"""Ticks from the order of a plan by which the running motion goes on to further moves until it does so, and ticks more
+for each of them.
+"""
+MAX_PARTS = 50
+"""Number of moves that are planned at once from rest. As many wait at most: then the program waits, too."""
+MAX_FURTHER = 25
+"""Number of moves to which a running motion goes on at once."""
+AHEAD = 150
+"""Number of moves ahead of the arm from which on no further ones are planned."""
+SPARE = 4
+"""Ticks more for which the running motion stays as it is, since a change of its rate looks ahead."""
+_UNREACHABLE = frozenset({"no_solution", "singular", "collision", "limit_position"})
+"""Reasons for which a motion that a program has begun ends in a protective stop."""
+
+
+class Journey:
+    """The moves of one thread that are blended, from the first one to the last, and the motion along them.
+
+    The motion begins when the last move is known, or as many as are planned at once; `step` carries it on in every tick
+    while the thread goes on to further moves. Each plan ends at rest, so the arm stops where no further move comes in
+    time.
+
+    Args:
+        access: The robot.
+        owner: The thread.
+        allowance: Counts plans within a tick.
+        rest: Stops what still moves, and lets time pass until a motion may begin.
+    """
+
+    def __init__(
+        self, access: Access, owner: object, allowance: Allowance, rest: Callable[[], Turns]
+    ) -> None:
+        self._access, self._motion, self.owner = access, access.motion, owner
+        self._allowance, self._rest = allowance, rest
+        self.legs: list[Segment] = []
+        """Moves that the arm has not passed."""
+        self._effects: list[list[Effect]] = []
+        """What the program does after each of them, until the next."""
+        self.closed = False
+        """Whether no further move will come."""
+        self.number: int | None = None
+        """Number of the motion while it runs."""
+        self.outcome: str | None = None
+        """Event that ended it."""
+        self.skipped = False
+        """True after a call of `abort`; a motion that was being planned then is not started."""
+        self.over = False
+        """Whether there is nothing more to do."""
+        self._fault: Fault | None = None
+        self._steps: Turns | None = None
+        self._marks: list[tuple[int, float]] = []
+        """Where the blend at the end of each move under way begins, see `PlannedMove.marks`."""
+        self._further: tuple[Callable[[], Plan], int, int] | None = None
+        """Plan of further moves that was ordered, tick at which it is taken, and how many they are."""
+        self._ends = self._refuses = False
+        """Whether the running motion goes on no further, and whether this is since a further move is impossible."""
+        self._count = 0
+        """Number of moves of the running motion so far."""
+
+    # ------------------------------------------------------------------ for the program
+
+    def add(self, leg: Segment) -> None:
+        """Take the next move."""
+        self.legs.append(leg)
+        self._effects.append([])
+
+    def then(self, effect: Effect) -> None:
+        """Do something where the blend after the last move begins."""
+        self._effects[-1].append(effect)
+
+    @property
+    def full(self) -> bool:
+        """Whether as many moves wait as are planned at once."""
+        return len(self.legs) - len(self._marks) >= MAX_PARTS
+
+    @property
+    def begun(self) -> bool:
+        """Whether it is under way."""
+        return self._steps is not None
+
+    def raise_fault(self) -> None:
+        """Raise what has gone wrong, in the thread that it concerns."""
+        fault, self._fault = self._fault, None
+        if fault is not None:
+            raise fault
+
+    # ------------------------------------------------------------------ in every tick
+
+    def step(self) -> None:
+        """Carry out what is due in this tick; the first call begins."""
+        if self.over:
+            return
+        if self._steps is None:
+            self._steps = self._travel()
+        try:
+            next(self._steps)
+        except StopIteration:
+            self.over = True
+        except Fault as fault:
+            self.over, self._fault = True, fault
+
+    def _travel(self) -> Turns:
+        while self.legs:
+            self.skipped = False
+            yield from self._rest()
+            self._check_ready()
+            legs = self.legs[:MAX_PARTS]
+            plan = yield from self._planned(legs)
+            if self._motion.activity.protective:
+                continue
+            if self.skipped:
+                break
+            if isinstance(plan.found, RefusalError):
+                self._refused(plan.found, legs)  # in a protective stop, it tries again when it is resumed
+                continue
+            self._start(legs, plan)
+            while self.outcome is None:
+                yield
+                self._pass_blends()
+                self._go_on()
+            self._marks, ended = [], len(self._marks)
+            if self.outcome == "motion_done":
+                self._tell_stop(ended)
+                self._pass(len(self.legs) if self.skipped else ended)
+        self._pass(len(self.legs))
+
+    def _tell_stop(self, ended: int) -> None:
+        """Say that the arm has stopped at a point with a blend, since the move after it was not known in time."""
+        comes = len(self.legs) > ended or not self.closed
+        if comes and self.legs[ended - 1].blend > 0.0 and not (self._refuses or self.skipped):
+            where = f"segments[{self._count - 1}]"
+            why = f"{where}: the arm stops there, since the move after it was not known in time for its blend"
+            self._access.emit("warning", code="blend_skipped", why=why)
+
+    def _command(self, legs: list[Segment]) -> MoveJ | MoveL | MovePath:
+        return command_of(
+            legs, goes_on=legs[-1].blend > 0.0 and not (self.closed and legs[-1] is self.legs[-1])
+        )
+
+    def _start(self, legs: list[Segment], plan: Plan) -> None:
+        try:
+            reply = self._access.send(self._command(legs), plan)
+        except RefusalError as refusal:
+            raise Fault(refusal.reply.why) from refusal
+        assert isinstance(reply, Accepted)
+        assert isinstance(plan.found, PlannedMove)
+        self.number, self.outcome = reply.id, None
+        self._further, self._ends, self._refuses = None, False, False
+        self._marks = list(plan.found.marks) or [(0, float("inf"))]
+        self._count = len(legs)
+
+    def _planned(self, legs: list[Segment]) -> Generator[None, None, Plan]:
+        """The plan of a move. Lines and paths, and joint moves in debt, begin a fixed time after it is ordered."""
+        plans, command = self._access.plans, self._command(legs)
+        if isinstance(command, MoveJ) and self._allowance.debt < PAUSE:
+            self._allowance.owe()
+            return plans.now(command, within_tick=True)
+        while True:
+            while self._allowance.planning > 0:  # of a thread that was killed meanwhile: one after the other
+                yield
+            self._allowance.planning = DELAY + DELAY_PER_PART * (len(legs) - 1)
+            ordered = plans.later(command)
+            for _ in range(self._allowance.planning):
+                yield
+            yield from self._rest()  # a client may have moved the arm meanwhile
+            self._check_ready()
+            plan = ordered()
+            if plans.hold(plan):
+                return plan
+
+    def _go_on(self) -> None:
+        """Let the running motion go on to the moves that have come meanwhile."""
+        if self._further is not None and not self._take():
+            return
+        under_way = len(self._marks)
+        legs = self.legs[under_way : under_way + MAX_FURTHER]
+        if not legs or under_way >= AHEAD or self._ends or self.legs[under_way - 1].blend == 0.0:
+            return
+        ticks = FURTHER + FURTHER_PER_PART * len(legs)
+        ordered = self._access.plans.further(command_of(legs, goes_on=True), (ticks + SPARE) * PERIOD)
+        if ordered is not None:
+            self._further = ordered, self._tick + ticks, len(legs)
+
+    def _take(self) -> bool:
+        """Take the plan of further moves when it is due; return whether more may be ordered."""
+        assert self._further is not None
+        ordered, due, count = self._further
+        if self._tick < due:
+            return False
+        plan, self._further = ordered(), None
+        if not self._access.plans.hold(plan):  # what it depends on has changed
+            return True
+        if not isinstance(plan.found, PlannedMove):  # the moves begin anew where the motion ends
+            self._ends, self._refuses = True, plan.found is not None
+            return False
+        part = self._marks[-1][0]
+        self._motion.motions.extend(plan.found)
+        self._marks[-1:] = [(part + number, place) for number, place in plan.found.marks]
+        self._count += count
+        return True
+
+    def _pass_blends(self) -> None:
+        """Do what the program does behind the blends that the arm has begun."""
+        progress = self._motion.motions.progress
+        while progress is not None and len(self._marks) > 1 and progress > self._marks[0]:
+            del self._marks[0]
+            self._pass(1)
+
+    def _pass(self, count: int) -> None:
+        effects = self._effects[:count]
+        del self.legs[:count], self._effects[:count]
+        for each in effects:
+            for effect in each:
+                effect()
+
+    @property
+    def _tick(self) -> int:
+        return self._access.latest().tick
+
+    def _check_ready(self) -> None:
+        try:
+            self._motion.check("move_j")
+        except RefusalError as refusal:
+            raise Fault(refusal.reply.why) from refusal
+
+    def _refused(self, refusal: RefusalError, legs: list[Segment]) -> None:
+        """End a program whose move is impossible, or stop the robot if it is a line or path that leads nowhere."""
+        reply = refusal.reply
+        if isinstance(command_of(legs), MoveJ) or reply.code not in _UNREACHABLE:
+            raise Fault(reply.why)
+        self._motion.protect(f"the program's move was refused: {reply.why}", reply.code)

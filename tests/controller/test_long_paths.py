@@ -1,0 +1,258 @@
+"""Programs of many points close to each other: the arm does not stand still, and what comes late it waits for."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tvist_controller.dispatch.planner import Planner
+from tvist_controller.planning.move_planner import PlannedMove
+from tvist_protocol import commands as c
+from tvist_protocol.motions import MovePath
+from tvist_protocol.programs import ProgramPlay
+
+from .robots import H
+from .scripts import a_robot, failure, finish, playing, start
+from .test_program_sockets import opened
+from .test_programs import HERE, KINEMATICS
+
+APART, ROUND, SPEED, ACCELERATION = 1.5e-3, 0.05, 0.5, 2.0
+"""Distance of the points on a circle, its radius [m], and what the moves ask for [m/s, m/s^2]."""
+
+
+def circle(count):
+    """Points on a circle through where the arm is, shape (count, 3) [m]."""
+    angles = 2.0 * np.arcsin(0.5 * APART / ROUND) * np.arange(1, count + 1)
+    around = np.column_stack((np.sin(angles), 1.0 - np.cos(angles), np.zeros(count)))
+    return np.array(HERE[:3]) + ROUND * around
+
+
+def zigzag(count):
+    """Rows of 30 mm, 6 mm apart."""
+    steps = ([[1, 0, 0]] * 20 + [[0, 1, 0]] * 4 + [[-1, 0, 0]] * 20 + [[0, 1, 0]] * 4) * (count // 48 + 1)
+    return np.array(HERE[:3]) + APART * np.cumsum(steps[:count], axis=0)
+
+
+def moves(points, radius=5e-4):
+    last = len(points) - 1
+    return [
+        f"movel(p{[*map(float, point), *HERE[3:]]}, a={ACCELERATION}, v={SPEED}, r={0 if number == last else radius})"
+        for number, point in enumerate(points)
+    ]
+
+
+def tool(robot):
+    """Positions of the tool, of the shaped reference, one a tick [m]."""
+    return np.array([KINEMATICS.pose(np.array(state.target_q))[1] for state in robot.states])
+
+
+def speeds(robot):
+    """Speed of the tool between the first and the last moment at which it moves, without 0.1 s at both ends [m/s]."""
+    speed = np.linalg.norm(np.diff(tool(robot), axis=0), axis=1) / H
+    moving = np.flatnonzero(speed > 1e-6)
+    return speed[moving[0] : moving[-1] + 1][50:-50]
+
+
+def away(robot, points):
+    """Largest distance of the tool from the lines between the points [m]."""
+    corners, worst = np.vstack((HERE[:3], points)), 0.0
+    starts, ways = corners[:-1], np.diff(corners, axis=0)
+    for place in tool(robot):
+        shares = np.clip(((place - starts) * ways).sum(axis=1) / (ways**2).sum(axis=1), 0.0, 1.0)
+        worst = max(worst, float(np.linalg.norm(starts + shares[:, None] * ways - place, axis=1).min()))
+    return worst
+
+
+def warnings(robot):
+    return [event.why for event in robot.events if event.kind == "warning"]
+
+
+def begin(points, ticks=0, **changes):
+    robot = a_robot(**changes)
+    start(robot, *moves(points))
+    robot.tick(ticks)
+    return robot
+
+
+@pytest.mark.parametrize("shaper", ["none", "zv"])
+def test_the_arm_goes_along_points_as_fast_as_their_curve_permits_and_never_stands_still(shaper):
+    """Without its ends, which last longer with a shaper, it takes at most 1.25 times the circle's quickest time."""
+    points = circle(300)
+    robot = finish(begin(points, shaper=shaper))
+    between = speeds(robot)
+    assert between.min() > 0.01 * SPEED
+    quickest = between.sum() * H / np.sqrt(ACCELERATION * ROUND)
+    assert len(between) * H <= 1.25 * quickest
+    assert robot.kinds().count("motion_started") == 1
+    assert warnings(robot) == []
+    np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-9)
+    assert away(robot, points) < 2e-5
+
+
+def test_corners_between_points_are_passed_without_a_stop_and_inside_their_radius():
+    points = zigzag(150)
+    robot = finish(begin(points))
+    assert speeds(robot).min() > 0.01 * SPEED
+    assert away(robot, points) < 5e-4
+    assert robot.kinds().count("motion_started") == 1
+
+
+def test_limits_are_kept_where_a_motion_goes_on():
+    robot = finish(begin(circle(200)))
+    q = np.array([state.reference_q for state in robot.states])
+    places = np.array([KINEMATICS.pose(each)[1] for each in q])
+    assert np.abs(np.diff(q, 3, axis=0)).max() / H**3 < 2000.0
+    acceleration = np.linalg.norm(np.diff(places, 2, axis=0), axis=1) / H**2
+    assert acceleration.max() < 1.02 * ACCELERATION
+    jerk = np.linalg.norm(np.diff(places, 3, axis=0), axis=1) / H**3
+    assert jerk.max() < 2.0 * 60.0  # along the path it is limited to 60, and across it by the joints
+
+
+def test_however_many_points_there_are_a_plan_has_few_of_them_and_a_short_part_of_the_path(monkeypatch):
+    sizes, plan = [], Planner.plan
+
+    def noted(self, command, *rest, **named):
+        found = plan(self, command, *rest, **named)
+        if isinstance(command, MovePath):
+            assert isinstance(found.found, PlannedMove)
+            course = found.found.course
+            sizes.append((len(command.segments), len(course.curve.knots.s), len(course.law.edges)))
+        return found
+
+    monkeypatch.setattr(Planner, "plan", noted)
+    robot = begin(circle(900))
+    journeys, most = robot.controller.programs.arm._journeys, 0
+    while playing(robot):
+        robot.tick()
+        most = max([most, *(len(one.legs) for one in journeys.values())])
+    parts, knots, edges = np.array(sizes).T
+    assert parts[0] == 50
+    assert max(parts[1:]) <= 25
+    assert max(knots) < 700
+    assert max(edges) < 1500
+    assert most < 250
+
+
+def test_equal_programs_give_equal_bits():
+    one, other = (finish(begin(circle(120), shaper="zv")) for _ in range(2))
+    assert [state.target_q for state in one.states] == [state.target_q for state in other.states]
+
+
+CHANGES = st.lists(
+    st.tuples(
+        st.integers(1, 120),
+        st.sampled_from(["pause", "resume", "slow", "fast", "zv", "none", "heavy", "light"]),
+    ),
+    max_size=6,
+)
+
+
+def change(robot, what):
+    match what:
+        case "pause":
+            robot.send(c.Pause)
+        case "resume":
+            robot.send(c.Resume)
+        case "slow" | "fast":
+            robot.send(c.SetSpeed, fraction=0.3 if what == "slow" else 1.0)
+        case "heavy" | "light":
+            robot.send(c.SetPayload, mass=3.0 if what == "heavy" else 0.5, com=(0, 0, 0.05), inertia=(0,) * 6)
+        case _:
+            robot.send(c.SetShaper, name=what)
+
+
+@settings(max_examples=10, deadline=None)
+@given(CHANGES)
+def test_whatever_is_changed_on_the_way_it_stays_on_the_path_and_comes_to_its_end(changes):
+    points = circle(100)
+    robot = begin(points, 215)
+    for ticks, what in changes:
+        robot.tick(ticks)
+        change(robot, what)
+    robot.send(c.Resume)
+    robot.send(c.SetSpeed, fraction=1.0)
+    finish(robot)
+    assert failure(robot) is None
+    np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-8)
+    assert away(robot, points) < 2e-5
+
+
+@pytest.mark.parametrize("ticks", [230, 300, 371, 480])
+def test_a_stop_on_the_way_ends_it_on_the_path(ticks):
+    points = circle(200)
+    robot = begin(points, ticks)
+    robot.send(c.Stop)
+    robot.tick(400)
+    assert robot.controller.cycle.mode.at_rest
+    assert not playing(robot)
+    assert robot.kinds().count("motion_started") == 1
+    assert away(robot, points) < 2e-5
+
+
+@pytest.mark.parametrize("ticks", [230, 371, 480])
+def test_after_a_protective_stop_it_goes_on_to_the_end(ticks):
+    points = circle(150)
+    robot = begin(points, ticks)
+    robot.controller.motion.protect("a test")
+    robot.tick(3000)
+    robot.send(c.UnlockProtectiveStop)
+    robot.send(ProgramPlay)
+    finish(robot)
+    assert failure(robot) is None
+    np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-8)
+
+
+READS = (
+    "n = 1",
+    "while n > 0:",
+    "  got = socket_read_ascii_float(3, timeout=1)",
+    "  n = got[0]",
+    "  if n > 0:",
+    f"    movel(p[got[1], got[2], got[3], {HERE[3]}, {HERE[4]}, {HERE[5]}], a=2, v=0.5, r=0.0005)",
+    "  end",
+    "end",
+)
+
+
+def sent(points):
+    return "".join(f"({x:.9f},{y:.9f},{z:.9f})\n" for x, y, z in points).encode()
+
+
+def test_points_that_come_over_a_socket_in_time_are_one_motion():
+    points = circle(150)
+    robot, far = opened(*READS)
+    for number in range(0, 150, 3):
+        far.tell("received", sent(points[number : number + 3]))
+        robot.tick(8)
+    robot.tick(600)
+    between = speeds(robot)
+    assert between.min() > 0.01 * SPEED
+    assert robot.kinds().count("motion_started") == 1
+    np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-8)
+
+
+def test_where_the_next_point_comes_too_late_the_arm_stops_at_the_last_one_and_says_so():
+    points = circle(80)
+    robot, far = opened(*READS)
+    far.tell("received", sent(points[:60]))
+    robot.tick(900)
+    np.testing.assert_allclose(tool(robot)[-1], points[59], atol=1e-8)
+    assert warnings(robot) == [
+        "segments[59]: the arm stops there, since the move after it was not known in time for its blend"
+    ]
+    far.tell("received", sent(points[60:]))
+    robot.tick(600)
+    assert robot.kinds().count("motion_started") == 2
+    np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-8)
+
+
+def test_a_far_point_that_comes_while_the_arm_is_on_its_way_is_blended():
+    """The arm has begun the last line that it knows, and is not yet where the blend begins."""
+    x, y, z = HERE[:3]
+    robot, far = opened(*READS)
+    far.tell("received", sent([(x, y + 0.05, z)]))
+    robot.tick(100)
+    far.tell("received", sent([(x, y + 0.05, z + 0.05)]))
+    robot.tick(900)
+    assert robot.kinds().count("motion_started") == 1
+    assert speeds(robot).min() > 0.01 * SPEED
