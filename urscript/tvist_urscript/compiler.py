@@ -112,7 +112,9 @@ def translate(
 def _program(text: str) -> tree.Function:
     statements = _parsed(text)
     head = statements[0]
-    if len(statements) > 1 or not isinstance(head, tree.Function):
+    if not isinstance(head, tree.Function) or not (
+        len(statements) == 1 or _is_called_alone(head, statements)
+    ):
         return _together(text, statements)
     if head.kind == "thread":
         raise ScriptError(head.line, head.column, syntax_error(head.line, "a thread belongs into a program"))
@@ -120,6 +122,15 @@ def _program(text: str) -> tree.Function:
         name, _ = head.parameters[0]
         raise ScriptError(name.line, name.column, f"the program {head.name} cannot have parameters")
     return head
+
+
+def _is_called_alone(head: tree.Function, statements: list[tree.Statement]) -> bool:
+    """Whether all that follows a `def` is one call of it, as post-processors write a program for a socket."""
+    match statements[1:]:
+        case [tree.Evaluate(value=tree.Call(name=name, arguments=[], runs=False))]:
+            return head.kind == "def" and name == head.name and not head.parameters
+        case _:
+            return False
 
 
 def _statements(text: str) -> tree.Function:
