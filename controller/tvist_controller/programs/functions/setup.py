@@ -93,6 +93,11 @@ class SetupFunctions:
         """
         self._choose("digital", STANDARD[integer("outputId", outputId, 0, 7)], state)
 
+    def set_runstate_standard_digital_outputs(self, outputs: object) -> None:
+        """Check the numbers of outputs. What each does is said by the calls that PolyScope exports behind this one."""
+        for output in outputs.items if isinstance(outputs, Array) else (outputs,):
+            integer("outputs", output, 0, 7)
+
     def set_runstate_configurable_digital_output_to_value(self, outputId: object, state: object) -> None:
         """Choose what an output does, as `set_runstate_standard_digital_output_to_value`."""
         self._choose("digital", CONFIGURABLE[integer("outputId", outputId, 0, 7)], state)
