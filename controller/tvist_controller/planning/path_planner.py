@@ -71,7 +71,8 @@ class PathPlanner:
         limits = self._description.limits
         joints = JointLimits(np.array(limits.velocity), np.array(limits.acceleration), min(limits.jerk))
         curve = SplineCurve(joined(run))
-        law_of(run, curve, ground_of(run, curve), joints, 60.0, LEAST_WINDOW)
+        for goes_on in (False, True):
+            law_of(run, curve, ground_of(run, curve), joints, 60.0, LEAST_WINDOW, goes_on=goes_on)
 
     def plan(self, command: MoveL | MoveC | MovePath, basis: MotionBasis) -> PlannedMove | None:
         """Plan a motion from rest, or the rest of one that goes on; the command's content has been checked.
