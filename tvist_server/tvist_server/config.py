@@ -8,20 +8,18 @@ from typing import Annotated, TypeVar
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
-from tvist_controller import calibrations
 from tvist_controller.cell.description import Cell, as_declared
 from tvist_controller.setup import Setup, check_rating, paper_payload
 from tvist_controller.sources.own_plants import load_plant
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
-from tvist_protocol.calibration import Calibration
 from tvist_protocol.info import Clock
 from tvist_protocol.values import Namespace, Payload, RobotName, Seed
 from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.cell_file import read_cell
 from tvist_server.durations import ticks_of
 from tvist_server.fleet import MOST, members
-from tvist_server.initial import read_state, shaped_by
+from tvist_server.initial import calibration_for, posture, read_state, shaped_by
 from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.temporary import temporary_folder
@@ -282,11 +280,11 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             if self.ur:
                 self.ur_ports.check_joints(description.robot.name, description.joints)
             profile = PLAIN if chosen is None else PROFILES[chosen]
-            calibration = self._calibration(description.robot.model)
+            calibration = calibration_for(self.calibration, description)
             cell = None if self.cell is None else read_cell(self.cell)
             setup = Setup(
                 description=self._described(description, profile),
-                q=self._start(description, profile),
+                q=posture(_either(self.start, profile.start(description) or "Q1"), description),
                 payload=self._declared(description, profile, cell),
                 carried=None if cell is None or not cell.tools else as_declared(cell.tools[0]),
                 cell=cell,
@@ -312,11 +310,6 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 check_rating(setup.payload, description)
             except ValueError as error:
                 raise ConfigError(f"{error}: give --overload to insist") from error
-        if calibration is not None and calibration.robot != description.robot.model:
-            raise ConfigError(
-                f"calibration {calibration.name!r} is for a {calibration.robot}, but the robot is a "
-                f"{description.robot.model}: give another calibration, or none"
-            )
         return setup
 
     @property
@@ -335,29 +328,6 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         if self.payload is None and cell is not None and cell.tools:
             return as_declared(cell.tools[0])
         return paper_payload(description, _either(self.payload, profile.payload))
-
-    def _calibration(self, model: str) -> Calibration | None:
-        """Load the calibration that is named or, if none is, the one that comes with the package for this model."""
-        name = calibrations.default_for(model) if self.calibration is None else self.calibration
-        if name is None:
-            raise ConfigError(
-                f"no calibration for a {model} comes with the package: give one that tvist identify made, or none"
-            )
-        return None if name == "none" else calibrations.load(name)
-
-    def _start(self, description: RobotDescription, profile: Profile) -> tuple[float, ...]:
-        start = _either(self.start, profile.start(description) or "Q1")
-        if not isinstance(start, str):
-            return start
-        for name, pose in description.poses.items():
-            if name.lower() == start.strip().lower():
-                return pose
-        try:
-            return tuple(float(angle) for angle in start.split(","))
-        except ValueError:
-            known = ", ".join(description.poses)
-            why = f"start is {start.strip()!r}: must be one of {known}, or angles separated by commas"
-            raise ConfigError(why) from None
 
 
 def _either(given: T | None, default: T) -> T:

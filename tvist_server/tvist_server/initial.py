@@ -7,10 +7,13 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
+from tvist_controller import calibrations
 from tvist_controller.setup import Setup
 from tvist_controller.sources.own_files import is_file
 from tvist_controller.sources.own_shapers import check_for, load_own
+from tvist_plant.description import RobotDescription
 from tvist_plant.user_file import read_bytes, read_toml
+from tvist_protocol.calibration import Calibration
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Joints, Payload, ResetMode, Seed
@@ -93,3 +96,51 @@ def read_state(path: str) -> InitialState:
         raise InitialStateError(f"state {path}: it is not valid TOML: {error}") from error
     except ProtocolError as error:
         raise InitialStateError(f"state {path}: {error.why}") from error
+
+
+def calibration_for(name: str | None, description: RobotDescription) -> Calibration | None:
+    """Load a calibration.
+
+    Args:
+        name: Name of one that comes with the package, a file that `tvist identify` made, or `none`; None for the one
+            that comes with the package for this model.
+        description: The robot.
+
+    Raises:
+        ValueError: There is none, or it is for another robot.
+    """
+    model = description.robot.model
+    name = calibrations.default_for(model) if name is None else name
+    if name is None:
+        raise ValueError(
+            f"no calibration for a {model} comes with the package: give one that tvist identify made, or none"
+        )
+    if name == "none":
+        return None
+    found = calibrations.load(name)
+    if found.robot != model:
+        raise ValueError(
+            f"calibration {found.name!r} is for a {found.robot}, but the robot is a {model}: give another "
+            "calibration, or none"
+        )
+    return found
+
+
+def posture(start: str | tuple[float, ...], description: RobotDescription) -> tuple[float, ...]:
+    """Return the joint angles of a pose's name, or of angles separated by commas [rad].
+
+    Raises:
+        ValueError: It is neither.
+    """
+    if not isinstance(start, str):
+        return start
+    for name, pose in description.poses.items():
+        if name.lower() == start.strip().lower():
+            return pose
+    try:
+        return tuple(float(angle) for angle in start.split(","))
+    except ValueError:
+        known = ", ".join(description.poses)
+        raise ValueError(
+            f"start is {start.strip()!r}: must be one of {known}, or angles separated by commas"
+        ) from None
