@@ -84,7 +84,7 @@ def run_program(
     return Ran(result, summary(watch), failure, server)
 
 
-def _counted(found: "Sequence[Shortcoming]", what: str) -> str:
+def _counted(found: Sequence[object], what: str) -> str:
     from tvist_lab.words import counted
 
     return counted(len(found), what)
@@ -103,8 +103,8 @@ def _checked(file: Path, text: str) -> Ran | None:
     first = {"line": errors[0].line, "column": errors[0].column, "text": errors[0].text}
     failures = [{"kind": "compile_error", "line": one.line, "text": one.text} for one in errors]
     result = {"file": named(file), "ok": False, "exit_reason": "compile_error", "error": first}
-    count = f"{len(errors)} {'error' if len(errors) == 1 else 'errors'}"
-    return Ran({**result, "failures": failures}, failure=Failure(f"{named(file)} cannot run: it has {count}"))
+    why = f"{named(file)} cannot run: it has {_counted(errors, 'error')}"
+    return Ran({**result, "failures": failures}, failure=Failure(why))
 
 
 def _ended(watch: "ProgramWatch", errors: list[str]) -> "list[Shortcoming]":

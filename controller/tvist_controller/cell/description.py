@@ -79,7 +79,7 @@ class GripperModel(_Table, frozen=True, kw_only=True):
     """A gripper with two fingers, on one of the tools. It answers as a Robotiq 2F does."""
 
     model: Literal["2F-85", "2F-140"]
-    """Which one: it opens by 85 mm or 140 mm."""
+    """Model, which opens by 85 mm or 140 mm."""
     tool: str | None = None
     """Name of the tool that it is part of [the first]."""
     activated: bool = False

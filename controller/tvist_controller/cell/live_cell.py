@@ -156,9 +156,8 @@ class LiveCell:
         self._emit("text", why=f"cell: the tool {tool.name} ({tool.mass:g} kg) is on the flange")
 
     def _move_fingers(self, gripper: Gripper, q: Floats) -> None:
-        holding = gripper.holds
         moved = gripper.tick(lambda wide, narrow: self._between(wide, narrow, q))
-        if holding and self._held is not None and moved.released:
+        if moved.released and self._held is not None:
             self._put_down(q)
         if moved.gripped and self._met is not None:
             self._pick_up(self._met, q)

@@ -134,11 +134,19 @@ def _kept(law: RetimedLaw, curve: SplineCurve, limits: JointLimits) -> RetimedLa
 
 def _excess(law: RetimedLaw, moments: Floats, curve: SplineCurve, limits: JointLimits) -> float:
     """Largest ratio of a speed to the one with which the joints keep their limits, at some moments [-]."""
+    velocity, acceleration = shares(law, moments, curve, limits)
+    return max(float(velocity.max()), float(np.sqrt(acceleration.max())))
+
+
+def shares(
+    law: RetimedLaw, moments: Floats, curve: SplineCurve, limits: JointLimits
+) -> tuple[Floats, Floats]:
+    """Largest shares of the joints' limits of velocity and acceleration at some moments, each of shape (n,) [-]."""
     s, sd, sdd = law.states(moments)
     _, slope, second = curve.derivatives(s)
     qd = np.abs(slope * sd[:, None])
     qdd = np.abs(slope * sdd[:, None] + second * (sd**2)[:, None])
-    return max(float((qd / limits.velocity).max()), float(np.sqrt((qdd / limits.acceleration).max())))
+    return qd.max(axis=0) / limits.velocity, qdd.max(axis=0) / limits.acceleration
 
 
 def fastest(law: RetimedLaw, curve: SplineCurve) -> float:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.paths.pacing import JointLimits
+from tvist_controller.paths.pacing import JointLimits, shares
 from tvist_controller.paths.route import Run
 from tvist_controller.trajectory.retiming import RetimedLaw
 from tvist_controller.trajectory.spline import SplineCurve
@@ -40,13 +40,12 @@ def slower_than_asked(
         See `PlannedMove.limited`; None if it is as fast as asked, or if just the way is too short.
     """
     pacing, way = run[0].pacing, float(curve.end[0])
-    s, sd, sdd = law.states(law.moments)
-    fastest = float(sd.max())
     if pacing.duration is not None:
         if law.duration <= LATE * pacing.duration:
             return None
         what = f"duration is {law.duration:.4g} s instead of {pacing.duration:.4g}"
-        return _because(what, _shares(curve, s, sd, sdd, limits), description)
+        return _because(what, shares(law, law.moments, curve, limits), description)
+    fastest = float(law.states(law.moments)[1].max())
     if fastest >= REACHED * pacing.velocity:
         return None
     what = f"velocity is {fastest:.4g} of {pacing.velocity:.4g} m/s"
@@ -56,21 +55,11 @@ def slower_than_asked(
     short = within_reach < pacing.velocity
     if short and within_reach <= min(permitted, BLUNTED * fastest):
         return None
-    return _because(what, _shares(curve, s, sd, sdd, limits), description)
+    return _because(what, shares(law, law.moments, curve, limits), description)
 
 
-def _shares(
-    curve: SplineCurve, s: Floats, sd: Floats, sdd: Floats, limits: JointLimits
-) -> tuple[Floats, Floats]:
-    """Shares of the joints' velocities and accelerations that a motion uses at most, each of shape (n,)."""
-    _, slope, second = curve.derivatives(s)
-    qd = slope * sd[:, None]
-    qdd = slope * sdd[:, None] + second * (sd**2)[:, None]
-    return np.abs(qd).max(axis=0) / limits.velocity, np.abs(qdd).max(axis=0) / limits.acceleration
-
-
-def _because(what: str, shares: tuple[Floats, Floats], description: RobotDescription) -> tuple[Code, str]:
-    velocity, acceleration = shares
+def _because(what: str, used: tuple[Floats, Floats], description: RobotDescription) -> tuple[Code, str]:
+    velocity, acceleration = used
     names, limits = description.robot.joints, description.limits
     if velocity.max() >= BINDING:
         joint = int(np.argmax(velocity))

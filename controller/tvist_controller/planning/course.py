@@ -12,6 +12,20 @@ from tvist_controller.trajectory.spline import Knots, SplineCurve
 
 KEPT = 1.2
 """Time of a motion that is kept behind the arm [s]: filters keep samples of up to a second."""
+SAME = 1e-9
+"""Distance below which two knots are one [m]."""
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """Edges of a law."""
+
+    first: int
+    """The first one that is kept."""
+    known: int
+    """The last one up to which the law stays the same."""
+    branch: int
+    """The one behind which the path may change."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +49,7 @@ class Course:
         """Joint positions at its end, shape (n,) [rad]."""
         return self.curve.posture(self.curve.end)
 
-    def branch(self, until: float) -> "tuple[Cuts, Branch] | None":
+    def branch(self, until: float) -> tuple[Cuts, Branch] | None:
         """Return the first place at which it may change, and what stays the same there; None if that comes too soon.
 
         Args:
@@ -55,7 +69,7 @@ class Course:
         begun = last.begun + s - last.s  # the arm is on its last leg already
         return Cuts(first, known, known), Branch(s, last.legs, begun, self.curve.posture(np.array([s])))
 
-    def knots(self, cuts: "Cuts") -> Knots:
+    def knots(self, cuts: Cuts) -> Knots:
         """The knots of the part that is kept: up to where it branches."""
         s, old = self.law.edges, self.curve.knots
         kept = slice(
@@ -65,19 +79,3 @@ class Course:
         end = self.curve.derivatives(s[cuts.branch : cuts.branch + 1])
         ends = (s[cuts.branch : cuts.branch + 1], *end)
         return Knots(*(np.concatenate((each[kept], one)) for each, one in zip(old, ends, strict=True)))
-
-
-SAME = 1e-9
-"""Distance below which two knots are one [m]."""
-
-
-@dataclass(frozen=True)
-class Cuts:
-    """Edges of a law."""
-
-    first: int
-    """The first one that is kept."""
-    known: int
-    """The last one up to which the law stays the same."""
-    branch: int
-    """The one behind which the path may change."""

@@ -290,9 +290,10 @@ class ProgramArm:
         return stopped
 
     def _check_alone(self) -> None:
-        journey = self._journey
-        moves = journey is not None and not journey.over and self._lives(journey.owner)
-        if {self._inside, journey.owner if moves and journey is not None else None} - {None, self._thread()}:
+        journey, owner = self._journey, None
+        if journey is not None and not journey.over and self._lives(journey.owner):
+            owner = journey.owner
+        if {self._inside, owner} - {None, self._thread()}:
             raise Fault(TAKEN)
 
     @contextmanager

@@ -4,16 +4,15 @@ A program that was exported with the URCap has these functions in its preamble: 
 the gripper over a socket.
 """
 
-from collections.abc import Generator
 from math import ceil, floor
 
 from tvist_controller.cell.gripper import CLOSED, MOVING, OPEN, Gripper
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import integer, number
 from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.journey import Turns
 from tvist_urscript import Fault
 
-Turns = Generator[None, None, None]
 _ONE = "1"
 """Gripper that a call does not name. The cell has one, so the name makes no difference."""
 
