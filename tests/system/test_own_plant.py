@@ -85,7 +85,9 @@ def test_ur_s_own_client_moves_it(served):
 
 def test_its_fault_stops_the_robot_and_is_told(served, broken):
     with Robot.connect(served.endpoint) as robot:
-        broken.write_text("joint 3 is too warm")
+        written = broken.with_suffix(".new")
+        written.write_text("joint 3 is too warm")
+        written.replace(broken)  # the arm never reads half of it
         try:
             eventually(lambda: robot.state().safety_mode == 9)
             assert robot.state().robot_mode == 3
