@@ -11,7 +11,7 @@ READY := .venv/.ready
 # The folders of the distributions: tvist-protocol, tvist-shaping, tvist-urscript and tvist.
 DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 
-.PHONY: checksums docs docs-serve rehearse release setup demo notebooks test test-all lint elsewhere bench soak dist format lock schemas clean
+.PHONY: checksums page docs docs-serve rehearse release setup demo notebooks test test-all lint elsewhere bench soak dist format lock schemas clean
 
 setup: $(READY)
 
@@ -60,6 +60,10 @@ soak: setup elsewhere rehearse
 format: setup
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
+
+# The page of the view is in the repository, built; only who changes it needs Node.
+page:
+	cd view/page && npm ci --ignore-scripts --no-audit --no-fund && node build.mjs
 
 # The site needs no package of tvist: it is made from the files. So its environment is a small one of its own.
 DOCS_READY := .venv-docs/.ready

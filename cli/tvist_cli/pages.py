@@ -3,41 +3,61 @@
 import asyncio
 import logging
 import os
-import warnings
-from collections.abc import Callable, Coroutine
-from typing import TYPE_CHECKING, Any
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from tvist_cli.failure import interrupted, told
 from tvist_cli.output import err
 
 if TYPE_CHECKING:
-    from viser import ViserServer
+    from tvist_view.stage import Meet
 
 NICE = 5
 """How much a page gives way to other programs, such as a robot's server on the same machine."""
 
 
+@dataclass(frozen=True)
+class Door:
+    """Where a page is served."""
+
+    address: str
+    port: int
+    insecure: bool
+    """Serve other machines, too."""
+
+
 def serve_page(
-    run: "Callable[[ViserServer], Coroutine[Any, Any, None]]",
-    place: tuple[str, int],
-    title: str,
-    *,
-    insecure: bool,
+    page: str,
+    meet: "Meet",
+    door: Door,
+    run: Callable[[], Awaitable[None]] | None = None,
+    parts: Callable[[str], bytes | None] = lambda _: None,
 ) -> None:
-    """Serve a page until Control+C."""
-    from tvist_view.stage import StageError, close_stage, open_stage
+    """Serve a page until Control+C.
+
+    Args:
+        page: The page.
+        meet: Called for each tab.
+        door: Where it is served.
+        run: What is done while it is served; None: nothing.
+        parts: Content of a path that the page asks for; None: there is none.
+    """
+    from tvist_view.stage import StageError, open_stage
 
     logging.basicConfig(format="tvist: %(message)s", level=logging.WARNING)
-    warnings.filterwarnings("ignore", "Queued a .* on a closed connection")  # a browser left during a picture
     if hasattr(os, "nice"):
         os.nice(NICE)
-    with told(StageError):
-        server = open_stage(*place, title, insecure=insecure)
-    err.print(f"the page is at http://{place[0]}:{server.get_port()} (Control+C ends it)")
+
+    async def served() -> None:
+        async with open_stage(
+            page, meet, door.address, door.port, insecure=door.insecure, parts=parts
+        ) as url:
+            err.print(f"the page is at {url} (Control+C ends it)")
+            await (asyncio.Event().wait() if run is None else run())
+
     try:
-        with told():
-            asyncio.run(run(server))
+        with told(StageError):
+            asyncio.run(served())
     except KeyboardInterrupt:
         raise interrupted("the page has ended") from None
-    finally:
-        close_stage(server)

@@ -1,62 +1,118 @@
-"""Recordings as runs that a page plays back."""
+"""Recordings and simulated motions as runs that a page plays back."""
 
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.pages import serve_page
+from tvist_cli.judging import judge
+from tvist_cli.output import progress
+from tvist_cli.pages import Door, serve_page
+from tvist_cli.serving import compile_if_new
 
 if TYPE_CHECKING:
     from tvist_lab.recordings.mcap_file import RecordingFile
-    from tvist_protocol.geometry import Geometry
-    from tvist_protocol.values import Payload
+    from tvist_view.look import Look
     from tvist_view.track import Track
 
 
-def show_tracks(tracks: "list[Track]", factor: float, place: tuple[str, int], *, insecure: bool) -> None:
-    """Play runs back on a page until Control+C.
+@dataclass(frozen=True)
+class Shows:
+    """What is shown."""
 
-    Args:
-        tracks: The runs.
-        factor: Magnification of the bending to begin with.
-        place: Address and port of the page.
-        insecure: Serve other machines, too.
-    """
-    from tvist_view.playback import Playback
+    title: str
+    tracks: "list[Track]"
+    result: dict[str, Any] | None = None
+    """What the comparison of two runs says."""
 
-    serve_page(
-        lambda server: Playback(server, tracks, factor=factor).run(), place, "tvist", insecure=insecure
-    )
+    @property
+    def lasts(self) -> float:
+        """Duration [s]."""
+        return max(track.end for track in self.tracks) - min(track.start for track in self.tracks)
+
+    def page(self, factor: float) -> str:
+        """The page that plays it back.
+
+        Args:
+            factor: Magnification of the bending to begin with.
+        """
+        from tvist_view.playback import playback
+
+        return playback(self.tracks, self.title, factor=factor, result=self.result)
+
+    def serve(self, factor: float, door: Door) -> None:
+        """Play it back on a page until Control+C."""
+        from tvist_view.playback import meet
+
+        serve_page(self.page(factor), meet, door)
 
 
-def recorded(file: Path) -> "list[Track]":
+def recorded(file: Path) -> Shows:
     """The run in a recording."""
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read
-    from tvist_view.chain import Chain
+    from tvist_view.look import GeometryError
     from tvist_view.track import Shown, Track, TrackError
 
-    with told(RecordingError, TrackError, ValueError):
+    with told(RecordingError, TrackError, GeometryError, ValueError):
         content = read(file)
-        geometry, payload = _look_of(content)
-        Chain(geometry)  # raises where this program cannot draw it
-        return [Track(Shown(file.stem, geometry, payload), content.states, content.truths)]
+        return Shows(file.stem, [Track(Shown(file.stem, _look_of(content)), content.states, content.truths)])
 
 
-def _look_of(content: "RecordingFile") -> "tuple[Geometry, Payload]":
+def compared(shapers: Sequence[str], robot: str) -> Shows:
+    """The same motion with each shaper, simulated now."""
+    from tvist_controller.commands.refusal import RefusalError
+    from tvist_lab.compared import run_beside
+    from tvist_plant.description import DescriptionError, load
+    from tvist_server.config import ConfigError
+    from tvist_view.beside import Run
+    from tvist_view.described import pairs
+    from tvist_view.look import Look
+    from tvist_view.playback import said
+    from tvist_view.track import Shown, Track
+
+    if not 2 <= len(shapers) <= 3:
+        raise Failure(f"compare has {len(shapers)} shapers: give two or three", code=2)
+    compile_if_new()
+    tracks, runs = [], []
+    with told(DescriptionError, ConfigError, RefusalError, code=2), progress(len(shapers), "runs") as advance:
+        poses = load(robot).poses
+        named = pairs(list(poses))
+        if not named:
+            raise Failure(f"robot file {robot} names no two poses to move between", code=2)
+        first, last = named[0]
+        for shaper in shapers:
+            info, collected = asyncio.run(run_beside(shaper, (poses[first], poses[last]), robot=robot))
+            assert info.geometry is not None  # of our own server
+            label = "without" if shaper == "none" else f"with {shaper}" if "none" in shapers else shaper
+            tracks.append(
+                Track(Shown(label, Look(info.geometry, info.payload)), collected.states, collected.truths)
+            )
+            runs.append(Run(collected.states, collected.truths, collected.events))
+            advance(1, None)
+    result = None
+    if len(shapers) == 2 and shapers[0] == "none":
+        result = said(judge(*runs), shapers[1], f"{first} → {last}")
+    return Shows(f"{' and '.join(shapers)}: {info.model}, {first} → {last}", tracks, result)
+
+
+def _look_of(content: "RecordingFile") -> "Look":
     """What the robot of a recording looks like: as it says, or by its robot file, which a server's recording holds."""
     from tvist_controller.about import geometry_of
     from tvist_plant.description import RobotDescription
     from tvist_protocol.content import checked
     from tvist_protocol.values import Payload
+    from tvist_view.look import Look
 
     info, start = content.info, content.start or {}
     if info is not None and info.geometry is not None:
-        return info.geometry, info.payload
+        return Look(info.geometry, info.payload)
     if "description" in start:
         geometry = geometry_of(checked(start["description"], RobotDescription))
         nothing = Payload(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-        return geometry, nothing if info is None else info.payload
+        return Look(geometry, nothing if info is None else info.payload)
     raise Failure(
         "this recording does not say what its robot looks like: record it with tvist serve --record"
     )

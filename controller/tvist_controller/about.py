@@ -8,7 +8,7 @@ from tvist_controller.reporting.stop_report import stopping
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.channels import COMMANDS, tag
-from tvist_protocol.geometry import Capsule, Geometry
+from tvist_protocol.geometry import Capsule, Geometry, Mesh
 from tvist_protocol.info import CalibrationInfo, Info, Limits
 from tvist_protocol.values import PROTOCOL_VERSION
 
@@ -68,21 +68,26 @@ def info_of(controller: Controller) -> Info:
         arm=controller.arm,
         programs=controller.programs.kept.names,
         poses=setup.description.poses,
-        geometry=None if setup.description.kinematics.placement else geometry_of(setup.description),
+        geometry=geometry_of(setup.description),
     )
 
 
 def geometry_of(description: RobotDescription) -> Geometry:
-    """Kinematics and shape of an arm with Denavit-Hartenberg parameters, for clients that draw it."""
+    """Kinematics and shape of an arm, for clients that draw it."""
     kinematics, collision = description.kinematics, description.collision
     return Geometry(
         a=list(kinematics.a),
         d=list(kinematics.d),
         alpha=list(kinematics.alpha),
+        placement=list(kinematics.placement),
         bending=sorted(description.link_flexibility.links),
         capsules=[
             Capsule(name=body.name, link=body.link, start=body.start, end=body.end, radius=body.radius)
             for body in collision.bodies
+        ],
+        meshes=[
+            Mesh(link=mesh.link, file=mesh.file, placement=mesh.placement, scale=mesh.scale)
+            for mesh in description.meshes
         ],
         payload_radius=collision.payload_radius,
         floor=collision.floor,

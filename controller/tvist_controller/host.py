@@ -120,12 +120,14 @@ class Host:
             for sink in self._sinks:
                 sink.io(io)
         report, events = self.controller.complete_tick()
-        truth = self.controller.truth() if self.controller.setup.truth else None
+        told = self.controller.setup.truth
+        truth = None
         for sink in self._sinks:
             for event in events:
                 sink.event(event)
             sink.report(report)
-            if truth is not None:
+            if told or sink.wants_truth:
+                truth = truth or self.controller.truth()
                 sink.truth(truth)
         if self.controller.session.lease is not self.standing.lease:
             self.standing = self._standing()

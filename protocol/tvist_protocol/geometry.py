@@ -22,8 +22,25 @@ class Capsule(Struct, frozen=True, kw_only=True, gc=False):
     """Radius [m]."""
 
 
+Origin = tuple[float, float, float, float, float, float]
+"""A frame in another: x y z [m], and roll, pitch and yaw about its fixed axes [rad], as in a URDF."""
+
+
+class Mesh(Struct, frozen=True, kw_only=True, gc=False):
+    """A mesh of a URDF that shows a part of the arm."""
+
+    link: int
+    """Index of the link in whose frame it stands; -1 for the base frame."""
+    file: str
+    """Its file on the server's machine."""
+    placement: Origin
+    """Its frame in that of the link."""
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Factors of its coordinates [-]."""
+
+
 class Geometry(Struct, frozen=True, kw_only=True, gc=False):
-    """Kinematics and shape of the arm. Joint i turns about z, then follows Tz(d) Tx(a) Rx(alpha)."""
+    """Kinematics and shape of the arm. Joint i turns about z, then follows Tz(d) Tx(a) Rx(alpha), or its placement."""
 
     version: int = GEOMETRY_VERSION
     """Version of this description; a client that does not know it draws nothing."""
@@ -33,11 +50,15 @@ class Geometry(Struct, frozen=True, kw_only=True, gc=False):
     """Denavit-Hartenberg link offsets, one per joint [m]."""
     alpha: list[float]
     """Denavit-Hartenberg link twists, one per joint [rad]."""
+    placement: list[Origin] = []
+    """Frame of each link in that of its joint, for an arm from a URDF; `a`, `d` and `alpha` are empty then."""
     bending: list[int] = []
     """Indices of the links that bend, in order. Each has two values in `link_deflection` of `truth`: rotations about y
     and then z, in the middle of the link, after Tx(a/2) Tz(d) from its joint."""
     capsules: list[Capsule] = []
     """Parts of the arm, from the base on."""
+    meshes: list[Mesh] = []
+    """Meshes that show the arm instead, if the file is there."""
     payload_radius: float = 0.05
     """Radius of the capsule from the flange through the centre of mass of the payload to twice its distance [m]."""
     floor: float = 0.0

@@ -187,6 +187,19 @@ class Collision(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Bodies of the arm, from the base to the flange."""
 
 
+class Mesh(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A mesh that shows a part of the arm; it is drawn, and nothing else."""
+
+    link: Annotated[int, Meta(ge=-1)]
+    """Index of the link in whose frame it stands; -1 for the base frame."""
+    file: str
+    """Its file."""
+    placement: Placement = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """Position [m] and roll, pitch, yaw about fixed axes [rad]."""
+    scale: Vector3 = (1.0, 1.0, 1.0)
+    """Factors of its coordinates [-]."""
+
+
 class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Content of a robot file."""
 
@@ -199,6 +212,7 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
     link_flexibility: LinkFlexibility = LinkFlexibility()
     sensors: Sensors = Sensors()
     collision: Collision = Collision()
+    meshes: tuple[Mesh, ...] = ()
     poses: dict[str, tuple[Number, ...]] = {}
     """Named joint positions [rad]."""
     provenance: dict[str, str] = {}

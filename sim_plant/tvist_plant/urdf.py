@@ -22,6 +22,7 @@ from tvist_plant.urdf_elements import (
     UrdfError,
     angles,
     joint_of,
+    mesh_file,
     named,
     numbers,
     origin_of,
@@ -135,17 +136,30 @@ def _content(
     if first[2, 2] < 1.0 - UPRIGHT:
         raise UrdfError(f"{where}: the axis of joint {chain[0].name} must point straight up from the base")
     placements, bodies = [], []
+    intos: list[Floats] = []
     for number, joint in enumerate(chain):
         back = np.asarray(np.linalg.inv(turns[number]), dtype=np.float64)
         last = number == len(chain) - 1
         after = _flange(joint.child, tree) if last else frames[number + 1] @ turns[number + 1]
         placement: Floats = back @ after
-        bodies.append(_body(joint.child, links, tree, placement, back, where))
+        intos.append(np.linalg.inv(placement) @ back)
+        bodies.append(_body(joint.child, links, tree, intos[-1], where))
         if number == 0:  # turning about the first axis and moving along it change places with the joint
             upright = first.copy()
             upright[:2, 3] = 0.0
             placement = upright @ placement
         placements.append([*placement[:3, 3].tolist(), *angles(placement[:3, :3])])
+    root, away = chain[0].parent, np.eye(4)
+    while root in tree.to:
+        root = tree.to[root].parent
+    away[:2, 3] = -first[:2, 3]  # the base frame is on the first joint's axis
+    shown = [(-1, root, away), *((at, joint.child, intos[at]) for at, joint in enumerate(chain))]
+    meshes = [
+        mesh
+        for at, link, into in shown
+        for name, frame in _rigid(link, tree).items()
+        for mesh in _meshes(at, links[name], into @ frame, path, f"{where}: link {name}")
+    ]
     masses = [body.mass for body in bodies]
     centres = [body.about_centre() for body in bodies]
     given = f"given: {path.name}"
@@ -159,6 +173,7 @@ def _content(
             "inertia": [tensor[np.triu_indices(3)].tolist() for _, tensor in centres],
         },
         "limits": limits,
+        "meshes": meshes,
         "provenance": {
             "kinematics": given,
             "links": given,
@@ -195,9 +210,27 @@ def _flange(link: str, tree: _Tree) -> Floats:
     return next((rigid[name] for name in FLANGES if name in rigid), rigid[link])
 
 
-def _body(link: str, links: dict[str, Element], tree: _Tree, end: Floats, back: Floats, where: str) -> Body:
+def _meshes(number: int, link: Element, into: Floats, path: Path, here: str) -> list[dict[str, Any]]:
+    """Return the meshes that show a link, whose frame is given in that of the link of a number."""
+    found = []
+    for visual in link.findall("visual"):
+        mesh = visual.find("geometry/mesh")
+        if mesh is not None and mesh.get("filename"):
+            at = into @ origin_of(visual, here)
+            found.append(
+                {
+                    "link": number,
+                    "file": str(mesh_file(str(mesh.get("filename")), path)),
+                    "placement": [*at[:3, 3].tolist(), *angles(at[:3, :3])],
+                    "scale": numbers(mesh, "scale", (1.0, 1.0, 1.0), here).tolist(),
+                }
+            )
+    return found
+
+
+def _body(link: str, links: dict[str, Element], tree: _Tree, into: Floats, where: str) -> Body:
     """Return the bodies that a joint moves up to the next one, in the frame at their end."""
-    whole, into = Body(), np.linalg.inv(end) @ back
+    whole = Body()
     for name, placement in _rigid(link, tree).items():
         inertial = links[name].find("inertial")
         if inertial is None:

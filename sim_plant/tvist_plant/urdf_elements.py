@@ -133,6 +133,24 @@ def origin_of(element: Element, here: str) -> Floats:
     return placement
 
 
+def mesh_file(name: str, urdf: Path) -> Path:
+    """Return where a mesh's file is, as far as that can be known without ROS: beside its package's folder.
+
+    Args:
+        name: Name in the URDF: `package://PACKAGE/...`, `file://...` or a path from the URDF's folder.
+        urdf: The URDF file.
+    """
+    folder = urdf.resolve().parent
+    if not name.startswith("package://"):
+        return folder / name.removeprefix("file://")
+    inside = Path(name.removeprefix("package://"))
+    # A URDF stands somewhere in its package, or in one beside it.
+    places = [
+        above / part for above in (folder, *folder.parents) for part in (inside, Path(*inside.parts[1:]))
+    ]
+    return next((place for place in places if place.is_file()), folder / inside)
+
+
 def rotation(roll: float, pitch: float, yaw: float) -> Floats:
     """Return the rotation matrix of URDF's angles: about fixed x, then y, then z [rad], shape (3, 3)."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in (roll, pitch, yaw))

@@ -17,7 +17,6 @@ ABSENT = (
     "matplotlib",
     "mujoco",
     "polars",
-    "viser",
     "marimo",
     "distributed",
     "tvist_lab",

@@ -1,117 +1,221 @@
-"""Where the arm is drawn: against the simulated arm's own truth, and against pinocchio."""
+"""The arm that the page draws, in a browser: against pinocchio and against the simulated arm's truth."""
 
 import asyncio
+import struct
+import threading
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from tvist_controller.about import geometry_of
 from tvist_lab.collect import collect
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_plant.description import load
-from tvist_plant.model import flexible_model
-from tvist_protocol.geometry import Capsule, Geometry
-from tvist_view.chain import Chain, GeometryError
-from tvist_view.deflection import Magnification
-from tvist_view.drawn_arm import capsule, quaternion
+from tvist_plant.model import FLANGE, flexible_model, rigid_model
+from tvist_protocol.geometry import Capsule, Geometry, Mesh
+from tvist_view.look import GeometryError, Look
+from tvist_view.playback import playback
+from tvist_view.stage import open_stage, page
+from tvist_view.track import Shown, Track
 
+from .browser import browser
+
+SEVEN = "tests/plant/urdf/seven.urdf"
+ARMS = ("one-joint", "ur3e", "ur5e", "ur10e", "ur16e", "ur20", "ur30", SEVEN)
 UR5E = load("ur5e")
-angles = st.floats(-3.0, 3.0)
+
+
+def look_of(name):
+    description = load(name)
+    return Look(geometry_of(description), description.payload)
 
 
 @pytest.fixture(scope="module")
-def chain():
-    return Chain(geometry_of(UR5E))
-
-
-@pytest.fixture(scope="module")
-def truths():
-    """A motion of the flexible arm: states, truths."""
+def moved():
+    """A motion of the flexible arm: its states and truths."""
 
     async def move():
         async with robot_in_process(free_setup(shaper="none")) as robot:
             with collect(robot) as collected:
                 async with robot.control("test") as arm:
                     await arm.move_j([0.7, -2.5, 0.5, -1.2, 0.3, 0.2])
-                    await robot.advance(1000)
-            return collected.states, collected.truths
+                    await robot.advance(500)
+            return collected
 
     return asyncio.run(move())
 
 
-@given(st.lists(angles, min_size=6, max_size=6), st.lists(st.floats(-0.5, 0.5), min_size=4, max_size=4))
-def test_the_flange_is_where_the_flexible_model_has_it(q, bends):
-    flexible = flexible_model(UR5E, UR5E.payload)
-    everything = np.zeros(flexible.model.nv)
-    everything[flexible.joints], everything[flexible.flexes] = q, bends
-    data = flexible.model.createData()
-    pin.framesForwardKinematics(flexible.model, data, everything)
-    flange = Chain(geometry_of(UR5E)).flange(q, bends)
-    np.testing.assert_allclose(flange, data.oMf[flexible.flange].homogeneous, atol=1e-12)
+def standing(moved, look):
+    """One state of an arm of as many joints."""
+    zeros = [0.0] * look.joints
+    return [replace(state, actual_q=zeros, reference_q=zeros, target_qdd=zeros) for state in moved.states[:3]]
 
 
-def test_at_factor_one_the_drawn_flange_is_the_truths(truths, chain):
-    for truth in truths[1][::50]:
-        for gravity in (False, True):
-            flange = chain.flange(*Magnification(1.0, gravity).drawn(truth))
-            np.testing.assert_allclose(flange[:3, 3], truth.flange_pose[:3], atol=1e-9)
-            turned = pin.exp3(np.array(truth.flange_pose[3:]))
-            np.testing.assert_allclose(flange[:3, :3], turned, atol=1e-9)
+@pytest.fixture(scope="module")
+def chromium(moved):  # whose event loop playwright would not suffer beside its own
+    with browser() as started:
+        yield started
 
 
-@pytest.mark.parametrize("factor", [1.0, 7.5, 100.0, 300.0])
-def test_drawn_deflections_are_the_factor_times_the_truth(truths, factor):
-    for truth in truths[1][::50]:
-        q, bends = Magnification(factor, gravity=True).drawn(truth)
-        np.testing.assert_allclose(q - truth.motor_q, factor * np.array(truth.gear_deflection), atol=1e-12)
-        np.testing.assert_allclose(bends, factor * np.array(truth.link_deflection), atol=1e-12)
-        q, bends = Magnification(factor).drawn(truth)
-        static = np.array(truth.static_gear_deflection)
-        expected = static + factor * (np.array(truth.gear_deflection) - static)
-        np.testing.assert_allclose(q - truth.motor_q, expected, atol=1e-12)
+@pytest.fixture
+def opened(chromium, tmp_path):
+    """Opens a page that plays tracks back."""
+    pages = []
+
+    def open_page(*tracks, theme="dark"):
+        file = tmp_path / "page.html"
+        file.write_text(playback(tracks, "test", factor=100.0), encoding="utf-8")
+        tab = chromium.new_page(viewport={"width": 500, "height": 500}, color_scheme=theme)
+        failed = []
+        tab.on("pageerror", lambda error: failed.append(str(error)))
+        tab.goto(file.as_uri())
+        tab.wait_for_function("tvist.shown !== undefined")
+        assert not failed
+        pages.append(tab)
+        return tab
+
+    yield open_page
+    for tab in pages:
+        tab.close()
 
 
-def test_an_arm_at_rest_is_drawn_where_it_is_however_much_is_magnified(truths):
-    """Before it moves, the arm stands in equilibrium, but for what friction holds: 1e-6 rad."""
-    truth = truths[1][0]
-    assert np.abs(truth.gear_deflection).max() > 1e-4
-    np.testing.assert_allclose(truth.gear_deflection, truth.static_gear_deflection, atol=2e-6)
-    np.testing.assert_allclose(truth.link_deflection, truth.static_link_deflection, atol=2e-6)
-
-
-def test_after_a_stop_the_static_part_is_what_the_deflection_settles_to(truths):
-    """Friction holds a gear a little off its equilibrium; what vibrates in the motion is far larger."""
-    everything = np.array([truth.gear_deflection for truth in truths[1]])
-    static = np.array([truth.static_gear_deflection for truth in truths[1]])
-    moving = np.abs(everything - static).max(axis=0)
-    assert moving.max() > 1e-3
-    assert np.abs(everything[-1] - static[-1]).max() < 0.5 * moving.max()
-
-
-def test_a_truth_of_an_older_server_is_drawn_with_gravity(truths):
-    from msgspec.structs import replace
-
-    old = replace(truths[1][100], static_gear_deflection=[], static_link_deflection=[])
-    np.testing.assert_array_equal(
-        Magnification(10.0).drawn(old)[0], Magnification(10.0, gravity=True).drawn(old)[0]
+def flanges(tab, angles, bends):
+    """Poses of the flange that the page computes, shape (count, 4, 4)."""
+    found = tab.evaluate(
+        "([all, bends]) => { const { chain } = tvist.tracks[0].robot.arm;"
+        " return all.map((q, i) => chain.frames(q, bends[i]).at(-1).elements); }",
+        [angles.tolist(), bends.tolist()],
     )
+    return np.array(found).reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
-def test_a_capsule_of_a_bending_link_is_cut_in_its_middle(chain):
-    near, far = (part for part in chain.parts if part.name.startswith("upper_arm"))
-    np.testing.assert_allclose(near.end, far.start)
-    frames = chain.frames(np.zeros(6))
-    ends = [frames[part.frame] @ [*part.end, 1.0] for part in (near, far)]
-    np.testing.assert_allclose(np.linalg.norm(near.end - near.start), 0.2125, atol=1e-12)
-    np.testing.assert_allclose(ends[0] - ends[1], [0.2125, 0.0, 0.0, 0.0], atol=1e-12)
+@pytest.mark.parametrize("name", ["ur5e", SEVEN])
+def test_the_flange_is_where_pinocchio_has_it(opened, moved, name):
+    look, description, random = look_of(name), load(name), np.random.default_rng(0)
+    tab = opened(Track(Shown("x", look), standing(moved, look), []))
+    q = random.uniform(-3.0, 3.0, (50, look.joints))
+    bends = random.uniform(-0.5, 0.5, (50, 2 * len(look.geometry.bending)))
+    found = flanges(tab, q, bends)
+    if name == "ur5e":
+        flexible = flexible_model(description, description.payload)
+        model, frame = flexible.model, flexible.flange
+    else:
+        model = rigid_model(description, description.payload)
+        frame = model.getFrameId(FLANGE)
+    data = model.createData()
+    for number in range(len(q)):
+        everything = q[number]
+        if name == "ur5e":
+            everything = np.zeros(model.nv)
+            everything[flexible.joints], everything[flexible.flexes] = q[number], bends[number]
+        pin.framesForwardKinematics(model, data, everything)
+        np.testing.assert_allclose(found[number], data.oMf[frame].homogeneous, atol=1e-9)
 
 
-def test_without_bending_near_and_far_frames_are_the_same(chain):
-    frames = chain.frames([0.1, -1.0, 0.5, 0.3, 0.2, 0.1])
-    np.testing.assert_allclose(frames[1::2], frames[2::2], atol=1e-15)
+def test_at_factor_one_the_drawn_flange_is_the_truths_and_deflections_are_the_factor_times_it(opened, moved):
+    look = look_of("ur5e")
+    tab = opened(Track(Shown("x", look), moved.states, moved.truths))
+    truths = moved.truths[::100]
+    rows = [look.row(moved.states[truth.tick - moved.states[0].tick], truth) for truth in truths]
+    drawn = tab.evaluate(
+        "([rows, looks]) => { const { drawn } = tvist.tracks[0].robot.constructor;"
+        " return looks.map((look) => rows.map((row) => drawn(row, 6, 4, look))); }",
+        [rows, [{"factor": k, "gravity": g} for k, g in ((1, False), (1, True), (100, False), (7.5, True))]],
+    )
+    for one in drawn[0], drawn[1]:
+        q, bends = (np.array([entry[name] for entry in one]) for name in ("q", "bends"))
+        for found, truth in zip(flanges(tab, q, bends), truths, strict=True):
+            np.testing.assert_allclose(found[:3, 3], truth.flange_pose[:3], atol=1e-8)
+            np.testing.assert_allclose(found[:3, :3], pin.exp3(np.array(truth.flange_pose[3:])), atol=1e-8)
+    for entry, truth in zip(drawn[2], truths, strict=True):
+        static = np.array(truth.static_gear_deflection)
+        expected = static + 100.0 * (np.array(truth.gear_deflection) - static)
+        np.testing.assert_allclose(np.array(entry["q"]) - truth.motor_q, expected, atol=1e-9)
+    for entry, truth in zip(drawn[3], truths, strict=True):
+        np.testing.assert_allclose(entry["bends"], 7.5 * np.array(truth.link_deflection), atol=1e-9)
+
+
+def test_between_two_rows_the_page_draws_what_is_between(opened, moved):
+    look = look_of("ur5e")
+    track = Track(Shown("x", look), moved.states, moved.truths)
+    tab = opened(track)
+    for time in (0.0, 0.5, 0.504, 1e3):
+        row = tab.evaluate("(time) => Array.from(tvist.tracks[0].row(time))", time)
+        at = min(round(time / 0.002), len(moved.states) - 1)
+        np.testing.assert_allclose(row, look.row(moved.states[at], moved.truths[at]), atol=5e-4)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_every_arm_is_drawn_in_one_piece_and_fills_the_picture(opened, moved, name):
+    look = look_of(name)
+    tab = opened(Track(Shown("x", look), standing(moved, look), []))
+    found = tab.evaluate(
+        "() => { const { arm } = tvist.tracks[0].robot; const [a, b] = [tvist.stage.scene.filled(), arm.outline()];"
+        " return { ...a, points: b.map((p) => p.toArray()), parts: arm.frames.map((f) => f.children.length) }; }"
+    )
+    points = np.array(found["points"])
+    assert np.isfinite(points).all()
+    assert np.linalg.norm(points, axis=1).max() < 1.8 * look.reach + 0.3
+    assert points[:, 2].min() > -0.8 * look.reach
+    assert max(np.diff(found["x"])[0], np.diff(found["y"])[0]) > 2 * 0.6
+    assert all(-1.05 < edge < 1.05 for key in "xy" for edge in found[key])
+    assert sum(found["parts"]) >= 2 * look.joints
+
+
+def test_a_urdfs_own_meshes_stand_in_for_what_is_drawn(chromium, moved, tmp_path):
+    corners = [(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0.3)]
+    facet = struct.pack("<12fH", *(0, 0, 1), *(value for corner in corners for value in corner), 0)
+    for number in range(2):
+        (tmp_path / f"part{number}.stl").write_bytes(bytes(80) + struct.pack("<I", 1) + facet)
+    meshes = [
+        Mesh(link=link, file=str(tmp_path / f"part{number}.stl"), placement=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0))
+        for number, link in enumerate((-1, 2))
+    ]
+    look = look_of("ur5e")
+    look = Look(replace(look.geometry, meshes=meshes), look.payload)
+    packed = Track(Shown("x", look), standing(moved, look), []).packed(0.0)
+    packed["look"]["meshes"] = ["/mesh/0.stl", "/mesh/1.stl"]
+    text = page({"kind": "playback", "title": "x", "factor": 1, "tracks": [packed]})
+    files = {f"/mesh/{number}.stl": (tmp_path / f"part{number}.stl").read_bytes() for number in range(2)}
+    counted = _in_browser(chromium, text, files)
+    assert counted == {"meshes": 2, "others": 1}  # the payload stays
+
+
+def _in_browser(chromium, text, files):
+    """Parts of the arm that a served page has drawn in the end."""
+    ready, done, urls = threading.Event(), threading.Event(), []
+
+    async def serve():
+        async def meet(tab):
+            async for _ in tab:
+                pass
+
+        async with open_stage(text, meet, "127.0.0.1", 0, parts=files.get) as url:
+            urls.append(url)
+            ready.set()
+            await asyncio.to_thread(done.wait)
+
+    thread = threading.Thread(target=asyncio.run, args=(serve(),))
+    thread.start()
+    try:
+        assert ready.wait(30)
+        tab = chromium.new_page()
+        tab.goto(urls[0])
+        tab.wait_for_function(
+            "tvist.tracks?.[0].robot.arm.frames.flatMap((f) => f.children).filter((c) => c.userData.mesh).length === 2"
+        )
+        counted = tab.evaluate(
+            "() => { const all = tvist.tracks[0].robot.arm.frames.flatMap((f) => f.children);"
+            " const meshes = all.filter((c) => c.userData.mesh).length;"
+            " return { meshes, others: all.length - meshes }; }"
+        )
+        tab.close()
+        return counted
+    finally:
+        done.set()
+        thread.join()
 
 
 @pytest.mark.parametrize(
@@ -119,35 +223,25 @@ def test_without_bending_near_and_far_frames_are_the_same(chain):
     [
         ({"version": 2}, "version 2"),
         ({"a": [0.1]}, "different lengths"),
+        ({"a": [], "d": [], "alpha": []}, "no joints"),
         ({"bending": [2]}, "does not exist"),
         ({"capsules": [Capsule(name="x", link=5, start=(0, 0, 0), end=(0, 0, 1), radius=0.1)]}, "not exist"),
     ],
 )
 def test_a_geometry_that_cannot_be_drawn_is_said(changes, says):
     with pytest.raises(GeometryError, match=says):
-        Chain(Geometry(**{"a": [0.1, 0.2], "d": [0.0, 0.0], "alpha": [0.0, 0.0], **changes}))
+        Look(Geometry(**{"a": [0.1, 0.2], "d": [0.0, 0.0], "alpha": [0.0, 0.0], **changes}), UR5E.payload)
 
 
-def test_deflections_of_another_arm_are_refused(chain):
-    with pytest.raises(GeometryError, match="3 link deflections for 2 bending links"):
-        chain.frames(np.zeros(6), np.zeros(3))
+def test_deflections_of_another_arm_are_refused(moved):
+    look = look_of("one-joint")
+    with pytest.raises(GeometryError, match="6 deflections where the robot's geometry has 2"):
+        look.row(moved.states[0], moved.truths[0])
 
 
-@pytest.mark.parametrize("end", [(0.0, 0.0, 0.4), (0.3, 0.0, 0.0), (-0.2, 0.1, 0.05), (0.1, 0.2, -0.3)])
-def test_a_capsule_reaches_from_end_to_end_and_as_far_around(end):
-    start, end = np.array([0.1, -0.2, 0.3]), np.array([0.1, -0.2, 0.3]) + end
-    mesh = capsule(start, end, 0.05)
-    axis = end - start
-    along = np.clip((mesh.vertices - start) @ axis / (axis @ axis), 0.0, 1.0)
-    distances = np.linalg.norm(mesh.vertices - (start + along[:, None] * axis), axis=1)
-    np.testing.assert_allclose(distances, 0.05, atol=1e-6)
-    assert along.min() == 0.0
-    assert along.max() == 1.0
-
-
-@given(st.lists(st.floats(-3.2, 3.2), min_size=3, max_size=3))
-def test_quaternions_turn_as_their_matrices_do(vector):
-    rotation = pin.exp3(np.array(vector))
-    w, x, y, z = quaternion(rotation)
-    np.testing.assert_allclose(pin.Quaternion(w, x, y, z).matrix(), rotation, atol=1e-9)
-    assert w * w + x * x + y * y + z * z == pytest.approx(1.0)
+def test_without_truth_the_arm_is_stiff_and_an_older_truth_has_no_static_part(moved):
+    look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
+    assert look.row(state, None) == [*state.actual_q, *state.reference_q, *[0.0] * 20]
+    old = look.row(state, replace(truth, static_gear_deflection=[], static_link_deflection=[]))
+    assert old[12:18] == [0.0] * 6
+    assert old[18:24] == truth.gear_deflection

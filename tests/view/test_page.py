@@ -1,21 +1,26 @@
 """The page in a real browser: it shows the robot, moves it, and lets it go."""
 
+import io
+import json
+import re
 import signal
 
+import numpy as np
 import pytest
-from tests.conformance.served import PATIENCE, Served, free_endpoint
+from PIL import Image
+from tests.conformance.served import PATIENCE, Served, finished, free_endpoint
 from tests.conformance.wire import TICK, Wire
 
 from .browser import Page, browser
 
 pytestmark = pytest.mark.realtime
 
-Q3 = 2
 STOPPED = 1
 MS = PATIENCE * 1000.0
 """How long the page may take to show something [ms]: its graphics are computed, beside the other tests."""
-ON_PHONE = """element => { const box = element.getBoundingClientRect();
-return box.x >= 0 && box.right <= 390 && box.y >= 0 && box.bottom <= 844; }"""
+SIZES = {"wide": (1280, 800), "phone": (390, 844)}
+HIGH = """() => { const seen = tvist.stage.scene.filled(); return seen && (seen.y[1] - seen.y[0]) / 2; }"""
+"""Share of the scene's height that the arm takes, by the page's own projection."""
 
 
 @pytest.fixture(scope="module")
@@ -26,13 +31,13 @@ def chromium():
 
 @pytest.fixture(scope="module")
 def served():
-    with Served("--truth") as robot:
+    with Served() as robot:
         yield robot
 
 
 @pytest.fixture(scope="module")
 def view(served):
-    with Page(served.endpoint, "--magnify", "100") as page:
+    with Page(served.endpoint) as page:
         yield page
 
 
@@ -85,7 +90,7 @@ def test_the_page_draws_the_robot_and_asks_nothing_of_the_network(chromium, view
 def test_a_motion_of_the_page_moves_the_arm(tab, wire, served):
     take(tab)
     assert wire.info()["control"].startswith("view-")
-    tab.get_by_role("button", name="Q1 → Q3").click()
+    tab.get_by_role("button", name="stretched → folded").click()
     moving(wire)
     target = wire.info()["poses"]["Q3"]
     wire.wait(
@@ -102,7 +107,7 @@ def test_closing_the_tab_in_a_jog_stops_the_arm_within_260_ms_of_the_last_set_po
     page.set_default_timeout(MS)
     page.goto(view.url)
     take(page)
-    page.get_by_text("Joints", exact=True).click()
+    page.get_by_role("button", name="more").click()
     button = page.get_by_role("button", name="+ hold to jog")
     button.scroll_into_view_if_needed()
     button.hover()
@@ -118,7 +123,7 @@ def test_closing_the_tab_in_a_jog_stops_the_arm_within_260_ms_of_the_last_set_po
 
 def test_letting_the_jog_button_go_stops_the_arm(tab, wire):
     take(tab)
-    tab.get_by_text("Joints", exact=True).click()
+    tab.get_by_role("button", name="more").click()
     button = tab.get_by_role("button", name="− hold to jog")
     button.scroll_into_view_if_needed()
     button.hover()
@@ -135,7 +140,7 @@ def test_letting_the_jog_button_go_stops_the_arm(tab, wire):
 def test_one_tab_has_control_the_other_watches_and_may_stop(chromium):
     """The robot is in slow motion, since software draws two pages slowly."""
     with (
-        Served("--truth", "--speed", "0.1") as robot,
+        Served("--speed", "0.1") as robot,
         Page(robot.endpoint) as view,
         Wire(robot.endpoint) as wire,
     ):
@@ -146,8 +151,8 @@ def test_one_tab_has_control_the_other_watches_and_may_stop(chromium):
             page.goto(view.url)
         take(tab)
         other.get_by_text("Another tab has control").wait_for()
-        assert other.get_by_role("button", name="Q1 → Q2").is_disabled()
-        tab.get_by_role("button", name="Q1 → Q2").click()
+        assert other.get_by_role("button", name="front → left").is_disabled()
+        tab.get_by_role("button", name="front → left").click()
         moving(wire)
         other.get_by_role("button", name="STOP").click()
         wire.wait("event", lambda event: event["kind"] == "motion_stopped")
@@ -157,27 +162,103 @@ def test_one_tab_has_control_the_other_watches_and_may_stop(chromium):
         other.close()
 
 
-def test_on_a_phone_the_first_screen_has_a_plot_and_stop(chromium, view):
-    phone = chromium.new_page(viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True)
-    phone.goto(view.url)
-    for what in (phone.get_by_role("button", name="STOP"), phone.get_by_text("Tool acceleration")):
-        what.wait_for(timeout=MS)
-        # The sheet with the controls slides in from below.
-        phone.wait_for_function(ON_PHONE, arg=what.element_handle(), timeout=MS)
-    phone.close()
+def in_sight(page):
+    """State, STOP, a plot and what says how much bending is magnified are inside the window, and the arm is large."""
+    page.get_by_text("RUNNING, NORMAL").wait_for(timeout=MS)
+    page.wait_for_function(f"({HIGH})() > 0", timeout=MS)
+    size = page.viewport_size
+    bar = page.locator("#bar")
+    for what in (
+        bar.get_by_role("button", name="STOP"),
+        bar.get_by_text("RUNNING, NORMAL"),
+        bar.get_by_text("control"),
+        page.get_by_role("figure", name="Tool acceleration"),
+        page.get_by_text("bending × 100"),
+    ):
+        box = what.first.bounding_box()
+        assert box["x"] >= 0 and box["x"] + box["width"] <= size["width"], what  # noqa: PT018
+        assert box["y"] >= 0 and box["y"] + box["height"] <= size["height"], what  # noqa: PT018
+    assert page.evaluate(HIGH) > 0.35
+    assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_the_first_screen_has_the_arm_the_state_stop_and_a_plot(chromium, view, name):
+    width, height = SIZES[name]
+    page = chromium.new_page(viewport={"width": width, "height": height}, color_scheme="dark")
+    page.goto(view.url)
+    in_sight(page)
+    picture = Image.open(io.BytesIO(page.locator("#scene canvas").screenshot(timeout=MS))).convert("L")
+    bright = np.flatnonzero((np.asarray(picture) > 140).sum(axis=1) > 2)  # on the dark ground only the arm is
+    assert np.ptp(bright) > 0.3 * picture.height
+    page.close()
+
+
+def test_a_b_makes_the_motion_twice_and_says_what_log_analyze_says(tmp_path, chromium):
+    file = tmp_path / "ab.mcap"
+    with (
+        Served("--truth", "--record", str(file)) as robot,
+        Page(robot.endpoint) as view,
+        Wire(robot.endpoint) as wire,
+    ):
+        page = chromium.new_page(viewport={"width": 500, "height": 400})
+        page.set_default_timeout(MS)
+        page.goto(view.url)
+        page.get_by_role("button", name="A/B").click()
+        card = page.locator(".card")
+        card.get_by_text("vibration").wait_for()
+        less = float(re.search(r"(\d+) % less", card.inner_text()).group(1))
+        assert page.get_by_role("figure", name="Tool acceleration").first.get_by_text("with zv").is_visible()
+        page.close()
+        while wire.info()["control"] is not None:
+            pass
+        assert wire.info()["shaper"] == "zv"
+    told = json.loads(finished("-m", "tvist_cli", "log", "analyze", file, "--json").stdout)
+    before, after = (one["peak_m_s2"] for one in (told["motions"][0], told["motions"][-1]))
+    assert less == pytest.approx(100.0 * (1.0 - after / before), abs=1.0)
+
+
+def test_of_several_robots_one_is_picked(chromium):
+    with Served("--robots", "ur5e*2", name=None) as robots, Page(robots.endpoint, "--name", "ur5e-1") as view:
+        page = chromium.new_page(viewport={"width": 500, "height": 400})
+        page.set_default_timeout(MS)
+        page.goto(view.url)
+        page.get_by_text("RUNNING, NORMAL").wait_for()
+        page.get_by_role("combobox", name="robot").select_option("ur5e-2")
+        page.wait_for_function("tvist.info.name === 'ur5e-2' && tvist.last")
+        page.close()
 
 
 def test_where_there_is_no_robot_the_page_and_the_terminal_say_so_and_wait(chromium):
     endpoint = free_endpoint()
     with Page(endpoint) as view:
         view.said("no server answers.*waiting for the robot")
-        page = chromium.new_page()
+        page = chromium.new_page(viewport={"width": 1280, "height": 800})
         page.goto(view.url)
         page.get_by_text("No robot.").wait_for(timeout=MS)
-        with Served("--name", "ur5e", name=None, endpoint=endpoint):
-            page.get_by_text("RUNNING, NORMAL").wait_for(timeout=MS)
-            page.get_by_text("tvist serve --truth").wait_for(timeout=MS)
-        page.get_by_text("The robot has gone.").wait_for(timeout=MS)
+        for _ in range(2):  # what comes back looks as it did at first
+            with Served("--name", "ur5e", name=None, endpoint=endpoint):
+                in_sight(page)
+            page.get_by_text("The robot has gone.").wait_for(timeout=MS)
         page.close()
         view.process.send_signal(signal.SIGINT)
         assert view.process.wait(PATIENCE) == 130
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{", '{"do":"nothing"}', '{"do":"move","first":"Q1","last":"Q9"}', '{"do":"jog","joint":99,"direction":1}',
+     '{"do":"speed","fraction":7}', '{"do":"carry","mass":"x"}', '{"do":"robot","name":""}', "[1]",
+     '{"do":"stop","x":1}'],
+)  # fmt: skip
+def test_what_a_tab_may_not_ask_is_said_and_changes_nothing(view, wire, text):
+    from websockets.sync.client import connect
+
+    before = wire.info()
+    with connect(view.url.replace("http", "ws"), max_size=None) as tab:
+        tab.send(text)
+        while (told := json.loads(tab.recv(PATIENCE)))["type"] != "notice":
+            pass
+    assert told["text"]
+    after = wire.info()
+    assert (after["control"], after["payload"]) == (before["control"], before["payload"])

@@ -3,18 +3,21 @@
 import asyncio
 
 import numpy as np
+import pinocchio as pin
 import pytest
-from msgspec.structs import replace
 
+from tvist_controller.about import geometry_of
 from tvist_lab.collect import collect
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_plant.description import load
-from tvist_view.moments import Moments
-from tvist_view.scene import Moment
-from tvist_view.signals import History, rests_since
+from tvist_plant.model import FLANGE, rigid_model
+from tvist_protocol.stream import Truth
+from tvist_view.look import Look
+from tvist_view.signals import LATE, Running, rests_since, signals_of, up_in_flange
 
-TWISTS = load("ur5e").kinematics.alpha
+UR5E = load("ur5e")
+LOOK = Look(geometry_of(UR5E), UR5E.payload)
 
 
 @pytest.fixture(scope="module")
@@ -32,81 +35,89 @@ def collected():
     return asyncio.run(move())
 
 
-def history(collected, samples=5000, *, truth=True):
-    kept = History(TWISTS, samples)
-    for state, true in zip(collected.states, collected.truths, strict=True):
-        if truth:
-            kept.add_truth(true)
-        kept.add(state)
-    return kept
+def signals(collected, *, truth=True):
+    return signals_of(LOOK, collected.states, {one.tick: one for one in collected.truths} if truth else {})
 
 
 @pytest.mark.parametrize("truth", [True, False])
 def test_alpha_is_the_laboratorys(collected, truth):
     expected = amplitude(tool_acceleration(collected.recording(), truth=truth))
-    np.testing.assert_allclose(history(collected, truth=truth).signals().alpha, expected, atol=1e-9)
+    np.testing.assert_allclose(signals(collected, truth=truth).alpha, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["ur5e", "tests/plant/urdf/seven.urdf"])
+def test_up_is_where_an_independent_model_has_it(name):
+    description = load(name)
+    look = Look(geometry_of(description), description.payload)
+    rigid = rigid_model(description, description.payload)
+    q = np.random.default_rng(0).uniform(-3.0, 3.0, (20, description.joints))
+    data = rigid.createData()
+    for angles, up in zip(q, up_in_flange(q, look.turns), strict=True):
+        pin.framesForwardKinematics(rigid, data, angles)
+        np.testing.assert_allclose(up, data.oMf[rigid.getFrameId(FLANGE)].rotation[2], atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_what_is_drawn_and_plotted_is_of_one_tick_in_whatever_order_state_and_truth_come(collected, seed):
     random = np.random.default_rng(seed)
-    times = np.maximum.accumulate(np.arange(30) + random.integers(-4, 5, 30)) + 0.5
-    lost = set(random.integers(0, 30, seed).tolist())
-    states = [(float(place), state) for place, state in enumerate(collected.states[:30])]
-    truths = [(times[i], truth) for i, truth in enumerate(collected.truths[:30]) if i not in lost]
-    moments, kept = Moments(), History(TWISTS, 100)
-    assert moments.newest() is None
+    count = 200
+    times = np.arange(count) + random.integers(-4, 5, count) + 0.5
+    lost = set(random.integers(0, count - LATE - 10, seed).tolist())
+    states = [(float(place), state) for place, state in enumerate(collected.states[:count])]
+    truths = [(times[i], truth) for i, truth in enumerate(collected.truths[:count]) if i not in lost]
+    running = Running(LOOK)
+    assert running.row() is None
     for _, message in sorted(states + truths, key=lambda pair: pair[0]):
-        moments.add(message)
-        drawn = moments.newest()
-        assert drawn is None or drawn.truth is None or drawn.truth.tick == drawn.state.tick
-    for _, state in states:
-        kept.add(state)
-    for _, truth in truths:
-        kept.add_truth(truth)
-    assert drawn.state.tick == max(truth.tick for _, truth in truths)
-    expected = amplitude(tool_acceleration(collected.recording(), truth=True))[:30]
+        running.add(message)
+        if isinstance(message, Truth) and random.random() < 0.3:
+            running.update()
+    running.update()
+    drawn = running.row()
+    last = collected.truths[count - 1]
+    assert drawn[:6] == last.motor_q
+    found = running.signals()
+    assert (np.diff(found.time) > 0.0).all()
+    expected = amplitude(tool_acceleration(collected.recording(), truth=True))[:count]
     expected[list(lost)] = np.nan
-    np.testing.assert_allclose(kept.signals().alpha, expected, atol=1e-9)
-    moments.add(collected.states[0])  # it has started anew
-    assert moments.newest() == Moment(collected.states[0], None)
+    np.testing.assert_allclose(found.alpha, expected[1:-1], atol=1e-9)
+    whole = signals(collected).unshaped[1 : count - 1]
+    np.testing.assert_allclose(found.unshaped, whole, atol=1e-9)
+    running.add(collected.states[0])  # it has started anew
+    assert len(running.signals().time) == 0
 
 
-def test_a_full_ring_keeps_the_newest_in_order(collected):
-    whole, part = history(collected).signals(), history(collected, 700).signals()
-    assert len(part.time) == 700
-    assert (np.diff(part.time) > 0.0).all()
-    np.testing.assert_array_equal(part.alpha, whole.alpha[-700:])
-
-
-def test_what_is_told_again_counts_once_and_a_robot_that_starts_anew_begins_anew(collected):
-    kept = history(collected)
-    count = len(kept.signals().time)
-    kept.add(collected.states[-1])
-    assert len(kept.signals().time) == count
-    kept.add(replace(collected.states[-1], timestamp=0.002))
-    assert len(kept.signals().time) == 1
+def test_what_is_told_since_a_count_is_told_once(collected):
+    running, told = Running(LOOK), []
+    count = 0
+    for number, state in enumerate(collected.states):
+        running.add(state)
+        if number % 17 == 0:
+            running.update()
+            told += running.since(count)[0]
+            count = running.count
+    assert told == [round(state.timestamp, 4) for state in collected.states[1 : len(told) + 1]]
+    running.add(collected.states[-1])  # told again
+    running.update()
+    assert running.count == len(collected.states) - 2
 
 
 def test_the_shaped_reference_comes_to_rest_after_the_unshaped_one(collected):
-    signals = history(collected).signals()
-    rests = rests_since(signals)
+    found = signals(collected)
+    rests = rests_since(found)
     assert rests is not None
     reference, shaped = rests
     assert 0.02 < shaped - reference < 0.2
-    assert rests_since(signals.between(0.0, reference - 0.1)) is None
+    assert rests_since(found.between(0.0, reference - 0.1)) is None
 
 
 def test_the_acceleration_before_the_shaper_keeps_the_limit_and_none_is_made_up_over_a_hole(collected):
-    signals = history(collected).signals()
-    assert 1.9 < signals.unshaped.max() < 2.0 + 1e-6
-    sparse = History(TWISTS, 5000)
-    for state in collected.states[::7] + collected.states[-3:]:
-        sparse.add(state)
-    assert sparse.signals().unshaped.max() < 2.1
+    found = signals(collected)
+    assert 1.9 < found.unshaped.max() < 2.0 + 1e-6
+    sparse = signals_of(LOOK, collected.states[::7] + collected.states[-3:], {})
+    assert sparse.unshaped.max() < 2.1
 
 
 def test_nothing_is_there_before_the_first_state():
-    signals = History(TWISTS, 100).signals()
-    assert len(signals.time) == len(signals.alpha) == 0
-    assert rests_since(signals) is None
+    found = Running(LOOK).signals()
+    assert len(found.time) == len(found.alpha) == 0
+    assert rests_since(found) is None

@@ -1,50 +1,80 @@
 """The page's door: other sites in a browser on this machine are turned away."""
 
-import contextlib
+import asyncio
+import urllib.error
+import urllib.request
 
 import pytest
-import viser
 import websockets
 
-from tvist_view.stage import close_stage, open_stage
-
-PROTOCOL = websockets.Subprotocol(f"viser-v{viser.__version__}")
+from tvist_view.stage import StageError, open_stage, page
 
 
-@pytest.fixture
-def port():
-    server = open_stage("127.0.0.1", 0, "test")
-    yield server.get_port()
-    close_stage(server)
+async def _echo(tab):
+    async for text in tab:
+        await tab.send("echo", {"text": text})
+
+
+def opened(**options):
+    return open_stage(page({"kind": "none"}), _echo, "127.0.0.1", 0, **options)
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:1", "null"])
-async def test_another_site_is_turned_away(port, origin):
-    async with websockets.connect(
-        f"ws://127.0.0.1:{port}", origin=origin, subprotocols=[PROTOCOL], max_size=None
-    ) as page:
-        with contextlib.suppress(websockets.ConnectionClosed):
-            async for _ in page:
-                pass
-    assert page.close_code == 1008
+async def test_another_site_is_turned_away(origin):
+    async with opened() as url:
+        with pytest.raises(websockets.InvalidStatus, match="403"):
+            await websockets.connect(url.replace("http", "ws"), origin=origin)
 
 
 @pytest.mark.parametrize("named", [True, False])
-async def test_the_page_itself_and_programs_are_let_in(port, named):
-    origin = f"http://127.0.0.1:{port}" if named else None
-    async with websockets.connect(
-        f"ws://127.0.0.1:{port}", origin=origin, subprotocols=[PROTOCOL], max_size=None
-    ) as page:
-        assert await page.recv()
-        await page.ping()
-        assert page.close_code is None
+async def test_the_page_itself_and_programs_are_let_in(named):
+    async with (
+        opened() as url,
+        websockets.connect(url.replace("http", "ws"), origin=url if named else None) as tab,
+    ):
+        await tab.send("hello")
+        assert await tab.recv() == '{"type":"echo","text":"hello"}'
 
 
-def test_nobody_can_ask_for_a_public_tunnel(port):
-    server = open_stage("127.0.0.1", 0, "test")
+@pytest.mark.parametrize(
+    ("path", "host", "code"),
+    [
+        ("/", None, 200),
+        ("/", "evil.example", 403),  # whose name leads to this machine
+        ("/nothing", None, 404),
+        ("/mesh/0.stl", None, 200),
+        ("/../../etc/passwd", None, 404),
+    ],
+)
+async def test_what_is_asked_for_by_name(path, host, code):
+    async with opened(parts={"/mesh/0.stl": b"solid"}.get) as url:
+        request = urllib.request.Request(url + path, headers={"Host": host} if host else {})  # noqa: S310
+        assert await asyncio.to_thread(_code, request) == code
+
+
+def _code(request):
     try:
-        from viser._messages import ShareUrlRequest
+        with urllib.request.urlopen(request) as answer:  # noqa: S310
+            return answer.status
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code
 
-        assert not server._websock_server._incoming_handlers.get(ShareUrlRequest)
-    finally:
-        close_stage(server)
+
+async def test_other_machines_are_served_only_if_that_is_asked_for():
+    with pytest.raises(StageError, match="--insecure"):
+        async with open_stage("", _echo, "0.0.0.0", 0):  # noqa: S104
+            pass
+    async with open_stage("", _echo, "0.0.0.0", 0, insecure=True) as url:  # noqa: S104
+        assert url.startswith("http://0.0.0.0:")
+
+
+async def test_a_port_in_use_is_said():
+    async with opened() as url:
+        with pytest.raises(StageError, match="Another port: --port"):
+            async with open_stage("", _echo, "127.0.0.1", int(url.rpartition(":")[2])):
+                pass
+
+
+def test_nothing_that_the_page_is_told_ends_its_script():
+    assert "</script><b>" not in page({"kind": "</script><b>"})

@@ -118,7 +118,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     dump: str | None = None
     """Folder to save the last second before a failure of the simulated arm to [the system's temporary folder]."""
     truth: bool = False
-    """Publish what a real robot cannot measure, such as the arm's deflection, on tvist/NAME/truth and in the
+    """Always publish what a real robot cannot measure, such as the arm's deflection, on tvist/NAME/truth and in the
     recording."""
     quiet: bool | None = None
     """Simulate sensors without noise and angles with an encoder's resolution, for clients that wait until values stop

@@ -51,6 +51,10 @@ class Publisher(Sink):
         self.dropped = 0
         """Number of messages of a tick that were dropped for lack of room."""
 
+    def want_truth(self, wanted: bool) -> None:
+        """Note whether somebody subscribes to what a real robot cannot measure; from any thread."""
+        self.wants_truth = wanted
+
     def open(self, gateways: Sequence[Gateway], wake: Callable[[], None] | None = None) -> None:
         """Set the gateways that messages go to.
 

@@ -12,7 +12,7 @@ from tvist_controller.line.rehearsal import rehearse
 from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.reporting.sink import Sink
 from tvist_controller.setup import Setup
-from tvist_plant.plant import Pacing
+from tvist_plant.plant import Pacing, Truthful
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Refused, Reply
@@ -91,6 +91,9 @@ class ServedRobot:
         """Gateway for the sockets of programs."""
         self._host = Host(self.controller, *sinks, black_box, self._publisher, ports=self.sockets)
         plant = self.controller.cycle.line.plant
+        knows = isinstance(plant, Truthful) and plant.truth() is not None
+        self.want_truth = self._publisher.want_truth if knows and not setup.truth else None
+        """To be told whether a client on this machine wants the truth; None if it is published anyway, or unknown."""
         self.driven = Mailbox(
             self._host, self.sockets.patience, plant.wait if isinstance(plant, Pacing) else None
         )

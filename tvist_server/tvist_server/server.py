@@ -19,6 +19,7 @@ from tvist_server.config import ServeConfig
 from tvist_server.ending import Ending
 from tvist_server.gateways.base import Gateway
 from tvist_server.gateways.console import Console, ConsoleGateway
+from tvist_server.gateways.endpoints import is_local
 from tvist_server.gateways.metrics import Metrics
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.starting import Prepare, Starting
@@ -156,8 +157,11 @@ class Server:
 
     def _gateways(self, robot: ServedRobot, config: ServeConfig, number: int) -> list[Gateway]:
         name, desk, lockstep = robot.setup.name, robot.reception, config.clock != "realtime"
+        # Who can only be on this machine may see the arm bend; what goes over a network is asked for with `truth`.
+        local = not config.connect and all(map(is_local, config.endpoints))
+        wanted = robot.want_truth if local else None
         gateways: list[Gateway] = [
-            self._network.gateway(name, desk, lockstep=lockstep, truth=robot.setup.truth),
+            self._network.gateway(name, desk, lockstep=lockstep, truth=robot.setup.truth, wanted=wanted),
             robot.sockets,
         ]
         if config.ur:

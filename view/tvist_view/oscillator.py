@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvist_shaping import residual, shaper
-from tvist_view.chain import Floats
+from tvist_view.look import Floats
 
 STEP = 0.002
 """Time between two samples [s]."""

@@ -5,8 +5,8 @@ from collections.abc import AsyncIterator
 
 FRAME_S = 1.0 / 30.0
 """Time between two pictures [s]."""
-PLOT_EVERY = 3
-"""Pictures between two drawings of the plots."""
+NOTES_EVERY = 6
+"""Pictures between two looks at what the last stop was like."""
 
 
 async def pictures() -> AsyncIterator[int]:

@@ -1,17 +1,25 @@
-"""Signals of a robot over time, for plots: the newest are kept, the oldest are forgotten."""
+"""Signals of a robot over time, for plots."""
 
-from collections.abc import Sequence
+import itertools
+from collections import deque
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tvist_protocol.stream import State, Truth
-from tvist_view.chain import Floats
+from tvist_view.look import Floats, Look
 
 GRAVITY = 9.81
 """Gravity of the simulated world [m/s²]."""
 RESTS = 1e-9
 """Change of a reference within a tick that counts as none [rad]."""
+BRAKES_S = 0.02
+"""Time after the shaped reference has stopped within which the tool still brakes [s]."""
+KEPT = 3000
+"""Samples of a running robot that are kept: six seconds."""
+LATE = 50
+"""Ticks after which a truth that has not come is not waited for."""
 
 
 @dataclass(frozen=True)
@@ -29,12 +37,6 @@ class Signals:
     """Largest |q̈| over the joints of the shaped reference, shape (T,) [rad/s²]."""
     unshaped: Floats
     """The same of the reference before the shaper, shape (T,) [rad/s²]."""
-    f_d: Floats
-    """Damped frequency of the lowest mode, as estimated, shape (T,) [Hz]."""
-    zeta: Floats
-    """Damping ratio of the lowest mode, as estimated, shape (T,) [-]."""
-    delay: Floats
-    """Mean delay of the shaper, shape (T,) [s]."""
 
     def largest_alpha(self) -> float:
         """Largest |α| that is known, 0 without any [m/s²]."""
@@ -46,72 +48,111 @@ class Signals:
         return Signals(**{name: values[first:last] for name, values in vars(self).items()})
 
 
-class History:
-    """The newest signals of one robot.
+def signals_of(look: Look, states: Sequence[State], truths: Mapping[int, Truth]) -> Signals:
+    """The signals of states in the order of time.
 
     Args:
-        twists: Denavit-Hartenberg twists of the arm, one per joint [rad].
-        samples: Number of samples kept.
+        look: The robot.
+        states: Its states.
+        truths: Its truths by their ticks; without any, the tool's acceleration is the measured one.
+    """
+    time = np.array([state.timestamp for state in states])
+    if truths:
+        alpha = np.full(len(time), np.nan)  # the sensor's noise would look like vibration
+        known = [(place, truths[state.tick]) for place, state in enumerate(states) if state.tick in truths]
+        if known:
+            forces = np.array([truth.tool_acceleration for _, truth in known])
+            upward = _up(np.array([truth.flange_pose[3:] for _, truth in known]))
+            alpha[[place for place, _ in known]] = np.linalg.norm(forces - GRAVITY * upward, axis=1)
+    else:
+        measured = np.array([state.actual_tool_accelerometer for state in states]).reshape(-1, 3)
+        angles = np.array([state.actual_q for state in states]).reshape(len(time), -1)
+        alpha = np.linalg.norm(measured - GRAVITY * up_in_flange(angles, look.turns), axis=1)
+    return Signals(
+        time=time,
+        alpha=alpha,
+        acceleration=np.array([max(map(abs, state.target_qdd)) for state in states]),
+        unshaped=_second_difference(time, np.array([state.reference_q for state in states])),
+    )
+
+
+class Running:
+    """The newest signals and the newest moment of a running robot, whose states and truths come in any order.
+
+    Args:
+        look: The robot.
     """
 
-    def __init__(self, twists: Sequence[float], samples: int) -> None:
-        self._twists, self._joints = tuple(twists), len(twists)
-        joints = self._joints
-        self._rows = np.full((samples, 7 + 3 * joints), np.nan)
-        self._truths = np.full((samples, 7), np.nan)
-        self._count = self._truth_count = 0
+    def __init__(self, look: Look) -> None:
+        self._look = look
+        self._states: deque[State] = deque()
+        self._truths: dict[int, Truth] = {}
+        self.kept: deque[tuple[float, float, float, float]] = deque(maxlen=KEPT)
+        self.count = 0
+        """Number of samples since the beginning."""
+        self.state: State | None = None
+        self._shown: State | None = None
 
-    def add(self, state: State) -> None:
-        """Keep a state; one whose time is not later than the last one's is the same, told again."""
-        if self._count and state.timestamp <= self._rows[(self._count - 1) % len(self._rows), 0]:
-            if state.timestamp == self._rows[(self._count - 1) % len(self._rows), 0]:
-                return
-            self.clear()  # a robot that has started anew
-        self._rows[self._count % len(self._rows)] = (
-            state.timestamp,
-            *state.actual_tool_accelerometer,
-            state.estimated_f_d[0] if state.estimated_f_d else np.nan,
-            state.estimated_zeta[0] if state.estimated_zeta else np.nan,
-            state.shaper_delay,
-            *state.target_qdd,
-            *state.reference_q,
-            *state.actual_q,
-        )
-        self._count += 1
+    @property
+    def has_truth(self) -> bool:
+        """Whether the robot tells its truth."""
+        return bool(self._truths)
 
-    def add_truth(self, truth: Truth) -> None:
-        """Keep the true acceleration, which has no noise."""
-        self._truths[self._truth_count % len(self._truths)] = (
-            truth.timestamp,
-            *truth.tool_acceleration,
-            *truth.flange_pose[3:],
-        )
-        self._truth_count += 1
+    def add(self, message: State | Truth) -> None:
+        """Keep a message; an earlier tick than the last one's is that of a robot that has started anew."""
+        if isinstance(message, Truth):
+            self._truths[message.tick] = message
+            if len(self._truths) > 4 * LATE:
+                del self._truths[min(self._truths)]
+            return
+        if self.state is not None and message.tick <= self.state.tick:
+            if message.tick == self.state.tick:
+                return  # told again
+            self._states.clear()
+            self._truths.clear()
+            self.kept.clear()
+        self.state = message
+        self._states.append(message)
+        if len(self._states) > KEPT:
+            self._states.popleft()
 
-    def clear(self) -> None:
-        """Forget everything."""
-        self._count = self._truth_count = 0
+    def row(self) -> list[float] | None:
+        """Where the arm is, at the newest tick of which everything is known; None before the first one."""
+        shown = self._shown if self._shown is not None else self.state
+        return None if shown is None else self._look.row(shown, self._truths.get(shown.tick))
+
+    def update(self) -> None:
+        """Compute the signals of what has come."""
+        states = list(self._states)
+        if self._truths:  # a state waits for its truth, and those after it with it
+            known = itertools.takewhile(
+                lambda state: state.tick in self._truths or self._is_late(state), states
+            )
+            states = list(known)
+        if len(states) < 3:
+            return
+        found = signals_of(self._look, states, self._truths)
+        # The first and the last have no second difference: they are the middle ones of another time.
+        for sample in zip(*(values[1:-1].tolist() for values in vars(found).values()), strict=True):
+            self.kept.append(sample)
+            self.count += 1
+        self._shown = states[-1]
+        for _ in range(len(states) - 2):
+            self._states.popleft()
+
+    def _is_late(self, state: State) -> bool:
+        return self.state is not None and state.tick < self.state.tick - LATE
+
+    def since(self, count: int) -> list[list[float]]:
+        """Columns of the samples after a number of them: time, |α|, |q̈| before and after the shaper."""
+        new = min(self.count - count, len(self.kept))
+        rows = list(self.kept)[len(self.kept) - new :]
+        return [[round(row[place], 4) for row in rows] for place in (0, 1, 3, 2)]
 
     def signals(self) -> Signals:
-        """Everything that is kept."""
-        rows = _in_order(self._rows, self._count)
-        time, n = rows[:, 0], self._joints
-        alpha = _length(rows[:, 1:4] - GRAVITY * up_in_flange(rows[:, 7 + 2 * n : 7 + 3 * n], self._twists))
-        truths = _in_order(self._truths, self._truth_count)
-        if len(truths):
-            place = np.clip(np.searchsorted(truths[:, 0], time), 0, len(truths) - 1)
-            same = np.abs(truths[place, 0] - time) < 1e-9
-            true = _length(truths[:, 1:4] - GRAVITY * _up(truths[:, 4:7]))
-            alpha = np.where(same, true[place], np.nan)  # the sensor's noise would look like vibration
-        return Signals(
-            time=time,
-            alpha=alpha,
-            acceleration=np.abs(rows[:, 7 : 7 + n]).max(axis=1, initial=0.0),
-            unshaped=_second_difference(time, rows[:, 7 + n : 7 + 2 * n]),
-            f_d=rows[:, 4],
-            zeta=rows[:, 5],
-            delay=rows[:, 6],
-        )
+        """All that is kept."""
+        columns = np.array(self.kept).reshape(-1, 4).T
+        return Signals(*columns)
 
 
 def rests_since(signals: Signals) -> tuple[float, float] | None:
@@ -123,26 +164,27 @@ def rests_since(signals: Signals) -> tuple[float, float] | None:
     return float(signals.time[moving[-1]]), float(signals.time[shaped[-1]])
 
 
-def _in_order(ring: Floats, count: int) -> Floats:
-    """The rows of a ring buffer, oldest first."""
-    if count <= len(ring):
-        return ring[:count]
-    return np.roll(ring, -(count % len(ring)), axis=0)
+def after_stop(signals: Signals) -> str:
+    """What the last stop was like, in words; empty while there is none."""
+    rests = rests_since(signals)
+    if rests is None:
+        return ""
+    rest = signals.between(rests[1] + BRAKES_S, signals.time[-1])
+    later = 1e3 * (rests[1] - rests[0])
+    return f"after the stop {rest.largest_alpha():.2f} m/s²; shaping made the motion {later:.0f} ms longer"
 
 
-def up_in_flange(q: Floats, twists: Sequence[float]) -> Floats:
+def up_in_flange(q: Floats, turns: Sequence[Floats]) -> Floats:
     """The upward direction in the frame of the flange, shape (T, 3).
 
     Args:
         q: Joint angles, shape (T, joints) [rad].
-        twists: Denavit-Hartenberg twists, one per joint [rad].
+        turns: Rotation of each link's frame in that of its joint, shape (3, 3).
     """
     up = np.tile([0.0, 0.0, 1.0], (len(q), 1))
-    for angle, twist in zip(q.T, twists, strict=True):
+    for angle, turn in zip(q.T, turns, strict=True):
         c, s = np.cos(angle), np.sin(angle)
-        x, y, z = c * up[:, 0] + s * up[:, 1], c * up[:, 1] - s * up[:, 0], up[:, 2]
-        c, s = np.cos(twist), np.sin(twist)
-        up = np.stack([x, c * y + s * z, c * z - s * y], axis=1)
+        up = np.stack([c * up[:, 0] + s * up[:, 1], c * up[:, 1] - s * up[:, 0], up[:, 2]], axis=1) @ turn
     return up
 
 
@@ -158,10 +200,6 @@ def _up(rotation: Floats) -> Floats:
         - np.sin(angle)[:, None] * np.cross(axis, up)
         + ((1.0 - np.cos(angle)) * (axis @ up))[:, None] * axis
     )
-
-
-def _length(vectors: Floats) -> Floats:
-    return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
 def _second_difference(time: Floats, q: Floats) -> Floats:

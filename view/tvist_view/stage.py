@@ -1,129 +1,171 @@
-"""The page's server with its floor, lights and camera. It is reached from this machine alone, unless told otherwise."""
+"""The page's server: one page, and a WebSocket for each tab. Only this machine reaches it, unless told otherwise."""
 
-import contextlib
-import io
 import ipaddress
+import itertools
+import json
+import logging
 import socket
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
+from functools import cache
+from importlib.resources import files
+from typing import Any
 from urllib.parse import urlsplit
 
-from viser import ClientHandle, ViserServer
-from viser._messages import ShareUrlRequest
-from viser.infra import WebsockClientConnection
+import msgspec
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
 
-UPRIGHT = 0.8
-"""Width over height below which a window is a phone's [-]."""
-PHONE_DISTANCE, PHONE_DROP = 1.4, 0.72
-"""How much further a phone's camera is, and how far below the point it looks, in distances [-]."""
+LARGEST = 16 * 2**20
+"""Largest message of a page, which is a picture of a film [byte]."""
+WAITS_S = 1.0
+"""How long a tab may take to say goodbye when the page ends [s]."""
+
+
+_QUIET = logging.getLogger("tvist.view.stage")
+_QUIET.setLevel(logging.CRITICAL)  # a browser that opens a connection and leaves is no error
 
 
 class StageError(RuntimeError):
     """The page cannot be served."""
 
 
-def open_stage(address: str, port: int, title: str, *, insecure: bool = False) -> ViserServer:
-    """Serve a page.
+class Tab:
+    """One open tab.
 
     Args:
+        number: Its number, which no other has.
+        connection: Its connection.
+    """
+
+    def __init__(self, number: int, connection: ServerConnection) -> None:
+        self.number, self._connection = number, connection
+
+    async def send(self, kind: str, content: Mapping[str, Any]) -> None:
+        """Send a message; wait while the tab is slow. To one that has gone nothing is sent."""
+        try:
+            await self._connection.send(msgspec.json.encode({"type": kind, **content}).decode())
+        except ConnectionClosed:
+            return
+
+    def __aiter__(self) -> AsyncIterator[str | bytes]:
+        """What the tab says, until it goes."""
+        return aiter(self._connection)
+
+
+Meet = Callable[[Tab], Awaitable[None]]
+"""Serves one tab until it goes."""
+
+
+def page(boot: Mapping[str, Any]) -> str:
+    """The page as one text that loads nothing.
+
+    Args:
+        boot: What kind of page it is, and what it needs to know at once.
+    """
+    said = json.dumps(msgspec.to_builtins(boot)).replace("<", "\\u003c")
+    return _page().replace('id="boot">{}', f'id="boot">{said}')
+
+
+@cache
+def _page() -> str:
+    return files("tvist_view").joinpath("page.html").read_text(encoding="utf-8")
+
+
+@asynccontextmanager
+async def open_stage(
+    page: str,
+    meet: Meet,
+    address: str,
+    port: int,
+    *,
+    insecure: bool = False,
+    parts: Callable[[str], bytes | None] = lambda _: None,
+) -> AsyncIterator[str]:
+    """Serve a page; the address of it is the value of the block.
+
+    Args:
+        page: The page.
+        meet: Called for each tab.
         address: Address to listen on.
         port: Port to listen on; 0 takes a free one.
-        title: Title of the page.
         insecure: Serve other machines, too: whoever opens the page can move the robot.
+        parts: Content of a path that the page asks for, such as a mesh; None: there is none.
 
     Raises:
         StageError: The port is in use, the address is not this machine's, or other machines could reach it.
     """
-    if not _is_local(address) and not insecure:
+    if not is_local(address) and not insecure:
         raise StageError(
             f"address is {address}: other machines could open the page and move the robot, since it knows no "
             "passwords. Add --insecure to accept that, or forward the port: ssh -L 8080:127.0.0.1:8080 HOST"
         )
-    with socket.socket(socket.AF_INET6 if ":" in address else socket.AF_INET) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((address, port))
-        except (OSError, OverflowError) as error:
-            raise StageError(
-                f"cannot listen on {address} port {port}: {getattr(error, 'strerror', None) or error}. "
-                "Another port: --port 8081"
-            ) from error
-        port = probe.getsockname()[1]
-    with contextlib.redirect_stdout(
-        io.StringIO()
-    ):  # it would print a banner; the caller says where the page is
-        server = ViserServer(host=address, port=port, label=title, verbose=False)
-    _only_this_site(server, anywhere=insecure)
-    server.gui.configure_theme(
-        control_layout="floating",
-        control_width="medium",
-        show_logo=False,
-        show_share_button=False,
+    numbers = itertools.count(1)
+
+    async def serve_tab(connection: ServerConnection) -> None:
+        await meet(Tab(next(numbers), connection))
+
+    def answer(connection: ServerConnection, request: Request) -> Response | None:
+        if not _may(request, anywhere=insecure):
+            return connection.respond(403, "another site may not use this page\n")
+        if request.headers.get("Upgrade", "").lower() == "websocket":
+            return None
+        path = urlsplit(request.path).path
+        if path == "/":
+            return _found("text/html; charset=utf-8", page.encode())
+        content = parts(path)
+        return (
+            connection.respond(404, "not found\n")
+            if content is None
+            else _found("application/octet-stream", content)
+        )
+
+    try:
+        with socket.create_server(
+            (address, port), family=socket.AF_INET6 if ":" in address else socket.AF_INET
+        ) as listening:
+            port = listening.getsockname()[1]
+            async with serve(
+                serve_tab,
+                sock=listening,
+                process_request=answer,
+                max_size=LARGEST,
+                compression=None,  # it would cost more than the way through this machine
+                close_timeout=WAITS_S,
+                logger=_QUIET,
+            ):
+                yield f"http://{f'[{address}]' if ':' in address else address}:{port}"
+    except (OSError, OverflowError) as error:
+        raise StageError(
+            f"cannot listen on {address} port {port}: {getattr(error, 'strerror', None) or error}. "
+            "Another port: --port 8081"
+        ) from error
+
+
+def _found(kind: str, content: bytes) -> Response:
+    headers = Headers(
+        {"Content-Type": kind, "Content-Length": str(len(content)), "Cache-Control": "no-store"}
     )
-    server.gui.set_panel_label(title)
-    scene = server.scene
-    scene.set_up_direction("+z")
-    scene.configure_environment_map(None)
-    scene.add_light_ambient("/lights/ambient", intensity=1.2)
-    scene.add_light_directional("/lights/sun", intensity=2.2, position=(1.5, -2.0, 3.0), cast_shadow=True)
-    scene.add_light_directional("/lights/sky", intensity=1.0, position=(-2.0, 1.5, 2.0))
-    scene.add_grid("/floor", 4.0, 4.0, cell_size=0.25, section_size=1.0, shadow_opacity=0.25)
-    return server
+    return Response(200, "OK", headers, content)
 
 
-def _only_this_site(server: ViserServer, *, anywhere: bool) -> None:
-    """Turn away other web sites in this machine's browsers, and requests for a public tunnel to the page.
+def _may(request: Request, *, anywhere: bool) -> bool:
+    """Whether a request comes from the page itself, or from a program.
 
-    A browser lets any site open a WebSocket to this machine, and names the site in the header Origin.
+    A browser lets any site open a WebSocket to this machine, and names the site in the header Origin. A site whose
+    name leads to this machine is told by the header Host.
     """
-    sockets = server._websock_server  # noqa: SLF001  viser has no public way to do either
-    sockets.unregister_handler(ShareUrlRequest)
-
-    async def check(client: WebsockClientConnection) -> None:
-        connection = sockets._live_connections[client.client_id]  # noqa: SLF001
-        if connection.request is None:
-            return
-        origin, host = (connection.request.headers.get(name) for name in ("Origin", "Host"))
-        if origin is None:  # no browser
-            return
-        site = urlsplit(origin)
-        if site.netloc != host or not (anywhere or _is_local(site.hostname or "")):
-            await connection.close(1008, "another site")
-
-    sockets.on_client_connect(check)
+    origin, host = request.headers.get("Origin"), request.headers.get("Host", "")
+    named = urlsplit(f"//{host}").hostname or ""
+    if not (anywhere or is_local(named)):
+        return False
+    return origin is None or urlsplit(origin).netloc == host
 
 
-def is_watched(server: ViserServer) -> bool:
-    """Whether anybody is connected to the page, also one who draws nothing."""
-    return bool(server._websock_server._live_connections)  # noqa: SLF001  viser counts only those with a camera
-
-
-def close_stage(server: ViserServer) -> None:
-    """End the page."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        server.stop()
-
-
-def look_at(server: ViserServer, target: tuple[float, float, float], distance: float) -> None:
-    """Have every camera begin with a look at a point [m] from the front and above.
-
-    On a phone held upright the controls cover the lower half: the point is above the middle then, and further away.
-    """
-
-    def aim(client: ClientHandle) -> None:
-        if client.camera.aspect < UPRIGHT:
-            x, y, z = target
-            client.camera.position = _from(target, PHONE_DISTANCE * distance)
-            client.camera.look_at = (x, y, z - PHONE_DROP * distance)
-
-    server.initial_camera.look_at = target
-    server.initial_camera.position = _from(target, distance)
-    server.on_client_connect(aim)
-
-
-def _from(target: tuple[float, float, float], distance: float) -> tuple[float, float, float]:
-    return (target[0] + 0.75 * distance, target[1] - 0.95 * distance, target[2] + 0.45 * distance)
-
-
-def _is_local(address: str) -> bool:
+def is_local(address: str) -> bool:
+    """Whether an address is of this machine alone."""
     try:
         return ipaddress.ip_address(address).is_loopback
     except ValueError:

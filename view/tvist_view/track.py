@@ -1,14 +1,23 @@
-"""A robot's run, recorded: its moments by time."""
+"""A robot's run, recorded."""
 
-from bisect import bisect_left
+import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from tvist_protocol.geometry import Geometry
+import numpy as np
+
 from tvist_protocol.stream import State, Truth
-from tvist_protocol.values import Payload
-from tvist_view.scene import Moment
-from tvist_view.signals import History, Signals
+from tvist_view.look import Look
+from tvist_view.signals import Signals, signals_of
+
+EVERY = 5
+"""Ticks between two rows that the page gets: between them it draws what is between."""
+
+MOVES = 1e-7
+"""Change of a reference within a tick from which on it moves [rad]."""
+CALM = 50
+"""Ticks of rest from which on a motion has ended."""
 
 
 class TrackError(ValueError):
@@ -20,8 +29,7 @@ class Shown:
     """What a robot looks like, and what it is called."""
 
     label: str
-    geometry: Geometry
-    payload: Payload
+    look: Look
 
 
 class Track:
@@ -39,29 +47,49 @@ class Track:
     def __init__(self, shown: Shown, states: Sequence[State], truths: Sequence[Truth]) -> None:
         if not states:
             raise TrackError("there is no state in it, so there is nothing to show")
-        self.shown = shown
-        by_tick = {truth.tick: truth for truth in truths}
-        self._moments = [Moment(state, by_tick.get(state.tick)) for state in states]
-        self._times = [state.timestamp for state in states]
-        self.has_truth = any(moment.truth is not None for moment in self._moments)
-        history = History(shown.geometry.alpha, len(states))
-        for moment in self._moments:
-            if moment.truth is not None:
-                history.add_truth(moment.truth)
-            history.add(moment.state)
-        self.signals: Signals = history.signals()
+        self.shown, self._states = shown, states
+        self._truths = {truth.tick: truth for truth in truths}
+        self.has_truth = bool(self._truths)
+        self.signals: Signals = signals_of(shown.look, states, self._truths)
 
     @property
     def start(self) -> float:
         """Simulation time of the first moment [s]."""
-        return self._times[0]
+        return self._states[0].timestamp
 
     @property
     def end(self) -> float:
         """Simulation time of the last moment [s]."""
-        return self._times[-1]
+        return self._states[-1].timestamp
 
-    def at(self, time: float) -> Moment:
-        """The moment at a simulation time [s], or the nearest there is."""
-        place = min(bisect_left(self._times, time - 1e-9), len(self._moments) - 1)
-        return self._moments[place]
+    @property
+    def stops(self) -> list[float]:
+        """Times at which the reference before the shaper came to rest for a while [s]."""
+        q = np.array([state.reference_q for state in self._states])
+        moves = np.abs(np.diff(q, axis=0, prepend=q[:1])).max(axis=1) > MOVES
+        ends = np.flatnonzero(moves[:-1] & ~moves[1:])
+        return [float(self.signals.time[end]) for end in ends if not moves[end + 1 : end + CALM].any()]
+
+    def packed(self, start: float) -> dict[str, Any]:
+        """What the page is told: rows of poses and samples of signals, as base64 of 32-bit floats.
+
+        Args:
+            start: Simulation time from which the page counts [s].
+        """
+        states = self._states[::EVERY]
+        rows = [self.shown.look.row(state, self._truths.get(state.tick)) for state in states]
+        signals = vars(self.signals) | {"time": self.signals.time - start}
+        return {
+            "label": self.shown.label,
+            "look": self.shown.look.packed(),
+            "reach": self.shown.look.reach,
+            "truth": self.has_truth,
+            "width": len(rows[0]),
+            "times": _packed(np.array([state.timestamp for state in states]) - start),
+            "rows": _packed(np.array(rows)),
+            "samples": {name: _packed(values) for name, values in signals.items()},
+        }
+
+
+def _packed(values: np.ndarray[Any, Any]) -> str:
+    return base64.b64encode(values.astype("<f4").tobytes()).decode()

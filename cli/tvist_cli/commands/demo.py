@@ -5,9 +5,10 @@ from pathlib import Path
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import out, print_json, program, progress, words
+from tvist_cli.pages import Door
 from tvist_cli.serving import compile_if_new
 from tvist_cli.tables import print_paper
-from tvist_cli.tracks import recorded, show_tracks
+from tvist_cli.tracks import recorded
 
 MAGNIFIED, PORT = 100.0, 8080
 """Magnification and port of the page of --view."""
@@ -63,7 +64,7 @@ def demo(
     if not result.equal:
         raise Failure("the recording differs from its replay or from what the client received")
     if view:
-        show_tracks(recorded(result.recording), MAGNIFIED, ("127.0.0.1", PORT), insecure=False)
+        recorded(result.recording).serve(MAGNIFIED, Door("127.0.0.1", PORT, insecure=False))
 
 
 def _print_next(recording: Path) -> None:

@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 from tvist_cli.failure import told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import out, print_json, progress, table, typed
-from tvist_cli.pages import serve_page
+from tvist_cli.pages import Door, serve_page
 from tvist_cli.serving import compile_if_new
 
 if TYPE_CHECKING:
-    from viser import ViserServer
-
     from tvist_view.lesson import Compared, OneMass
 
 MOVED = ("Q1", "Q2")
@@ -48,7 +46,10 @@ def lesson(
     """
     look.check(figures, markdown)
     if not (numbers or json or figures is not None or markdown is not None):
-        serve_page(_show, (address, port), "tvist lesson", insecure=insecure)
+        from tvist_view.lesson import Lesson
+
+        shown = Lesson(_one_mass(), _moved)
+        serve_page(shown.page, shown.meet, Door(address, port, insecure))
         return
     from tvist_lab.one_joint import lesson as run
     from tvist_lab.one_joint.markdown import MODES, delays, left, modes, page
@@ -80,12 +81,6 @@ def lesson(
     table("how much longer the motions last", ("", *ends), delays(done))
 
 
-async def _show(server: "ViserServer") -> None:
-    from tvist_view.lesson import show_lesson
-
-    await show_lesson(server, _one_mass(), _moved)
-
-
 def _one_mass() -> "OneMass":
     """The arm with one flexible joint, with the formula for its frequency."""
     from tvist_controller.about import geometry_of
@@ -94,14 +89,14 @@ def _one_mass() -> "OneMass":
     from tvist_plant.description import load
     from tvist_protocol.values import Payload
     from tvist_view.lesson import OneMass, frequency_to_elbow
+    from tvist_view.look import Look
 
     description = load("one-joint")
     shoulder = FlexibleShoulder.of(description, description.payload)
     low, high = (description.poses[name][1] for name in ("Q1", "Q3"))
     carried: Payload = paper_payload(description)
     return OneMass(
-        geometry=geometry_of(description),
-        payload=carried,
+        look=Look(geometry_of(description), carried),
         f_d_range=(shoulder.mode(low)[0], shoulder.mode(high)[0]),
         elbow=frequency_to_elbow(lambda angle: shoulder.mode(angle)[0], low, high),
     )
@@ -116,6 +111,7 @@ def _simulated(error: float, zeta: float) -> "Compared":
     from tvist_lab.compared import run_beside
     from tvist_plant.description import load
     from tvist_view.lesson import Compared, largest_after_stop
+    from tvist_view.look import Look
     from tvist_view.track import Shown, Track
 
     poses = load("ur5e").poses
@@ -125,7 +121,7 @@ def _simulated(error: float, zeta: float) -> "Compared":
     _, shaped = asyncio.run(run_beside("zv", way, modes=(f_d, zeta)))
     assert info.geometry is not None  # of our own server
     first, second = (
-        Track(Shown(label, info.geometry, info.payload), run.states, run.truths)
+        Track(Shown(label, Look(info.geometry, info.payload)), run.states, run.truths)
         for label, run in (("unshaped", unshaped), ("shaped", shaped))
     )
     return Compared(first, second, f_d=f_d, left=(largest_after_stop(first), largest_after_stop(second)))

@@ -17,6 +17,9 @@ class Sink:
     By default each method ignores its message.
     """
 
+    wants_truth = False
+    """Whether it asks for what a real robot cannot measure just now, although the robot does not publish it."""
+
     def report(self, report: Report) -> None:
         """Take a tick's report, by default as its state, which takes a while to make."""
         self.state(report.state)
@@ -28,7 +31,7 @@ class Sink:
         """Take an event; it comes before the state of its tick."""
 
     def truth(self, truth: Truth) -> None:
-        """Take what a real robot cannot measure, if it is published."""
+        """Take what a real robot cannot measure, if it is published or this sink wants it."""
 
     def io(self, io: Io) -> None:
         """Take changed inputs, outputs and registers; they precede the state of their tick."""

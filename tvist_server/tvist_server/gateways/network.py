@@ -95,7 +95,15 @@ class Network:
         self.session.info.declare_transport_events_listener(Callback(self._on_transport, indirect=False))
         _OPEN.add(self)
 
-    def gateway(self, robot: str, desk: Desk, *, lockstep: bool, truth: bool) -> ZenohGateway:
+    def gateway(
+        self,
+        robot: str,
+        desk: Desk,
+        *,
+        lockstep: bool,
+        truth: bool,
+        wanted: Callable[[bool], None] | None = None,
+    ) -> ZenohGateway:
         """Create the gateway of a robot.
 
         Args:
@@ -103,9 +111,11 @@ class Network:
             desk: Desk that receives the messages that arrive.
             lockstep: Whether a client advances time: then no state may be lost, and the publisher waits.
             truth: Whether to publish the topic with values that a real robot cannot measure.
+            wanted: Called, from any thread, with whether a client subscribes to that topic, if it is published only
+                then.
         """
         gateway = self._expected.pop(robot, None) or self._added(robot, desk)
-        gateway.serve(desk, lockstep=lockstep, truth=truth)
+        gateway.serve(desk, lockstep=lockstep, truth=truth, wanted=wanted)
         return gateway
 
     def expect(self, robots: Sequence[str], starting: Queried, *, here: bool = True) -> None:

@@ -8,6 +8,7 @@ them to the desk and return. One may still be running when the session is closed
 import contextlib
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import zenoh
 from zenoh.handlers import Callback
@@ -51,7 +52,9 @@ class ZenohGateway(Gateway):
         for queryable in self._queryables:
             queryable.undeclare()  # type: ignore[no-untyped-call]
 
-    def serve(self, desk: Desk, *, lockstep: bool, truth: bool) -> None:
+    def serve(
+        self, desk: Desk, *, lockstep: bool, truth: bool, wanted: Callable[[bool], None] | None = None
+    ) -> None:
         """Let clients reach the robot; arguments as for `Network.gateway`."""
         session, robot = self._session, self._robot
         self._desk = desk
@@ -61,7 +64,12 @@ class ZenohGateway(Gateway):
         self._queried = desk  # which knows the clients by now
         setpoint = keys.setpoint(robot)
         session.declare_subscriber(setpoint, Callback(partial(self._on_setpoint, setpoint), indirect=False))
-        self._publishers = _publishers(session, robot, lockstep=lockstep, truth=truth)
+        self._publishers = _publishers(session, robot, lockstep=lockstep, truth=truth or wanted is not None)
+        if wanted is not None:
+            tell = Callback(partial(_tell_wanted, wanted), indirect=False)
+            self._publishers["truth"].declare_matching_listener(tell)
+            status: Any = self._publishers["truth"].matching_status  # its annotation is another
+            wanted(status.matching)
         # Declared last, since it announces that everything else is ready.
         self._alive = session.liveliness().declare_token(keys.alive(robot))
 
@@ -132,6 +140,10 @@ class ZenohGateway(Gateway):
         """Note that a session has ended. Its liveliness tokens may outlast it while another session holds a copy."""
         if not self._closed and self._desk is not None:
             self._desk.session_gone(session)
+
+
+def _tell_wanted(wanted: Callable[[bool], None], status: zenoh.MatchingStatus) -> None:
+    wanted(status.matching)
 
 
 def _publishers(

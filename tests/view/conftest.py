@@ -1,0 +1,24 @@
+"""Runs that several files draw."""
+
+import asyncio
+
+import pytest
+
+from tvist_lab.compared import run_beside
+from tvist_plant.description import load
+from tvist_view.look import Look
+from tvist_view.track import Shown, Track
+
+POSES = load("ur5e").poses
+
+
+@pytest.fixture(scope="module")
+def tracks():
+    """Q1 to Q2, unshaped and shaped."""
+    found = []
+    for shaper in ("none", "zv"):
+        info, collected = asyncio.run(run_beside(shaper, (POSES["Q1"], POSES["Q2"])))
+        label = "without" if shaper == "none" else f"with {shaper}"
+        look = Look(info.geometry, info.payload)
+        found.append(Track(Shown(label, look), collected.states, collected.truths))
+    return found

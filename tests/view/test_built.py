@@ -1,0 +1,26 @@
+"""The page in the repository is what its sources build."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+VIEW = Path(__file__).parents[2] / "view"
+
+
+@pytest.mark.skipif(shutil.which("npm") is None, reason="there is no npm; only who changes the page needs it")
+def test_building_the_page_again_gives_the_same_bytes(tmp_path):
+    shutil.copytree(VIEW / "page", tmp_path / "page", ignore=shutil.ignore_patterns("node_modules"))
+    got = subprocess.run(
+        ["npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund"],
+        check=False,
+        cwd=tmp_path / "page",
+        capture_output=True,
+    )
+    if got.returncode != 0:
+        pytest.skip(f"no packages: {got.stderr.decode()[-200:]}")
+    subprocess.run(["node", "build.mjs", tmp_path], cwd=tmp_path / "page", check=True)
+    for name in ("page.html", "page.licences.txt"):
+        built, kept = ((folder / name).read_bytes() for folder in (tmp_path, VIEW / "tvist_view"))
+        assert built == kept, f"{name} is not what view/page builds: run make page"

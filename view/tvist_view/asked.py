@@ -1,0 +1,96 @@
+"""What a tab may ask, as its messages are read."""
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta, Struct
+
+Mass = Annotated[float, Meta(ge=0.0, le=1e4)]
+
+
+class Asked(Struct, tag_field="do", frozen=True, forbid_unknown_fields=True):
+    """A message of a tab."""
+
+
+class Setting(Asked, frozen=True):
+    """A message that changes a setting, also while the arm moves."""
+
+
+class Stop(Asked, tag="stop", frozen=True):
+    """Stop the arm, whoever moves it."""
+
+
+class Take(Asked, tag="take", frozen=True):
+    """Take control for this tab."""
+
+
+class Give(Asked, tag="give", frozen=True):
+    """Give control back."""
+
+
+class Show(Asked, tag="robot", frozen=True):
+    """Show another robot."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=200)]
+
+
+class Move(Asked, tag="move", frozen=True):
+    """Go to a named pose, if the arm is not there, and on to another."""
+
+    first: str
+    last: str
+
+
+class Compare(Asked, tag="compare", frozen=True):
+    """Make a motion without and with a shaper."""
+
+    first: str
+    last: str
+    shaper: str
+
+
+class Jog(Asked, tag="jog", frozen=True):
+    """Jog a joint for the next moment; the page says it again and again while its button is down."""
+
+    joint: Annotated[int, Meta(ge=0)]
+    direction: Annotated[float, Meta(ge=-1.0, le=1.0)]
+
+
+class Shape(Setting, tag="shape", frozen=True):
+    """Choose the shaper, and how many modes it suppresses; None: as many as before."""
+
+    shaper: str
+    modes: Annotated[int, Meta(ge=1)] | None = None
+
+
+class Speed(Setting, tag="speed", frozen=True):
+    """Set the speed slider."""
+
+    fraction: Annotated[float, Meta(ge=0.0, le=1.0)]
+
+
+class Declare(Setting, tag="declare", frozen=True):
+    """Declare a mass as payload [kg]."""
+
+    mass: Mass
+
+
+class Carry(Asked, tag="carry", frozen=True):
+    """Let the simulated arm carry a mass [kg]."""
+
+    mass: Mass
+
+
+class Fault(Setting, tag="fault", frozen=True):
+    """Cause a fault."""
+
+    name: str
+
+
+class Ready(Setting, tag="ready", frozen=True):
+    """Release what a client can release, and switch the power on."""
+
+
+Message = Stop | Take | Give | Show | Move | Compare | Jog | Shape | Speed | Declare | Carry | Fault | Ready
+read = msgspec.json.Decoder(Message).decode
+"""Reads a message; raises `msgspec.ValidationError` or `msgspec.DecodeError`."""

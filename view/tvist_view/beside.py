@@ -1,0 +1,137 @@
+"""One motion without and with a shaper, one after the other, on the robot that is shown."""
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tvist_client.arm import Arm
+from tvist_client.errors import ClientError
+from tvist_client.robot import Robot
+from tvist_protocol.errors import ProtocolError, RefusedError
+from tvist_protocol.stream import Event, State, Truth
+from tvist_view.look import Look
+from tvist_view.pilot import Doing, motion
+from tvist_view.signals import signals_of
+
+REST_S = 1.0
+"""Time after a motion that is looked at, and in which the arm comes to rest before the next one [s]."""
+POINTS = 600
+"""Points of a curve that the page draws."""
+
+
+@dataclass
+class Run:
+    """Everything that the robot said during one motion."""
+
+    states: list[State] = field(default_factory=list)
+    truths: list[Truth] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What shaping has changed; None is not measurable."""
+
+    less_percent: float | None
+    """By how much the largest acceleration after the stop is less [%]."""
+    earlier_ms: float | None
+    """By how much earlier the tool is at rest [ms]."""
+    before: float | None
+    """Largest acceleration after the stop without the shaper [m/s²]."""
+    after: float | None
+    """The same with it."""
+
+
+Judge = Callable[[Run, Run], Verdict]
+"""Measures a motion without and with the shaper."""
+
+
+def beside(
+    robot: Robot,
+    look: Look,
+    poses: Sequence[Sequence[float]],
+    shaper: str,
+    judge: Judge,
+    tell: Callable[[str | None], None],
+    done: Callable[[dict[str, Any]], None],
+) -> Doing:
+    """Make a motion without and with a shaper, judge both, and leave the shaper as it was.
+
+    Args:
+        robot: The robot.
+        look: What it looks like.
+        poses: Joint angles at the start and at the end of the motion [rad].
+        shaper: Name of the shaper.
+        judge: Measures both.
+        tell: Called with what happens now, and with None at the end.
+        done: Called with the result for the page.
+    """
+    start, end = poses
+
+    async def run(arm: Arm) -> None:
+        info = await robot.info()
+        runs = []
+        try:
+            for name, words in (("none", "without"), (shaper, f"with {shaper}")):
+                tell(f"{words}: to the start …")
+                await motion([start])(arm)
+                await _pass(robot, REST_S / 2)
+                await arm.set_shaper(name, modes=info.modes)
+                tell(f"{words} …")
+                with _gathered(robot) as gathered:
+                    await arm.move_j(end)
+                    await _pass(robot, REST_S)
+                runs.append(gathered)
+            verdict = await asyncio.to_thread(judge, *runs)
+            done({**vars(verdict), "with": shaper, **_curves(look, *runs)})
+        finally:
+            tell(None)
+            with contextlib.suppress(RefusedError, ClientError, ProtocolError):  # the robot may have gone
+                await arm.set_shaper(info.shaper, modes=info.modes)
+
+    return run
+
+
+@contextlib.contextmanager
+def _gathered(robot: Robot) -> Iterator[Run]:
+    run = Run()
+    ends = (
+        robot.on_state(run.states.append),
+        robot.on_truth(run.truths.append),
+        robot.on_event(run.events.append),
+    )
+    try:
+        yield run
+    finally:
+        for end in ends:
+            end()
+
+
+async def _pass(robot: Robot, seconds: float) -> None:
+    """Let simulation time pass."""
+    now = (await robot.state()).tick
+    await robot.until(now + round(seconds / 0.002))
+
+
+def _curves(look: Look, *runs: Run) -> dict[str, list[float]]:
+    """|α| of both motions over the time since each began."""
+    shown = []
+    for run in runs:
+        signals = signals_of(look, run.states, {truth.tick: truth for truth in run.truths})
+        moving = np.flatnonzero(signals.unshaped > 1e-3)
+        begun = signals.time[moving[0]] if len(moving) else signals.time[0]
+        shown.append((signals.time - begun, np.nan_to_num(signals.alpha)))
+    last = max(time[-1] for time, _ in shown)
+    grid = np.linspace(0.0, last, POINTS)
+    # The largest value in each step, so that no peak is lost between two points.
+    curves = []
+    for time, alpha in shown:
+        out = np.zeros(POINTS)
+        inside = time >= 0.0
+        np.maximum.at(out, np.searchsorted(grid, time[inside]).clip(0, POINTS - 1), alpha[inside])
+        curves.append(np.round(out, 4).tolist())
+    return {"time": np.round(grid, 4).tolist(), "without": curves[0], "shaped": curves[1]}

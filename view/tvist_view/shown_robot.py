@@ -1,0 +1,238 @@
+"""A robot on the network that tabs show: found, described, heard while somebody looks, and moved."""
+
+import asyncio
+import contextlib
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tvist_client.errors import AnswerTimeoutError, ClientError
+from tvist_client.robot import Robot
+from tvist_client.transports.zenoh import robots_at
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.info import Info
+from tvist_protocol.io import Io
+from tvist_protocol.stream import Event
+from tvist_view import asked
+from tvist_view.beside import Judge
+from tvist_view.described import described, state_in_words
+from tvist_view.doing import Doer
+from tvist_view.look import GeometryError, Look
+from tvist_view.meshes import Meshes
+from tvist_view.pilot import Pilot
+from tvist_view.signals import Running
+from tvist_view.watcher import Watcher
+
+log = logging.getLogger("tvist.view")
+
+INFO_S = 1.0
+"""Time between two looks at who has control [s]."""
+RETRY_S = 2.0
+"""Time between two attempts to find the robot [s]."""
+TOLD = {"protective_stop", "safety_stop", "warning", "lease_lost"}
+"""Kinds of events whose reason the page says."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where robots are found."""
+
+    endpoint: str
+    """Zenoh endpoint."""
+    security: Path | None = None
+    """Folder with a certificate for the robot's server."""
+    namespace: str = ""
+    """Namespace of the robots."""
+
+
+class ShownRobot:
+    """A robot that tabs show; it is looked for until the task is cancelled.
+
+    Args:
+        place: Where it is.
+        name: Its name.
+        judge: Measures a motion without and with a shaper.
+        meshes: Where the files of its meshes are offered to the page.
+    """
+
+    def __init__(self, place: Place, name: str, judge: Judge, meshes: Meshes) -> None:
+        self._place, self._name, self._judge, self._meshes = place, name, judge, meshes
+        self.running: Running | None = None
+        self._watchers: set[Watcher] = set()
+        self._ends: list[Callable[[], None]] = []
+        self._robot: Robot | None = None
+        self._doer: Doer | None = None
+        self._info: Info | None = None
+        self._io: Io | None = None
+        self._described: dict[str, Any] = {}
+        self._absent = f"Looking for robot {name} at {place.endpoint} …"
+        self._tasks: set[asyncio.Task[Any]] = set()
+        self.task = asyncio.create_task(self._run())
+
+    def come(self, watcher: Watcher) -> None:
+        """A tab shows this robot now."""
+        self._watchers.add(watcher)
+        watcher.robot = self
+        self._introduce(watcher)
+        self._listen()
+
+    async def go(self, watcher: Watcher) -> None:
+        """A tab does not show it any more: its motion is stopped, its control given back."""
+        self._watchers.discard(watcher)
+        watcher.robot = None
+        if self._doer is not None:
+            await self._doer.pilot.gone(watcher.tab.number)
+        self._listen()
+
+    def _introduce(self, watcher: Watcher) -> None:
+        watcher.status, watcher.count = {}, 0 if self.running is None else max(self.running.count - 1, 0)
+        if self._described:
+            watcher.put("robot", self._described)
+        else:
+            watcher.put("gone", {"text": self._absent})
+
+    async def _run(self) -> None:
+        place, lead = self._place, "No robot"
+        while True:
+            try:
+                async with await Robot.connect(
+                    place.endpoint, self._name, security=place.security, namespace=place.namespace
+                ) as robot:
+                    await self._shows(robot, await robot.info())
+            except (ClientError, RefusedError, GeometryError) as error:
+                lead = "The robot cannot be drawn" if isinstance(error, GeometryError) else lead
+                self._away(f"{lead}. {error}. The page waits for it.", str(error))
+            lead = "The robot has gone" if self._described else lead
+            self._described = {}
+            await asyncio.sleep(RETRY_S)
+
+    def _away(self, sentence: str, why: str) -> None:
+        """Say why there is no robot, once."""
+        if self._described:
+            sentence = sentence.replace("No robot.", "The robot has gone.", 1)
+        self._described = {}
+        if sentence != self._absent:
+            self._absent = sentence
+            log.warning("%s; waiting for the robot", why)
+            for watcher in self._watchers:
+                self._introduce(watcher)
+
+    async def _shows(self, robot: Robot, info: Info) -> None:
+        """Show the robot until it has gone.
+
+        Raises:
+            ClientError: It has.
+            GeometryError: It does not tell its geometry, or in a version that is not known.
+        """
+        if info.geometry is None:
+            raise GeometryError(
+                f"a {info.model} on a server of version {info.version} does not tell its geometry: update the server"
+            )
+        look = Look(info.geometry, info.payload)
+        place = self._place
+        robots = await robots_at(place.endpoint, place.security, place.namespace)
+        self._robot, self._info, self._absent = robot, info, ""
+        self.running = Running(look)
+        pilot = Pilot(robot, f"view-{os.getpid()}", self._say)
+        self._doer = Doer(robot, look, pilot, self._judge, self._say, self._result)
+        self._described = described(info, look, robots, self._meshes)
+        for watcher in self._watchers:
+            self._introduce(watcher)
+        self._listen()
+        try:
+            await self._ask(robot, pilot)
+        finally:
+            self._deaf()
+            self._robot = self._doer = self.running = None
+            if pilot.holder is not None:
+                await pilot.give_back(pilot.holder)
+
+    def _listen(self) -> None:
+        """Hear the robot while a tab shows it: its truth is computed for those who want it only."""
+        if not self._watchers:
+            self._deaf()
+        elif self._robot is not None and self.running is not None and not self._ends:
+            robot, running = self._robot, self.running
+            self._ends = [
+                robot.on_state(running.add),
+                robot.on_truth(running.add),
+                robot.on_event(self._on_event),
+                robot.on_io(self._on_io),
+            ]
+
+    def _deaf(self) -> None:
+        ends, self._ends = self._ends, []
+        for end in ends:
+            end()
+
+    async def _ask(self, robot: Robot, pilot: Pilot) -> None:
+        """Ask once a second who has control, and which shaper is in use."""
+        while True:
+            with contextlib.suppress(AnswerTimeoutError):  # slow is not gone
+                holder = pilot.holder
+                self._info = await robot.info()
+                # Control that was taken since the question is not in the answer.
+                if holder == pilot.holder:
+                    await pilot.heard(self._info.control)
+            await asyncio.sleep(INFO_S)
+
+    def status(self, tab: int) -> dict[str, Any] | None:
+        """What the bar of a tab says; None before the first state."""
+        info, doer, running = self._info, self._doer, self.running
+        if info is None or doer is None or running is None or running.state is None:
+            return None
+        pilot = doer.pilot
+        return {
+            **state_in_words(running.state, info, self._io),
+            "control": _control(pilot, tab, info.control),
+            "mine": pilot.holder == tab,
+            "free": pilot.holder is None and info.control in (None, pilot.client),
+            "truth": running.has_truth,
+            "comparing": doer.comparing,
+        }
+
+    def _on_event(self, event: Event) -> None:
+        if event.kind in TOLD and event.why:
+            self._say(event.why)
+
+    def _on_io(self, io: Io) -> None:
+        self._io = io
+
+    def _result(self, result: dict[str, Any]) -> None:
+        for watcher in self._watchers:
+            watcher.put("result", result)
+
+    def _say(self, sentence: str) -> None:
+        for watcher in self._watchers:
+            watcher.say(sentence)
+
+    def do(self, watcher: Watcher, message: asked.Message) -> None:
+        """Do what a tab asks for."""
+        doer, info = self._doer, self._info
+        if doer is None or info is None:
+            watcher.say("there is no robot now")
+        elif isinstance(message, asked.Jog) and message.joint < len(info.joints):
+            doer.pilot.jog(watcher.tab.number, message.joint, message.direction)
+        else:
+            task = asyncio.create_task(doer.do(info, watcher.tab.number, message))
+            self._tasks.add(task)
+            task.add_done_callback(self._finished)
+
+    def _finished(self, task: asyncio.Task[Any]) -> None:
+        self._tasks.discard(task)
+        if not task.cancelled() and (error := task.exception()) is not None:
+            log.error("the page: %s", error, exc_info=error)
+            self._say(f"the page has failed: {error}")
+
+
+def _control(pilot: Pilot, tab: int, control: str | None) -> str:
+    if pilot.holder == tab:
+        return "This tab has control."
+    if pilot.holder is not None:
+        return "Another tab has control; this one watches."
+    if control not in (None, pilot.client):
+        return f"Client {control} has control; this tab watches."
+    return "Nobody has control."
