@@ -114,7 +114,7 @@ class _Copy:
                 the file shows them.
             added: Time [ns], channel and content of other messages, in the order of time.
         """
-        schemas: dict[int, int] = {0: 0}
+        schemas: dict[int, Schema] = {}
         channels: dict[int, int] = {}
         told: set[str] = set()
         waiting = next(added, None)
@@ -132,15 +132,16 @@ class _Copy:
                             self._writer.add_message(
                                 channels[channel], time, record.data, record.publish_time, record.sequence
                             )
-                        case Schema(id=number) if number not in schemas:
-                            schemas[number] = self._writer.register_schema(
-                                record.name, record.encoding, record.data
-                            )
+                        case Schema(id=number):
+                            schemas[number] = record
                         case Channel(id=number, topic=topic) if (
                             number not in channels and topic not in self.topics
                         ):
                             channels[number] = self._writer.register_channel(
-                                topic, record.message_encoding, schemas[record.schema_id], record.metadata
+                                topic,
+                                record.message_encoding,
+                                self._schema(schemas.get(record.schema_id)),
+                                record.metadata,
                             )
                         case Metadata(name=name) if (
                             name not in told
@@ -152,6 +153,11 @@ class _Copy:
         for one in (waiting, *added) if waiting is not None else ():
             self._put(*one)
         self._writer.finish()  # type: ignore[no-untyped-call]
+
+    def _schema(self, schema: Schema | None) -> int:
+        return (
+            0 if schema is None else self._writer.register_schema(schema.name, schema.encoding, schema.data)
+        )
 
     def _put(self, time: int, channel: int, data: bytes) -> None:
         self._writer.add_message(channel, time, data, time)

@@ -94,7 +94,7 @@ def angles(recording: Recording, arm: Arm) -> tuple[Angles, list[str]]:
     rows = slice(None, None, PICTURE_TICKS)
     q = recording["actual_q"][rows]
     bends = np.zeros((len(q), 2 * len(arm.bending)))
-    notes = []
+    notes: list[str] = []
     if "truth_motor_q" not in recording:
         notes.append(
             "holds no truth (tvist serve --truth): the arm is drawn stiff, where its joints were measured"
@@ -105,7 +105,7 @@ def angles(recording: Recording, arm: Arm) -> tuple[Angles, list[str]]:
         if true.shape != q.shape or bent.shape != bends.shape:
             notes.append("holds a truth of another arm: the arm is drawn stiff")
         else:
-            known = np.isfinite(true).all(axis=1) & np.isfinite(bent).all(axis=1)
+            known = np.asarray(np.isfinite(np.hstack([true, bent])).all(axis=1))
             q, bends = np.where(known[:, None], true, q), np.where(known[:, None], bent, 0.0)
             if not known.all():
                 notes.append(
