@@ -209,7 +209,7 @@ class _Check:
         self.overloaded = ticks < TOO_SLOW * self.due or (last is not None and last.overloaded)
         said = f"{self.rate:.1f} Hz of {self.due:g} due"
         if not self.overloaded and self.rate < ON_TIME * self.due:
-            said = f"{said}, {self.rate / self.due:.0%}{_remedy(last, self.due)}"
+            said = f"{said}, {100.0 * self.rate / self.due:.0f} %{_remedy(last, self.due)}"
         if last is not None and last.due_ticks:
             self.missed = (
                 f"; since its start it has missed {last.missed_ticks} of {last.due_ticks} control periods"

@@ -109,7 +109,7 @@ def angles(recording: Recording, arm: Arm) -> tuple[Angles, list[str]]:
             q, bends = np.where(known[:, None], true, q), np.where(known[:, None], bent, 0.0)
             if not known.all():
                 notes.append(
-                    f"lacks the truth of {np.mean(~known):.0%} of its ticks: the arm is drawn stiff there"
+                    f"lacks the truth of {100.0 * np.mean(~known):.0f} % of its ticks: the arm is drawn stiff there"
                 )
     here = np.isfinite(q).all(axis=1)
     return Angles(recording["tick"][rows][here], q[here], bends[here]), notes
