@@ -1,14 +1,10 @@
 """`tvist log export`: write a recording as CSV, Parquet, npz or mat, or with an arm that Foxglove draws."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.misuse import lower
 from tvist_cli.output import print_json, say
-
-if TYPE_CHECKING:
-    from tvist_lab.recordings import Recording
 
 
 def export(
@@ -34,8 +30,9 @@ def export(
             after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
         json: Print one JSON object.
     """
-    from tvist_lab.foxglove.export import KIND as FOXGLOVE
-    from tvist_lab.recordings.export import FORMATS
+    from tvist_lab.recordings import RecordingError, mcap_file, read
+    from tvist_lab.recordings.export import FORMATS, FOXGLOVE, written_by
+    from tvist_lab.recordings.export import export as write
 
     kind = lower(to)
     if kind not in (*FORMATS, FOXGLOVE):
@@ -44,49 +41,33 @@ def export(
         raise Failure("columns is for a CSV: --to foxglove needs a recording", code=2)
     ending = f".{kind}.mcap" if kind == FOXGLOVE else f".{kind}"
     path = output or file.with_name(file.name.removesuffix(".gz")).with_suffix(ending)
-    written = _written(path, kind)
+    written = written_by(path, kind)
     for place in written:
         if place.exists() and file.exists() and place.samefile(file):
             raise Failure(f"{place} is the file to be exported: choose another one with --output", code=2)
         if place.exists() and not force:
             raise Failure(f"{place} exists already: give --force to replace it, or --output")
-    recording, notes = _write(file, path, kind, columns)
-    for note in notes:
-        say(f"{file}: {note}")
+    with told(RecordingError):
+        if kind == FOXGLOVE:
+            from tvist_lab.foxglove.export import export as draw
+
+            content = mcap_file.read(file)
+            recording = content.recording.noted(*filter(None, [content.note]), *draw(content, path))
+        else:
+            recording = read(file, columns)
+            write(recording, path, kind)
+    for note in recording.notes:
+        say(f"{file}: {note.removeprefix(f'{file} ')}")
     if json:
         print_json(
             {"file": str(file), "written": [str(place) for place in written], "rows": len(recording),
-             "columns": list(recording.columns), "notes": notes}
+             "columns": list(recording.columns), "notes": list(recording.notes)}
         )  # fmt: skip
     elif kind == FOXGLOVE:
-        recorded, beside = written
         say(
-            f"{len(recording)} ticks are in {recorded}: open it in Foxglove or Lichtblick with the layout {beside}"
+            f"{len(recording)} ticks are in {path}: open it in Foxglove or Lichtblick, with the layout {written[1]}"
         )
     else:
         say(
             f"{len(recording)} rows of {len(recording.columns)} columns are in {', '.join(map(str, written))}"
         )
-
-
-def _written(path: Path, kind: str) -> list[Path]:
-    from tvist_lab.foxglove import export as foxglove
-    from tvist_lab.recordings.export import written_by
-
-    return foxglove.written_by(path) if kind == foxglove.KIND else written_by(path, kind)
-
-
-def _write(file: Path, path: Path, kind: str, columns: str | None) -> "tuple[Recording, list[str]]":
-    """Read a file and write it; return what is in it, and what is missing."""
-    from tvist_lab.foxglove import export as foxglove
-    from tvist_lab.recordings import RecordingError, mcap_file, read
-    from tvist_lab.recordings.export import export as write
-
-    with told(RecordingError):
-        if kind == foxglove.KIND:
-            content = mcap_file.read(file)
-            note = [] if content.note is None else [content.note.removeprefix(f"{file} ")]
-            return content.recording, [*note, *foxglove.export(content, path)]
-        recording = read(file, columns)
-        write(recording, path, kind)
-        return recording, list(recording.notes)
