@@ -61,7 +61,7 @@ def export(content: RecordingFile, path: Path) -> list[str]:
         ExportError: A file cannot be written. None has changed then, except that the layout may be new.
     """
     arm, above = arm_of(content), topics(content.robot)[State].removesuffix("state")
-    (stood, stiff), (drawn, lacking) = _stood(content.recording, arm), _curves(content.recording)
+    (stood, stiff), (drawn, lacking) = _stood(content, arm), _curves(content.recording)
     # A viewer that has just opened the file shows what stands at its first time.
     ticks = [
         int(content.recording["tick"][0]),
@@ -166,12 +166,12 @@ def _entity(arm: Arm, body: Body) -> dict[str, Any]:
     }
 
 
-def _stood(recording: Recording, arm: Arm) -> tuple[tuple[Floats, Floats, Floats], list[str]]:
+def _stood(content: RecordingFile, arm: Arm) -> tuple[tuple[Floats, Floats, Floats], list[str]]:
     """Return ticks, joint angles and bends of every tenth row, and what is missing, in sentences.
 
     They are true where the truth was recorded, else measured, without bent links.
     """
-    rows = slice(None, None, PICTURE_TICKS)
+    recording, rows = content.recording, slice(None, None, PICTURE_TICKS)
     ticks, q = recording["tick"][rows], recording["actual_q"][rows]
     bends, notes = np.zeros((len(q), 2 * len(arm.bending))), []
     if "truth_motor_q" not in recording:
@@ -182,7 +182,7 @@ def _stood(recording: Recording, arm: Arm) -> tuple[tuple[Floats, Floats, Floats
         true = recording["truth_motor_q"][rows] + recording["truth_gear_deflection"][rows]
         bent = recording["truth_link_deflection"][rows] if arm.bending else bends
         if true.shape != q.shape or bent.shape != bends.shape:
-            raise RecordingError("the truth of the recording is that of another arm")
+            raise RecordingError(f"{content.path} holds a truth that is not of the arm in it")
         known = np.asarray(np.isfinite(np.hstack([true, bent])).all(axis=1))
         q, bends = np.where(known[:, None], true, q), np.where(known[:, None], bent, 0.0)
         if share := 100.0 * np.mean(~known):
