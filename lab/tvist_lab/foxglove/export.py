@@ -167,11 +167,12 @@ def _entity(arm: Arm, body: Body) -> dict[str, Any]:
 
 
 def _stood(content: RecordingFile, arm: Arm) -> tuple[tuple[Floats, Floats, Floats], list[str]]:
-    """Return ticks, joint angles and bends of every tenth row, and what is missing, in sentences.
+    """Return ticks, joint angles and bends of the first row of each ten ticks, and what is missing, in sentences.
 
     They are true where the truth was recorded, else measured, without bent links.
     """
-    recording, rows = content.recording, slice(None, None, PICTURE_TICKS)
+    recording = content.recording
+    rows = np.flatnonzero(np.diff(recording["tick"] // PICTURE_TICKS, prepend=-1.0))
     ticks, q = recording["tick"][rows], recording["actual_q"][rows]
     bends, notes = np.zeros((len(q), 2 * len(arm.bending))), []
     if "truth_motor_q" not in recording:
