@@ -21,7 +21,7 @@ LOG = {
     "analyze": "Measure the motions of a recording, or of another robot's log.",
     "compare": "Compare two recordings of the same motions, motion by motion.",
     "report": "Write a web page about recordings: a verdict, tables and figures in one file.",
-    "export": "Write a recording as CSV, Parquet, npz or mat.",
+    "export": "Write a recording as CSV, Parquet, npz or mat, or for Foxglove.",
     "replay": "Run a recording's commands again and compare bit by bit, or publish it.",
 }
 """The commands of `tvist log`."""

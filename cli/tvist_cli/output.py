@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import msgspec
+from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.segment import Segment
@@ -22,6 +23,8 @@ from tvist_protocol.errors import HARMFUL, harmless
 if TYPE_CHECKING:
     from tvist_lab.report import Page
 
+GAP = " │ "
+"""What separates the columns of a table."""
 WIDTH = 120
 """Number of columns when the output is not a terminal."""
 
@@ -74,6 +77,16 @@ def print_json(value: Any) -> None:
 
 
 @contextmanager
+def waiting(what: str) -> Iterator[Callable[[str], None]]:
+    """Show on a terminal what is waited for; the function it gives changes that."""
+    if err.is_terminal:
+        with err.status(Text(what)) as status:
+            yield lambda now: status.update(Text(now))
+    else:
+        yield lambda _: None
+
+
+@contextmanager
 def progress(
     total: int, what: str, kept: str = "nothing was written"
 ) -> Iterator[Callable[[int, str | None], None]]:
@@ -109,14 +122,30 @@ def progress(
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table with text aligned left and numbers aligned right."""
-    drawn = Table(title=title, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
-    for number, column in enumerate(columns):
-        drawn.add_column(column, no_wrap=number == 0, justify="left" if number == 0 else "right")
-    for row in rows:
-        drawn.add_row(*row)
-    out.print(drawn)
-    out.print()
+    """Print a table with text aligned left and numbers aligned right.
+
+    A table wider than the screen is printed in parts, one below the other, each with the first column.
+    """
+    out.print(Text(title, style="bold"))
+    for part in _parts(columns, rows):
+        drawn = Table(show_edge=False, pad_edge=False)
+        for number in part:
+            drawn.add_column(columns[number], no_wrap=number == 0, justify="left" if number == 0 else "right")
+        for row in rows:
+            drawn.add_row(*(row[number] for number in part))
+        out.print(drawn)
+        out.print()
+
+
+def _parts(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[list[int]]:
+    """Return which columns stand in each part of a table so that none is wider than the screen."""
+    wide = [max(map(cell_len, cells)) + len(GAP) for cells in zip(columns, *rows, strict=True)]
+    parts = [[0]]
+    for number in range(1, len(columns)):
+        if len(parts[-1]) > 1 and sum(wide[one] for one in (*parts[-1], number)) - len(GAP) > out.width:
+            parts.append([0])
+        parts[-1].append(number)
+    return parts
 
 
 def words(meanings: Mapping[str, str]) -> None:

@@ -23,6 +23,8 @@ LISTEN_S = 1.0
 """Shortest time over which the rate of states is measured [s]."""
 TELEMETRY_S = 3.0
 """Longest wait for telemetry, which comes once a second [s]."""
+ON_TIME = 0.9
+"""Share of the states due from which on the rate is in order [-]."""
 TOO_SLOW = 0.5
 """Share of the ticks due that must be seen to begin [-]: fewer are an overload whatever the telemetry says."""
 RETRY_S = 0.5
@@ -206,6 +208,8 @@ class _Check:
             return f"{self.rate:.1f} Hz"
         self.overloaded = ticks < TOO_SLOW * self.due or (last is not None and last.overloaded)
         said = f"{self.rate:.1f} Hz of {self.due:g} due"
+        if not self.overloaded and self.rate < ON_TIME * self.due:
+            said = f"{said}, {100.0 * self.rate / self.due:.0f} %{_remedy(last, self.due)}"
         if last is not None and last.due_ticks:
             self.missed = (
                 f"; since its start it has missed {last.missed_ticks} of {last.due_ticks} control periods"
@@ -247,6 +251,16 @@ class _Check:
                 f"{RELIEVE}"
             )
         return "not overloaded"
+
+
+def _remedy(last: Telemetry | None, due: float) -> str:
+    """Say where states are lost of which too few arrive, as far as the robot tells its own rate."""
+    if last is not None and last.ticks_per_second >= ON_TIME * due:
+        return (
+            f": the robot itself makes {last.ticks_per_second:.0f} ticks/s; next, look at the network and at the "
+            "load of this machine"
+        )
+    return f": next, {RELIEVE}"
 
 
 def _doubt(calibration: CalibrationInfo | None) -> str:

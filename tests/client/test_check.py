@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from contextlib import ExitStack
 
 import msgspec
@@ -175,6 +176,17 @@ def test_alive_looks_at_the_server_alone(realtime, endpoint, capsys):
     report = check(endpoint, alive=True)
     assert (report.ok, report.ready) == (True, None)
     assert realtime.robot.commands == []
+
+
+@pytest.mark.parametrize(("ticks", "remedy"), [(1e5, "look at the network"), (1.0, "end other programs")])
+def test_a_rate_far_from_the_due_one_is_named_with_what_to_do_next(
+    realtime, endpoint, monkeypatch, ticks, remedy
+):
+    monkeypatch.setattr("tvist_client.check.TOO_SLOW", 0.0)
+    realtime.robot.promised = {"due_per_second": 1e5, "ticks_per_second": ticks}
+    report = check(endpoint, alive=True)
+    assert report.ok
+    assert re.search(rf"Hz of 100000 due, \d %: .*{remedy}", report.findings[-1].said)
 
 
 @pytest.mark.parametrize(

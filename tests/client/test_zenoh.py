@@ -57,7 +57,7 @@ async def test_another_robots_endpoint_is_said_to_be_that(realtime, endpoint):
     with pytest.raises(NotConnectedError, match=r"no robot 'ur3' .*; the robots there are ur5e: check name"):
         await Robot.connect(endpoint, "ur3")
     where = (
-        f"'ur5e' at {endpoint} in namespace hall-3; there are no robots: check name, namespace and endpoint"
+        f"'ur5e' at {endpoint} in namespace hall-3; none answered in 3 s: check name, namespace and endpoint"
     )
     with pytest.raises(NotConnectedError, match=where):
         await Robot.connect(endpoint, namespace="hall-3")

@@ -227,14 +227,18 @@ def test_what_cannot_be_measured_is_refused_with_file_cause_and_line(tmp_path, k
     ("content", "words"),
     [
         (b"", "is empty"),
-        (bytes(range(256)) * 40, "neither a recording nor a log"),
-        (b"\x89PNG\r\n\x1a\n" + bytes(500), "neither a recording nor a log"),
+        (bytes(range(256)) * 40, "is no log that tvist reads: "),
+        (b"\x89PNG\r\n\x1a\n" + bytes(500), "is no log that tvist reads: "),
         (b"\xff\xfe\xfa\xfb hello", "no text"),
         (
             b"root:x:0:0:root:/root:/bin/sh\nmail:x:8:8:mail:/var/mail:/bin/sh\n",
-            "neither a recording nor a log",
+            "other is no log that tvist reads: its line 1",
         ),
-        (b"Dear diary, nothing moved today.\n", "no rows|no column"),
+        (
+            b"root:x:0:0:Super User:/root:/bin/sh\nmail:x:8:8:mail it:/var/mail:/bin/sh\n",
+            "other is no log that tvist reads: its line 1",
+        ),
+        (b"Dear diary, nothing moved today.\n", "is no log that tvist reads: its line 1"),
     ],
 )
 def test_other_files_are_refused_by_name(tmp_path, content, words):

@@ -14,6 +14,7 @@ from tests import forked
 from tests.conformance.served import NOISE, PATIENCE, Served, finished, free_endpoint
 from tests.conformance.wire import STOPPED, Wire
 
+from tvist_cli.output import out, table
 from tvist_client.blocking import Robot
 from tvist_plant.description import load
 from tvist_plant.fingerprint import fingerprint
@@ -491,3 +492,12 @@ def test_the_bare_client_swings_the_arm_and_measures_what_comes_back(realtime):
     )
     assert delay > 0.0  # [ms]: ZV delays by a quarter of a period, 37 ms at Q1's 6.7 Hz, and a tick
     assert acceleration > 0.0  # [rad/s²]
+
+
+def test_a_table_wider_than_the_screen_is_folded_with_its_first_column_in_each_part(capsys, monkeypatch):
+    monkeypatch.setattr(out, "_width", 30)
+    table("title", ("name", *"abc"), [("one", *["0123456789"] * 3)])
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 30
+    assert [line.split()[0] for line in lines if "0123456789" in line] == ["one", "one"]
+    assert sum(line.count("0123456789") for line in lines) == 3

@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure
-from tvist_cli.output import err, out, print_json
+from tvist_cli.output import out, print_json, waiting
 
 
 def check(
@@ -40,9 +40,7 @@ def check(
     from tvist_client.check import check as run
 
     seconds = 0.0 if wait is None else wait[0] if wait else math.inf
-    with err.status("") as status:
-        if not err.is_terminal:
-            status.stop()
+    with waiting(f"asking {name or 'the robot'} at {endpoint}, which takes seconds") as tell:
         report = run(
             endpoint,
             name,
@@ -50,7 +48,7 @@ def check(
             security=security,
             namespace=namespace,
             wait=seconds,
-            tell=status.update,
+            tell=tell,
         )
     if json:
         print_json(report)

@@ -108,7 +108,7 @@ def _figures(listed: "list[AnyShaper]", f_d: float, zeta: float) -> Figures:
 def _print(result: dict[str, Any]) -> None:
     table(
         f"input shapers for a mode of {result['f_d_hz']:g} Hz, ζ = {result['zeta']:g}",
-        ("shaper", "impulses", "ms", "mean ms", "5 % band", "10 % band", "ζ below", "peak"),
+        ("shaper", "impulses", "ms", "mean ms", "5 % band", "10 % band", "ζ ≤", "peak"),
         [_row(about) for about in result["shapers"]],
     )
     _list(result["shapers"])
@@ -117,7 +117,7 @@ def _print(result: dict[str, Any]) -> None:
     out.print(
         "\nms: how much later a motion ends; mean ms: delay during motion at constant velocity;\n"
         "band: ratios of true to assumed frequency for which at most that much vibration remains;\n"
-        "ζ below: largest damping ratio it supports; peak: largest factor on the reference's acceleration",
+        "ζ ≤: largest damping ratio it supports; peak: largest factor on the reference's acceleration",
         markup=False,
     )
 
@@ -170,7 +170,7 @@ def _row(about: dict[str, Any]) -> tuple[str, ...]:
     if "not_for_this_mode" in about:
         return about["name"], *("–" for _ in range(3 + len(BANDS))), limit, peak
     bands = (about[f"band_{percent}_percent"] for percent in BANDS)
-    spans = ("–" if band is None else f"{band[0]:.3f} – {_end(band[1])}" for band in bands)
+    spans = ("–" if band is None else f"{band[0]:.3f}–{_end(band[1])}" for band in bands)
     times = (f"{about[key]:.1f}" for key in ("duration_ms", "mean_delay_ms"))
     return about["name"], str(len(about["amplitudes"])), *times, *spans, limit, peak
 

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tvist_cli.failure import Failure, interrupted, told
-from tvist_cli.output import out, print_json
+from tvist_cli.output import out, print_json, waiting
 
 if TYPE_CHECKING:
     from tvist_client.many_states import ManyStates
@@ -61,7 +61,9 @@ def watch(
     command = unlock_command(endpoint, name, security, namespace)
 
     async def run() -> None:
-        async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
+        with waiting(f"waiting for {name} at {endpoint}"):
+            found = await Robot.connect(endpoint, name, security=security, namespace=namespace)
+        async with found as robot:
             events: list[Event] = []
             told: list[Telemetry] = []
             robot.on_telemetry(lambda telemetry: told.__setitem__(slice(None), [telemetry]))

@@ -37,6 +37,8 @@ KEYS: Mapping[Topic, Callable[[str], str]] = {
 }
 FIND_S = 1.0
 """Time after which the available robots are queried, once there is a link [s]; a robot appears within milliseconds."""
+LATE_S = 3.0
+"""Time after which they are queried again if none answered, since the machine may be busy [s]."""
 INFO_S = 10.0
 """Longest wait for `info` [s]."""
 
@@ -246,27 +248,30 @@ class ZenohTransport(Transport):
 
     async def _find(self) -> None:
         """Wait until the robot's liveliness token appears."""
-        try:
-            async with asyncio.timeout(FIND_S):
-                await self._alive.wait()
-        except TimeoutError:
+        robots: list[str] = []
+        for seconds in (FIND_S, LATE_S - FIND_S):
+            with suppress(TimeoutError):
+                async with asyncio.timeout(seconds):
+                    await self._alive.wait()
+                return
             robots = await _robots(self._session)
             if self._robot in robots:  # it has appeared late: the machine is slow
                 return
             with suppress(NotConnectedError):  # it has no token while it starts, but answers
                 await self.info()
                 return
-            there = f"the robots there are {', '.join(robots)}" if robots else "there are no robots"
-            # Access control denies silently, too.
-            secured = ", and that the robot lists the name of this certificate"
-            where, what = (
-                (f"{self._endpoint} in namespace {self._namespace}", "name, namespace and endpoint")
-                if self._namespace
-                else (self._endpoint, "name and endpoint")
-            )
-            check = f"check {what}{secured if self._endpoint.startswith('tls/') else ''}"
-            why = f"there is no robot {self._robot!r} at {where}; {there}: {check}"
-            raise NotConnectedError(why) from None
+            if robots:
+                break
+        there = f"the robots there are {', '.join(robots)}" if robots else f"none answered in {LATE_S:g} s"
+        # Access control denies silently, too.
+        secured = ", and that the robot lists the name of this certificate"
+        where, what = (
+            (f"{self._endpoint} in namespace {self._namespace}", "name, namespace and endpoint")
+            if self._namespace
+            else (self._endpoint, "name and endpoint")
+        )
+        check = f"check {what}{secured if self._endpoint.startswith('tls/') else ''}"
+        raise NotConnectedError(f"no robot {self._robot!r} at {where}; {there}: {check}")
 
 
 async def robots_at(endpoint: str, security: Folder | None = None, namespace: str = "") -> list[str]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from tvist_lab.recordings.log_columns import LogError, Rows, check_names, recording_of
+from tvist_lab.recordings.log_columns import STRANGE, LogError, Rows, check_known, check_names, recording_of
 from tvist_lab.recordings.named_columns import in_si, named
 from tvist_lab.recordings.packed import content
 from tvist_lab.recordings.recording import Floats, Recording
@@ -63,7 +63,7 @@ def read_csv(path: Path, columns: str | None = None) -> Recording:
             no rows; or see `named` and `recording_of`.
         OSError: The file cannot be read.
     """
-    lines = _lines(path)
+    lines = _lines(path, known=columns is None)
     values = _numbers(path, lines)
     if columns is None:
         names, units = [_rtde_name(name, lines.names) for name in lines.names], dict[str, str]()
@@ -81,11 +81,11 @@ def _rtde_name(name: str, names: list[str]) -> str:
     return f"{REALTIME[stem]}_{index}" if stem in REALTIME else name
 
 
-def _lines(path: Path) -> _Lines:
+def _lines(path: Path, *, known: bool) -> _Lines:
     raw = content(path).removeprefix(b"\xef\xbb\xbf")
     ends_whole = raw.endswith(b"\n")
     all_lines = raw.splitlines()
-    top, names, separator = _header(path, all_lines)
+    top, names, separator = _header(path, all_lines, known=known)
     below = enumerate(all_lines[top + 1 :], top + 2)
     body = [(at, line) for at, line in below if line.strip() and not line.lstrip().startswith(b"#")]
     if separator == " ":
@@ -124,28 +124,29 @@ def _lines(path: Path) -> _Lines:
     )
 
 
-def _header(path: Path, lines: list[bytes]) -> tuple[int, list[str], str]:
-    """Index of the header, its names, and what separates them."""
+def _header(path: Path, lines: list[bytes], *, known: bool) -> tuple[int, list[str], str]:
+    """Index of the header, its names, of which some must be known unless they are given, and what separates them."""
     top = _top(lines)
     if top is None:
         raise LogError(f"{path} holds no rows")
     try:
         header = lines[top].decode("utf-8").strip().lstrip("# ")
     except UnicodeDecodeError:
-        raise LogError(f"{path} is neither a recording nor a log: its line {top + 1} is no text") from None
+        raise LogError(f"{path} {STRANGE}: its line {top + 1} is no text") from None
     separator = next((one for one in SEPARATORS if one in header), ",")
     names = [
         name.strip().strip('"') for name in (header.split() if separator == " " else header.split(separator))
     ]
     if len(names) == 1:
         raise LogError(
-            f"{path} is neither a recording nor a log: its line {top + 1} does not name columns, as in "
-            "timestamp,actual_q_0"
+            f"{path} {STRANGE}: its line {top + 1} does not name columns, as in timestamp,actual_q_0"
         )
     if not any(re.match(r"[A-Za-z_]", name) for name in names):
         raise LogError(
             f"{path}, line {top + 1}: there must be a header with RTDE's names, as in timestamp,actual_q_0"
         )
+    if known:
+        check_known(path, top + 1, [_rtde_name(name, names) for name in names])
     check_names(f"{path}, line {top + 1}", names)
     if twice := sorted(name for name, count in Counter(names).items() if name and count > 1):
         raise LogError(f"{path}, line {top + 1}: the column {twice[0]} is there twice")

@@ -15,6 +15,8 @@ from tvist_lab.recordings.description import KEY, describe, meaning_of, ordered,
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_lab.whole_file import whole_file
 
+FOXGLOVE = "foxglove"
+"""Format of `tvist_lab.foxglove`, which takes recordings of a robot alone."""
 EXACT = 2.0**53
 """Whole numbers up to this one are the same as an integer and as a float."""
 
@@ -27,7 +29,9 @@ class ExportError(RecordingError):
 
 
 def written_by(path: Path, kind: str) -> list[Path]:
-    """Return the files that an export to `path` writes."""
+    """Return the files that an export to `path` writes: in Foxglove's format also a layout."""
+    if kind == FOXGLOVE:
+        return [path, path.with_name(f"{path.name.removesuffix('.mcap')}-layout.json")]
     return [path, sidecar(path)] if kind == "csv" else [path]
 
 

@@ -20,6 +20,8 @@ WIDTHS = {"actual_TCP_pose": 6, "target_TCP_pose": 6, "actual_TCP_speed": 6, "ac
 """Number of entries that a vector needs to be of use; joint angles have as many as the arm has joints."""
 OURS = ("tick", "reference_q", "unshaped_q", "target_q", "actual_TCP_pose")
 """Columns that only recordings of this controller have, all together."""
+STRANGE = "is no log that tvist reads"
+"""What is said first of a file that is something else."""
 LARGEST = 1e6
 """Largest number that a column with a unit in radians, metres and seconds can hold; more is damage."""
 PERIODS = (1e-4, 0.1)
@@ -91,6 +93,16 @@ def check_names(where: object, names: Sequence[str]) -> None:
     for name in names:
         if not is_name(name):
             raise LogError(f"{where}: {quoted(name)} is no column's name: it must be short and printable")
+
+
+def check_known(path: Path, line: int, names: Sequence[str]) -> None:
+    """Refuse a text none of whose columns has a name of a robot's log, which is some other text mostly."""
+    if not any(name == TIME or _MEASURED.fullmatch(name) for name in names):
+        found = f"; {found_columns(names)}" if all(map(is_name, names)) else ""
+        raise LogError(
+            f"{path} {STRANGE}: its line {line} does not name columns, as in timestamp,actual_q_0. If it is a log, "
+            f"name them with --columns time=…,q=joint_{{}}{found}"
+        )
 
 
 def _check_numbers(rows: Rows) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tvist_lab.recordings.log_columns import LogError, Rows, recording_of
+from tvist_lab.recordings.log_columns import STRANGE, LogError, Rows, recording_of
 from tvist_lab.recordings.packed import content
 from tvist_lab.recordings.recording import Recording
 
@@ -87,6 +87,6 @@ def _first(path: Path, data: bytes) -> tuple[int, int]:
                 return at, size
             at = data.find(head, at + 1)
     raise LogError(
-        f"{path} is neither a recording nor a log: no MCAP, no text, and no packets of port 30003 of "
+        f"{path} {STRANGE}: no MCAP, no text, and no packets of port 30003 of "
         f"{', '.join(map(str, SIZES))} bytes"
     )

@@ -1,4 +1,4 @@
-"""`tvist log export`: write a recording as CSV, Parquet, npz or mat."""
+"""`tvist log export`: write a recording as CSV, Parquet, npz or mat, or with an arm that Foxglove draws."""
 
 from pathlib import Path
 
@@ -16,42 +16,57 @@ def export(
     columns: str | None = None,
     json: bool = False,
 ) -> None:
-    """Write a recording or a log as CSV, Parquet, npz or mat, in full precision.
+    """Write a recording or a log as CSV, Parquet, npz or mat, in full precision, or a recording for Foxglove.
 
     Args:
         file: A recording, or any log that tvist log analyze reads.
-        to: csv, parquet, npz or mat. A vector becomes columns NAME_0, NAME_1, ... in CSV and Parquet, and one array in
-            npz and mat. Units, events and info go along; those of a CSV into FILE.csv-metadata.json.
-        output: File to write [FILE with its ending replaced, such as run.csv for run.mcap].
+        to: csv, parquet, npz, mat or foxglove. A vector becomes columns NAME_0, NAME_1, ... in CSV and Parquet, and one
+            array in npz and mat. Units, events and info go along; those of a CSV into FILE.csv-metadata.json. With
+            foxglove, the recording is written with channels for the 3D panel of Foxglove and Lichtblick, and beside it
+            a layout for both.
+        output: File to write [FILE with its ending replaced, such as run.csv or run.foxglove.mcap for run.mcap].
         force: Replace an existing file.
         columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
             after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
         json: Print one JSON object.
     """
-    from tvist_lab.recordings import RecordingError, read
-    from tvist_lab.recordings.export import FORMATS, written_by
+    from tvist_lab.recordings import RecordingError, mcap_file, read
+    from tvist_lab.recordings.export import FORMATS, FOXGLOVE, written_by
     from tvist_lab.recordings.export import export as write
 
     kind = lower(to)
-    if kind not in FORMATS:
-        raise Failure(f"to is {to!r}: must be one of {', '.join(FORMATS)}", code=2)
-    path = output or file.with_name(file.name.removesuffix(".gz")).with_suffix(f".{kind}")
-    for place in written_by(path, kind):
+    if kind not in (*FORMATS, FOXGLOVE):
+        raise Failure(f"to is {to!r}: must be one of {', '.join((*FORMATS, FOXGLOVE))}", code=2)
+    if kind == FOXGLOVE and columns is not None:
+        raise Failure("columns is for a CSV: --to foxglove needs a recording", code=2)
+    ending = f".{kind}.mcap" if kind == FOXGLOVE else f".{kind}"
+    path = output or file.with_name(file.name.removesuffix(".gz")).with_suffix(ending)
+    written = written_by(path, kind)
+    for place in written:
         if place.exists() and file.exists() and place.samefile(file):
             raise Failure(f"{place} is the file to be exported: choose another one with --output", code=2)
         if place.exists() and not force:
             raise Failure(f"{place} exists already: give --force to replace it, or --output")
     with told(RecordingError):
-        recording = read(file, columns)
-        write(recording, path, kind)
+        if kind == FOXGLOVE:
+            from tvist_lab.foxglove.export import export as draw
+
+            content = mcap_file.read(file)
+            recording = content.recording.noted(*filter(None, [content.note]), *draw(content, path))
+        else:
+            recording = read(file, columns)
+            write(recording, path, kind)
     for note in recording.notes:
-        say(f"{file}: {note}")
-    written = written_by(path, kind)
+        say(f"{file}: {note.removeprefix(f'{file} ')}")
     if json:
         print_json(
             {"file": str(file), "written": [str(place) for place in written], "rows": len(recording),
              "columns": list(recording.columns), "notes": list(recording.notes)}
         )  # fmt: skip
+    elif kind == FOXGLOVE:
+        say(
+            f"{len(recording)} ticks are in {path}: open it in Foxglove or Lichtblick, with the layout {written[1]}"
+        )
     else:
         say(
             f"{len(recording)} rows of {len(recording.columns)} columns are in {', '.join(map(str, written))}"

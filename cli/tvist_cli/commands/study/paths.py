@@ -119,13 +119,15 @@ def _figures(paths: list[dict[str, Any]], description: "RobotDescription", known
 def _print(result: dict[str, Any]) -> None:
     from tvist_lab.studies.path_examples import circle_in_words
     from tvist_lab.studies.paths import COLUMNS, TERMS, rows, title_of
+    from tvist_lab.words import counted
 
     for kind, group in result["summary"].items():
         if kind != "all":
             show(f"{title_of(kind, group)}; arm {result['plant']}", rows(group), COLUMNS)
     words(TERMS)
     out.print(circle_in_words(result["circle"]), soft_wrap=True)
+    refused = result["refused"]
     say(
-        f"{result['refused']} drawn paths were refused by the planner, and {result['stopping']} would have stopped on "
-        "their way; they were replaced"
+        f"{counted(refused, 'drawn path')} {'was' if refused == 1 else 'were'} refused by the planner, and "
+        f"{result['stopping']} would have stopped on the way; they were replaced"
     )

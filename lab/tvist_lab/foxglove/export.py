@@ -1,0 +1,244 @@
+"""A recording with what viewers need to draw its arm: the same messages, three channels more, and a layout beside it.
+
+The server records none of this: all of it follows from its messages, so no tick pays for it, and recordings stay small.
+"""
+
+import json
+from collections.abc import Iterator
+from contextlib import suppress
+from heapq import merge
+from importlib import resources
+from operator import itemgetter
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from mcap.records import Channel, Message, Metadata, Schema
+from mcap.well_known import MessageEncoding, SchemaEncoding
+from mcap.writer import LIBRARY_IDENTIFIER, Writer
+from scipy.spatial.transform import Rotation
+
+from tvist_lab.foxglove.arm import PAYLOAD, Arm, Z, arm_of
+from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.vibration import amplitude, best_tool_acceleration
+from tvist_lab.recordings import Floats, Recording, RecordingError
+from tvist_lab.recordings.export import FOXGLOVE, ExportError, written_by
+from tvist_lab.recordings.mcap_file import RecordingFile
+from tvist_lab.recordings.mcap_records import DAMAGE, opened, ring_records
+from tvist_lab.whole_file import whole_file
+from tvist_plant.robot_tables import Body
+from tvist_protocol.recorded import TICK_NS, topics
+from tvist_protocol.stream import State
+
+PICTURE_TICKS = 10
+"""Ticks between two messages about the frames: 50 a second show a vibration of 10 Hz, and viewers interpolate."""
+DIGITS = 9
+"""Decimals of places [m] and quaternions, which shorten the file by a third."""
+LIGHT, DARK = (0.85, 0.87, 0.89), (0.36, 0.40, 0.44)
+"""Colours of the arm's links, and of its base and payload: red, green, blue."""
+SCHEMAS = {"frames": "foxglove.FrameTransforms", "arm": "foxglove.SceneUpdate", "curves": "tvist.curves"}
+"""Schema of each channel, by the end of its topic. Viewers know those of Foxglove by name."""
+
+_Entry = tuple[int, str, Schema | None, Any]
+"""Time [ns], topic, its schema, and the message: as it was recorded, or its content."""
+
+
+def export(content: RecordingFile, path: Path) -> list[str]:
+    """Write a recording with channels for viewers, and a layout for it, replacing both files.
+
+    The channels are `frames` (`foxglove.FrameTransforms`, 50 a second), `arm` (`foxglove.SceneUpdate`, once) and
+    `curves` (every tick), each behind `tvist/<robot>/`. All else is as it was.
+
+    Args:
+        content: The recording.
+        path: File to write.
+
+    Returns:
+        What is missing in the added channels, in sentences.
+
+    Raises:
+        RecordingError: The recording does not say what its robot looks like.
+        ExportError: A file cannot be written. None has changed then, except that the layout may be new.
+    """
+    arm, above = arm_of(content), topics(content.robot)[State].removesuffix("state")
+    (stood, stiff), (drawn, lacking) = _stood(content, arm), _curves(content.recording)
+    # A viewer that has just opened the file shows what stands at its first time.
+    ticks = [
+        int(content.recording["tick"][0]),
+        *(one[0].tick for one in (content.journal, content.events) if one),
+    ]
+    first = min(ticks) * TICK_NS
+    own = [
+        [(first, f"{above}arm", None, {"entities": [_entity(arm, body) for body in arm.bodies]})],
+        ((time, f"{above}frames", None, frames) for time, frames in _transforms(arm, first, *stood)),
+        ((time, f"{above}curves", None, values) for time, values in drawn),
+    ]
+    try:
+        with whole_file(written_by(path, FOXGLOVE)[1]) as stream:
+            stream.write(_layout(content.robot, arm).encode())
+        with whole_file(path) as stream:
+            _write(merge(*own, _recorded(content.path, above), key=itemgetter(0)), stream)
+    except OSError as error:
+        raise ExportError(f"{path} cannot be written: {error.strerror or error}") from error
+    return [*stiff, *lacking]
+
+
+def _layout(robot: str, arm: Arm) -> str:
+    text = resources.files("tvist_lab.foxglove").joinpath("layout.json").read_text("utf-8")
+    layout = json.loads(text.replace("tvist/ROBOT/", f"tvist/{robot}/"))
+    view, reach = layout["configById"]["3D!arm"], float(np.linalg.norm(arm.shifts, axis=1).sum())
+    view["cameraState"] |= {"distance": 2.4 * reach, "targetOffset": [0, 0, 0.3 * reach]}
+    view["layers"]["grid"]["size"] = 4.0 * reach
+    view["transforms"] = {f"frame:{name}": {"visible": False} for name in arm.frames}
+    return json.dumps(layout, indent=1, ensure_ascii=False)
+
+
+def _write(entries: Iterator[_Entry], stream: IO[bytes]) -> None:
+    writer = Writer(stream, enable_data_crcs=True)
+    writer.start(library=f"tvist {LIBRARY_IDENTIFIER}")
+    channels: dict[str, int] = {}
+    for time, topic, schema, message in entries:
+        if isinstance(message, Metadata):
+            writer.add_metadata(message.name, message.metadata)
+            continue
+        if topic not in channels:
+            name = SCHEMAS.get(topic.rpartition("/")[2], "") if schema is None else schema.name
+            content = (
+                json.dumps({"title": name} | _schema_of(message)).encode() if schema is None else schema.data
+            )
+            number = writer.register_schema(name, SchemaEncoding.JSONSchema, content)
+            channels[topic] = writer.register_channel(topic, MessageEncoding.JSON, number)
+        data = message.data if isinstance(message, Message) else json.dumps(message).encode()
+        writer.add_message(channels[topic], time, data, time)
+    writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _recorded(path: Path, above: str) -> Iterator[_Entry]:
+    """Yield what a file holds, up to a damage of it, but the channels of an export."""
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, tuple[str, Schema | None]] = {}
+    told: set[str] = set()
+    time = 0
+    with suppress(*DAMAGE), opened(path) as streams:
+        for record in ring_records(streams):
+            match record:
+                case Schema(id=number):
+                    schemas[number] = record
+                case Channel(id=number, topic=topic) if topic.removeprefix(above) not in SCHEMAS:
+                    channels[number] = topic, schemas.get(record.schema_id)
+                case Message(channel_id=number, log_time=time) if number in channels:
+                    yield time, *channels[number], record
+                case Metadata(name=name) if name not in told:  # that of a ring's older file comes first
+                    told.add(name)
+                    yield time, "", None, record
+
+
+def _schema_of(example: Any) -> dict[str, Any]:
+    """Return the JSON Schema of messages like an example; the longest entry of a list stands for all."""
+    if isinstance(example, dict):
+        return {"type": "object", "properties": {name: _schema_of(part) for name, part in example.items()}}
+    if isinstance(example, list):
+        return {"type": "array", "items": _schema_of(max(example, key=lambda one: len(str(one)), default={}))}
+    kinds = {bool: "boolean", int: "integer", float: "number"}
+    return {"type": kinds.get(type(example), "string")}
+
+
+def _entity(arm: Arm, body: Body) -> dict[str, Any]:
+    start, end = np.array(body.start), np.array(body.end)
+    length, wide = float(np.linalg.norm(end - start)), 2.0 * body.radius
+    colour = dict(zip("rgb", DARK if body.link < 0 or body.name == PAYLOAD else LIGHT, strict=True)) | {
+        "a": 1.0
+    }
+    turn, _ = Rotation.align_vectors((end - start)[None] if length else Z[None], Z[None])
+    ends = [start, end] if length else [start]
+    spheres = [
+        {"pose": _pose(at, Rotation.identity()), "size": _named([wide] * 3), "color": colour} for at in ends
+    ]
+    around = {"pose": _pose((start + end) / 2.0, turn), "size": _named([wide, wide, length]), "color": colour}
+    return {
+        "timestamp": _stamp(0),
+        "frame_id": arm.frames[body.link + 1],
+        "id": body.name,
+        "lifetime": _stamp(0),  # for ever
+        "frame_locked": True,
+        "spheres": spheres,
+        "cylinders": [around | {"bottom_scale": 1.0, "top_scale": 1.0}] if length else [],
+    }
+
+
+def _stood(content: RecordingFile, arm: Arm) -> tuple[tuple[Floats, Floats, Floats], list[str]]:
+    """Return ticks, joint angles and bends of the first row of each ten ticks, and what is missing, in sentences.
+
+    They are true where the truth was recorded, else measured, without bent links.
+    """
+    recording = content.recording
+    rows = np.flatnonzero(np.diff(recording["tick"] // PICTURE_TICKS, prepend=-1.0))
+    ticks, q = recording["tick"][rows], recording["actual_q"][rows]
+    bends, notes = np.zeros((len(q), 2 * len(arm.bending))), []
+    if "truth_motor_q" not in recording:
+        notes.append(
+            "holds no truth (tvist serve --truth): the arm is drawn stiff, where its joints were measured"
+        )
+    else:
+        true = recording["truth_motor_q"][rows] + recording["truth_gear_deflection"][rows]
+        bent = recording["truth_link_deflection"][rows] if arm.bending else bends
+        if true.shape != q.shape or bent.shape != bends.shape:
+            raise RecordingError(f"{content.path} holds a truth that is not of the arm in it")
+        known = np.asarray(np.isfinite(np.hstack([true, bent])).all(axis=1))
+        q, bends = np.where(known[:, None], true, q), np.where(known[:, None], bent, 0.0)
+        if share := 100.0 * np.mean(~known):
+            notes.append(f"lacks the truth of {share:.0f} % of its ticks: the arm is drawn stiff there")
+    here = np.isfinite(q).all(axis=1)
+    return (ticks[here], q[here], bends[here]), notes
+
+
+def _transforms(
+    arm: Arm, first: int, ticks: Floats, q: Floats, bends: Floats
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    places, turns = (np.round(values, DIGITS) for values in arm.steps(q, bends))
+    names = list(zip(arm.frames, arm.frames[1:], strict=False))
+    for number, tick in enumerate(ticks.astype(int).tolist()):
+        time = tick * TICK_NS if number else first
+        steps = zip(names, places[number], turns[number], strict=True)
+        yield (
+            time,
+            {
+                "transforms": [
+                    {"timestamp": _stamp(time), "parent_frame_id": parent, "child_frame_id": child}
+                    | {"translation": _named(place), "rotation": _named(turn)}
+                    for (parent, child), place, turn in steps
+                ]
+            },
+        )
+
+
+def _curves(recording: Recording) -> tuple[Iterator[tuple[int, dict[str, float]]], list[str]]:
+    """Return |α| [m/s²], and the largest acceleration of a joint before and after the shaper [rad/s²], at every tick.
+
+    And what is missing in them, in sentences.
+    """
+    before, after = (np.abs(recording[f"{name}_qdd"]).max(axis=1) for name in ("unshaped", "target"))
+    found, notes = {"after_shaper": after}, []
+    if np.any(recording["shaper_delay"] > 0.0) and np.any(after) and np.array_equal(before, after):
+        notes.append("does not tell the reference before the shaper, as older servers: it has no curve")
+    else:
+        found["before_shaper"] = before
+    try:
+        found["alpha"] = amplitude(best_tool_acceleration(recording))
+    except (NotMeasurableError, RecordingError) as error:
+        notes.append(f"has no curve of |α|: {error}")
+    columns = (np.round(values, 6).tolist() for values in found.values())
+    rows = zip(recording["tick"].astype(int).tolist(), *columns, strict=True)
+    return ((tick * TICK_NS, dict(zip(found, values, strict=True))) for tick, *values in rows), notes
+
+
+def _stamp(time: int) -> dict[str, int]:
+    return {"sec": time // 10**9, "nsec": time % 10**9}
+
+
+def _named(values: Any) -> dict[str, float]:
+    return dict(zip("xyzw", map(float, values), strict=False))
+
+
+def _pose(place: Floats, turn: Rotation) -> dict[str, Any]:
+    return {"position": _named(place), "orientation": _named(turn.as_quat())}
