@@ -11,12 +11,19 @@ from tvist_controller.foresight.stops import StopPlan, StopPlanner
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.trajectory import Forecast, JointStop, PathStop, StuckError, Trajectory
+from tvist_controller.trajectory import Forecast, JointStop, PathStop, SlowedStop, StuckError, Trajectory
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
+LONG = 0.2
+"""Time for which a motion may run out without a search for a stop that plays it more slowly [s]."""
 EVEN = 1e-12
 """Differences between steps below this are rounding errors [rad]."""
+
+
+def _long(plan: StopPlan) -> bool:
+    """Whether a motion runs out for so long that a stop is to be sought that follows its time."""
+    return plan.duration is None or plan.duration > LONG
 
 
 def _anywhere(_: JointStop) -> bool:
@@ -126,18 +133,23 @@ class Outlook:
             stop = self.stops.under(ahead, state, forecast, deceleration)
         if stop is None and ahead is not None:
             ahead.until(MAX_AHEAD)
+            asked = None
             if not ahead.rests:  # it lasts so long that any stop is sooner
                 stop = self.stops.on_path(state, newest, forecast, deceleration, certain=False)
             else:
                 last, asked = ahead.last, self.stops.asked(np.array(ahead.references))
                 stop = self.stops.under(ahead, state, forecast, deceleration, asked)
                 lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead.references[-1])
+            if stop is None and cycle.mode is not LineMode.STOPPING and _long(lets_run_out):
+                slowed = self.stops.slowed(ahead, state, forecast, deceleration, asked)
+                if slowed is not None:
+                    return self._plan(slowed, deceleration, slowed.duration, slowed.end)
         if stop is not None:
             return self._plan(stop, deceleration, stop.duration, stop.end)
         return None if cycle.mode is LineMode.STOPPING else lets_run_out
 
     def _plan(
-        self, stop: JointStop | PathStop | None, wanted: float | None, duration: float, end: Floats
+        self, stop: JointStop | PathStop | SlowedStop | None, wanted: float | None, duration: float, end: Floats
     ) -> StopPlan:
         kept = None if stop is None else stop.acceleration
         way = float(np.abs(end - self._cycle.line.shaped.position).max())
