@@ -16,14 +16,9 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
 LONG = 0.2
-"""Time for which a motion may run out without a search for a stop that plays it more slowly [s]."""
+"""Time for which a motion along a curve may run out before a stop is sought that plays it more slowly [s]."""
 EVEN = 1e-12
 """Differences between steps below this are rounding errors [rad]."""
-
-
-def _long(plan: StopPlan) -> bool:
-    """Whether a motion runs out for so long that a stop is to be sought that follows its time."""
-    return plan.duration is None or plan.duration > LONG
 
 
 def _anywhere(_: JointStop) -> bool:
@@ -140,9 +135,11 @@ class Outlook:
                 last, asked = ahead.last, self.stops.asked(np.array(ahead.references))
                 stop = self.stops.under(ahead, state, forecast, deceleration, asked)
                 lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead.references[-1])
-            if stop is None and cycle.mode is not LineMode.STOPPING and _long(lets_run_out):
+            curved = forecast.path.posture_of is not None
+            lasts = math.inf if lets_run_out.duration is None else lets_run_out.duration
+            if stop is None and curved and lasts > LONG and cycle.mode is not LineMode.STOPPING:
                 slowed = self.stops.slowed(ahead, state, forecast, deceleration, asked)
-                if slowed is not None:
+                if slowed is not None and slowed.duration < lasts:
                     return self._plan(slowed, deceleration, slowed.duration, slowed.end)
         if stop is not None:
             return self._plan(stop, deceleration, stop.duration, stop.end)
