@@ -207,6 +207,20 @@ def test_after_a_protective_stop_it_goes_on_to_the_end_and_not_back_to_points_th
     assert away(robot, points) < 5e-5
 
 
+def test_a_protective_stop_of_a_paused_arm_passes_no_points():
+    points = circle(150)
+    robot = begin(points, 371)
+    robot.send(c.Pause)
+    robot.tick(300)
+    robot.controller.motion.protect("a test")
+    robot.tick(10)
+    robot.send(c.UnlockProtectiveStop)
+    robot.send(ProgramPlay)
+    finish(robot)
+    np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-8)
+    assert away(robot, points) < 5e-5
+
+
 @pytest.mark.parametrize("ticks", [295, 330, 400, 480])
 def test_a_stop_before_tight_corners_is_as_quick_as_one_on_a_line(ticks):
     """The motion slows down for its corners by itself, so no one limit suits the way to the end of a stop."""

@@ -115,6 +115,8 @@ class RunningMove:
         forecast, present = self._cycle.trajectory.forecast, self.progress
         if present is None or forecast is None or forecast.path is not self._trajectory.path:
             return None
+        if self._held and self._cycle.trajectory is self._trajectory:
+            return present  # it is paused, and does not go on to its end
         return present[0], float(forecast.end[0])
 
     @property
