@@ -201,7 +201,7 @@ def test_after_a_protective_stop_it_goes_on_to_the_end_and_not_back_to_points_th
     finish(robot)
     assert failure(robot) is None
     np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-8)
-    center = np.array(HERE[:3]) + (0.0, ROUND, 0.0)
+    center = np.array(HERE[:3]) + np.array([0.0, ROUND, 0.0])
     x, y = (tool(robot)[stood:] - center)[:, :2].T
     assert np.diff(np.unwrap(np.arctan2(y, x))).min() > -1e-6
     assert away(robot, points) < 5e-5

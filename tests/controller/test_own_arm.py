@@ -334,7 +334,9 @@ def cut_off():
     return arms[0], robot
 
 
-@pytest.mark.parametrize("names", [("step",), ("condition",), ("step", "condition", "switch", "measure", "stop")])
+@pytest.mark.parametrize(
+    "names", [("step",), ("condition",), ("step", "condition", "switch", "measure", "stop")]
+)
 def test_whatever_a_method_of_somebody_s_own_arm_raises_stops_that_robot_alone_and_is_named(names):
     arm, robot = cut_off()
     robot.send(c.MoveJ, q=TARGET)

@@ -173,5 +173,7 @@ def test_the_page_has_programs_stops_and_what_failed(result):
 
 
 def test_a_page_is_written_although_a_file_has_a_name_that_is_no_text(tmp_path):
-    write_report(tmp_path / "r.html", programs_page([{**UNCOMPILED, "file": "bad\udcff.script"}], {}, "tvist run"))
+    write_report(
+        tmp_path / "r.html", programs_page([{**UNCOMPILED, "file": "bad\udcff.script"}], {}, "tvist run")
+    )
     assert "bad?.script" in (tmp_path / "r.html").read_text(encoding="utf-8")

@@ -146,7 +146,11 @@ class Outlook:
         return None if cycle.mode is LineMode.STOPPING else lets_run_out
 
     def _plan(
-        self, stop: JointStop | PathStop | SlowedStop | None, wanted: float | None, duration: float, end: Floats
+        self,
+        stop: JointStop | PathStop | SlowedStop | None,
+        wanted: float | None,
+        duration: float,
+        end: Floats,
     ) -> StopPlan:
         kept = None if stop is None else stop.acceleration
         way = float(np.abs(end - self._cycle.line.shaped.position).max())

@@ -184,7 +184,12 @@ class StopPlanner:
 
         stops = (
             SlowedStop(
-                path, samples, acceleration=acceleration, jerk=0.5 * self.jerk, fastest=fastest, period=self.period
+                path,
+                samples,
+                acceleration=acceleration,
+                jerk=0.5 * self.jerk,
+                fastest=fastest,
+                period=self.period,
             )
             for acceleration in self._ladder(wanted)
         )

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from tvist_plant.description import Payload
-from tvist_plant.plant import Condition, Measurement, Plant, PlantError
+from tvist_plant.plant import Condition, Plant, PlantError
 from tvist_plant.plant_checks import check_measurement
 from tvist_plant.user_file import named
 
@@ -40,10 +40,7 @@ class _Called:
     def ask(self, name: str, call: Callable[[], Any]) -> Any:
         try:
             answer = call()
-            if name in _MEASURING:
-                self._check(answer)
-            elif name == "condition" and not isinstance(answer, Condition):
-                raise TypeError(f"it is a {type(answer).__name__}, and must be a Condition")
+            self._check(name, answer)
         except PlantError:
             raise
         except Exception as error:
@@ -52,10 +49,13 @@ class _Called:
             raise PlantError(f"the arm's {name} raises {named(error)}") from error
         return answer
 
-    def _check(self, measured: Measurement) -> None:
-        check_measurement(measured, self._joints, self._plant)
-        if not np.isfinite(np.concatenate((measured.q, measured.qd, measured.moment))).all():
-            raise PlantError("the arm has measured what is no number")
+    def _check(self, name: str, answer: Any) -> None:
+        if name == "condition" and not isinstance(answer, Condition):
+            raise TypeError(f"it is a {type(answer).__name__}, and must be a Condition")
+        if name in _MEASURING:
+            check_measurement(answer, self._joints, self._plant)
+            if not np.isfinite(np.concatenate((answer.q, answer.qd, answer.moment))).all():
+                raise PlantError("the arm has measured what is no number")
 
 
 def called(plant: Plant, joints: int) -> Plant:
@@ -69,9 +69,7 @@ def called(plant: Plant, joints: int) -> Plant:
         name: _method(name) for name in (*_MEASURING, *_OTHERS) if callable(getattr(plant, name, None))
     }
     if hasattr(plant, "condition"):
-        members["condition"] = property(
-            lambda self: self.ask("condition", lambda: self._plant.condition)  # noqa: SLF001  one of its own kind
-        )
+        members["condition"] = property(lambda self: self.ask("condition", lambda: self._plant.condition))
     return cast("Plant", type(type(plant).__name__, (_Called,), members)(plant, joints))
 
 
@@ -85,6 +83,6 @@ def told(plant: Plant) -> list[Exception]:
 
 def _method(name: str) -> Callable[..., Any]:
     def method(self: _Called, *given: Any, **options: Any) -> Any:
-        return self.ask(name, lambda: getattr(self._plant, name)(*given, **options))  # noqa: SLF001
+        return self.ask(name, lambda: getattr(self._plant, name)(*given, **options))
 
     return method

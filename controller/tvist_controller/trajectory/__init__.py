@@ -10,8 +10,8 @@ from tvist_controller.trajectory.limits import MotionLimits
 from tvist_controller.trajectory.motion import PlannedMotion, at_least, quickest_motion
 from tvist_controller.trajectory.path import JointLine, Path, Way
 from tvist_controller.trajectory.path_stop import PathStop
-from tvist_controller.trajectory.slowed_stop import SlowedStop
 from tvist_controller.trajectory.servo import Servo
+from tvist_controller.trajectory.slowed_stop import SlowedStop
 from tvist_controller.trajectory.stop import JointStop
 from tvist_controller.trajectory.stream import SetpointStream
 from tvist_controller.trajectory.tool_speed import ToolKinematics, ToolSpeed

@@ -46,7 +46,11 @@ class SlowedStop(Trajectory):
         self._samples = _between(ahead, np.array(times) / period)
         """Its samples, of which the first is the newest one of the motion."""
         joints = np.array([path.posture(x) for x in (ahead[0], *self._samples, self._samples[-1])])
-        self._states = joints[1:-1], 0.5 * (joints[2:] - joints[:-2]) / period, np.diff(joints, 2, axis=0) / period**2
+        self._states = (
+            joints[1:-1],
+            0.5 * (joints[2:] - joints[:-2]) / period,
+            np.diff(joints, 2, axis=0) / period**2,
+        )
 
     @property
     def hardest(self) -> float:
@@ -94,12 +98,14 @@ class SlowedStop(Trajectory):
 
 
 def _between(ahead: Floats, ticks: Floats) -> Floats:
-    """Samples of a motion at times between its own, by cubic splines through four of them; `ticks` count from the second."""
+    """Samples of a motion between its ticks, which count from the second: cubic splines through four of them."""
     last = len(ahead) - 1
     number = np.minimum(ticks.astype(int), last - 1) + 1
     t = (ticks - (number - 1))[:, None]
     before, start, end, then = (ahead[np.minimum(number + step, last)] for step in (-1, 0, 1, 2))
     own, next_ = 0.5 * (end - before), 0.5 * (then - start)
     change = end - start
-    found: Floats = start + t * (own + t * (3.0 * change - 2.0 * own - next_ + t * (own + next_ - 2.0 * change)))
+    found: Floats = start + t * (
+        own + t * (3.0 * change - 2.0 * own - next_ + t * (own + next_ - 2.0 * change))
+    )
     return found

@@ -1,4 +1,4 @@
-"""The last second before a failure: kept in memory, and written to a file when the simulated arm fails."""
+"""The last second before a failure: kept in memory, and written to a file when the arm fails."""
 
 import logging
 import os
@@ -110,4 +110,4 @@ class BlackBox(Sink):
                 recorder.error
                 or f"the last second before it is in {path}: look with tvist log analyze {path}"
             )
-            log.error("robot %s: the simulated arm failed; %s", info.name, why)
+            log.error("robot %s: the arm failed; %s", info.name, why)
