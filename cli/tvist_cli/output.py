@@ -182,5 +182,5 @@ def write_report(path: Path, page: "Page") -> None:
     from tvist_lab.whole_file import whole_file
 
     with whole_file(path) as stream:
-        stream.write(render(page).encode())
+        stream.write(render(page).encode(errors="replace"))  # a file's name need not be text
     say(f"the report is in {path}")

@@ -5,6 +5,7 @@ It puts the rooms together: each part knows those below it, and the controller w
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property, partial
 from typing import Any, Unpack
 
@@ -47,7 +48,7 @@ from tvist_plant.fingerprint import fingerprint
 from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.io import Io
-from tvist_protocol.replies import Done, Reply
+from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event, EventKind, State, Truth
 from tvist_protocol.values import Payload
@@ -75,6 +76,8 @@ class Controller(WholeRobot):
         self.counters = Counters()
         self._events: list[Event] = []
         planner = Planner(setup)
+        self._failed: PlantError | None = None
+        """Failure of the plant between two ticks, with which the next one deals."""
         self._next_timeout = -math.inf
         """Time at which something may time out next [s]."""
         self.plans = Plans(planner, self._basis, order)
@@ -178,6 +181,10 @@ class Controller(WholeRobot):
         except (RefusalError, NoControlError) as refusal:
             self.counters.refused += 1
             return refusal.reply
+        except PlantError as error:
+            self._failed = error
+            self.counters.refused += 1
+            return Refused(code="plant_failure", where="", why=str(error))
         return Done() if reply is None else reply
 
     def _carry_out(
@@ -236,20 +243,27 @@ class Controller(WholeRobot):
     def begin_tick(self) -> None:
         """Begin a control period: what has timed out ends, and programs have their turn."""
         if self.now >= self._next_timeout:
-            self._watch_time()
+            try:
+                self._watch_time()
+            except PlantError as error:  # a push that ends
+                self._failed = error
         if not self.programs.idle:
             self._look_again()
             self.programs.advance(self.tick_number + 1)
 
     def complete_tick(self) -> tuple[Report, list[Event]]:
         """Compute the rest of a control period that has begun."""
+        failed, self._failed = self._failed, None
         try:
+            if failed is not None:
+                raise failed
             sample = self.motion.step()
             self._safety.watch(sample)
             if self.cell is not None:
                 self.cell.tick(self.tick_number + 1, sample.measured.q)
         except PlantError as error:
-            self._faults.clear()
+            with suppress(PlantError):
+                self._faults.clear()
             sample = self._safety.recover(error, self._seed)
             self._reporter.restart()
             self._payload.begin_anew()
@@ -302,13 +316,21 @@ class Controller(WholeRobot):
         peripherals.changed, self._told_program = False, program
         return self.io(wrench=False)
 
-    def truth(self) -> Truth:
-        """Return what a real robot cannot measure, after a tick.
+    def truth(self) -> Truth | None:
+        """Return what a real robot cannot measure, after a tick; None if the plant has failed.
 
         Raises:
             ValueError: The plant does not provide it.
         """
-        return self._reporter.truth(self.tick_number, self.cycle.line.plant)
+        try:
+            return self._reporter.truth(self.tick_number, self.cycle.line.plant)
+        except PlantError as error:
+            self._failed = error
+            return None
+
+    def fail(self, why: str) -> None:
+        """Let the next tick deal with a failure of the plant that something outside the controller has seen."""
+        self._failed = PlantError(why)
 
     def _emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
         """Store an event of the tick that is being computed, or of the next one between two ticks."""

@@ -18,6 +18,7 @@ from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.socket_ports import NoPorts, SocketPorts
 from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.reporting.sink import Sink
+from tvist_controller.sources.plant_calls import told
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Setpoint
 from tvist_protocol.journal import Entry, entry_of
@@ -133,6 +134,24 @@ class Host:
             self.standing = self._standing()
         for one in news:
             self.socket(one)
+        self.tell_raised()
+
+    def tell_raised(self) -> None:
+        """Pass on what methods of the plant have raised."""
+        for error in told(self.controller.cycle.line.plant):
+            for sink in self._sinks:
+                sink.raised(error)
+
+    def fail(self, why: str) -> None:
+        """Let the next tick deal with a failure of the arm outside the controller, such as of what gives its ticks."""
+        self.controller.fail(why)
+
+    def leave_arm(self) -> None:
+        """Leave an arm that has power without it, since nobody controls it any more."""
+        power = self.controller.motion.power
+        if power is not None:
+            power.end()
+            self.tell_raised()
 
     def _carry_out_orders(self) -> Sequence[SocketNews]:
         """Pass on what programs want of their sockets; return what is known of it at once."""

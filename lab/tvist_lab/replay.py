@@ -185,7 +185,9 @@ def _tick(controller: Controller, setup: Setup, done: Replay) -> None:
     done.states.append(state)
     done.events += events
     if setup.truth:
-        done.truths.append(controller.truth())
+        truth = controller.truth()
+        if truth is not None:
+            done.truths.append(truth)
 
 
 def _give(controller: Controller, entry: Entry, presence: Presence) -> None:

@@ -190,16 +190,51 @@ def test_a_stop_on_the_way_ends_it_on_the_path(ticks):
 
 
 @pytest.mark.parametrize("ticks", [230, 371, 480])
-def test_after_a_protective_stop_it_goes_on_to_the_end(ticks):
+def test_after_a_protective_stop_it_goes_on_to_the_end_and_not_back_to_points_that_the_stop_has_passed(ticks):
     points = circle(150)
     robot = begin(points, ticks)
     robot.controller.motion.protect("a test")
     robot.tick(3000)
+    stood = len(robot.states)
     robot.send(c.UnlockProtectiveStop)
     robot.send(ProgramPlay)
     finish(robot)
     assert failure(robot) is None
     np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-8)
+    center = np.array(HERE[:3]) + np.array([0.0, ROUND, 0.0])
+    x, y = (tool(robot)[stood:] - center)[:, :2].T
+    assert np.diff(np.unwrap(np.arctan2(y, x))).min() > -1e-6
+    assert away(robot, points) < 5e-5
+
+
+def test_a_protective_stop_of_a_paused_arm_passes_no_points():
+    points = circle(150)
+    robot = begin(points, 371)
+    robot.send(c.Pause)
+    robot.tick(300)
+    robot.controller.motion.protect("a test")
+    robot.tick(10)
+    robot.send(c.UnlockProtectiveStop)
+    robot.send(ProgramPlay)
+    finish(robot)
+    np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-8)
+    assert away(robot, points) < 5e-5
+
+
+@pytest.mark.parametrize("ticks", [295, 330, 400, 480])
+def test_a_stop_before_tight_corners_is_as_quick_as_one_on_a_line(ticks):
+    """The motion slows down for its corners by itself, so no one limit suits the way to the end of a stop."""
+    points = zigzag(150)
+    robot = begin(points, ticks, shaper="zv")
+    robot.controller.motion.protect("a test")
+    robot.tick(75)
+    assert robot.controller.cycle.mode.at_rest
+    assert away(robot, points) < 5e-4
+    q = robot.column("target_q")
+    assert np.abs(np.diff(q, 2, axis=0)).max() / H**2 <= 40.0
+    free = begin(points, ticks + 75, shaper="zv")
+    covered, freely = (np.linalg.norm(np.diff(tool(each), axis=0), axis=1).cumsum() for each in (robot, free))
+    assert (covered <= freely + 1e-9).all()
 
 
 READS = (

@@ -6,6 +6,8 @@ from tests.own_arm import STANDS, SWITCHES, OwnArm
 
 from tvist_controller.controller import Controller
 from tvist_controller.motion.arm_power import STALE
+from tvist_controller.sources.own_plants import OwnPlant
+from tvist_controller.sources.plant_calls import told
 from tvist_plant.plant import PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, SafetyMode
@@ -307,3 +309,77 @@ def test_a_plant_needs_one_of_two_ways_to_begin():
 
     with pytest.raises(ValueError, match="Neither has neither reset nor measure"):
         Controller(setup(), Neither())
+
+
+class Cut(OwnArm):
+    """An arm whose cable may be cut: each method then raises what no method of a plant should."""
+
+    cut = ()
+
+    def __getattribute__(self, name):
+        if name in object.__getattribute__(self, "cut"):
+            raise OSError("no cable")
+        return object.__getattribute__(self, name)
+
+    def push(self, torque):
+        """Feel nothing."""
+
+
+def cut_off():
+    """A robot whose arm is switched on, and the arm."""
+    arms = []
+    plant = OwnPlant("cut.py:Cut", "", lambda *given: arms.append(Cut(*given)) or arms[0])
+    robot = Robot(plant=plant.make(UR5E, UR5E.payload))
+    robot.tick(SWITCHES + 1)
+    return arms[0], robot
+
+
+@pytest.mark.parametrize(
+    "names", [("step",), ("condition",), ("step", "condition", "switch", "measure", "stop")]
+)
+def test_whatever_a_method_of_somebody_s_own_arm_raises_stops_that_robot_alone_and_is_named(names):
+    arm, robot = cut_off()
+    robot.send(c.MoveJ, q=TARGET)
+    robot.tick(100)
+    arm.cut = names
+    robot.tick(5)
+    stops = [event for event in robot.events if event.kind == "safety_stop"]
+    assert [(event.category, "OSError: no cable" in event.why) for event in stops] == [(0, True)]
+    assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
+    raised = told(robot.controller.cycle.line.plant)
+    assert raised
+    assert all(isinstance(error, OSError) and error.__traceback__ for error in raised)
+    arm.cut = ()
+    assert (arm.stops > 0) == ("stop" not in names)
+    robot.send(c.RestartSafety)
+    robot.send(c.PowerOn)
+    robot.tick(SWITCHES + 2)
+    assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
+
+
+def test_a_push_or_reset_that_fails_is_refused_and_stops_the_robot():
+    arm, robot = cut_off()
+    robot.send(SimulationInject, fault="torque", joint=1, value=5.0, seconds=0.05)
+    arm.cut = ("push",)
+    refused = robot.send(SimulationInject, fault="torque", joint=0, value=5.0, seconds=1.0)
+    assert (refused.code, "OSError: no cable" in refused.why) == ("plant_failure", True)
+    robot.tick(100)
+    assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
+
+
+def test_a_simulated_arm_that_goes_on_failing_gets_no_power():
+    class Mock(NoArm):
+        def step(self, command):
+            if self.broken:
+                raise PlantError("the glass is broken")
+            return super().step(command)
+
+        broken = False
+
+    plant = Mock()
+    robot = Robot(plant=plant)
+    robot.tick(10)
+    plant.broken = True
+    robot.tick(20)
+    assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
+    assert [event.kind for event in robot.events if event.code == "plant_failure"] == ["safety_stop"]

@@ -8,6 +8,7 @@ import pytest
 from tests.controller.robots import NoArm
 from tests.lab.test_programs import MOVES, run
 
+from tvist_cli.output import write_report
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.programs.account import as_dict
 from tvist_lab.programs.baseline import BaselineError, changes, read_baseline
@@ -123,6 +124,8 @@ class TestBaseline:
             ('{"file": "b.script", "exit_reason": "compile_error"}', "is of b.script, and this run is of a"),
             ('{"file": "a.script", "exit_reason": "compile_error", "warnings": "x"}', "is not what tvist run"),
             ('{"programs": []}', "is of nothing"),
+            ("[" * 100_000, "is not what tvist run"),
+            (f'{{"file": "a.script", "exit_reason": 1{400 * "0"}}}', "is not what tvist run"),
         ],
     )  # fmt: skip
     def test_another_shape_is_refused_in_a_sentence(self, tmp_path, content, word):
@@ -167,3 +170,10 @@ def test_the_page_has_programs_stops_and_what_failed(result):
     result |= {"ok": True, "failures": [], "moves": []}
     text = render(programs_page([result], {}, "tvist run a.script"))
     assert "1 program ran as it should." in text
+
+
+def test_a_page_is_written_although_a_file_has_a_name_that_is_no_text(tmp_path):
+    write_report(
+        tmp_path / "r.html", programs_page([{**UNCOMPILED, "file": "bad\udcff.script"}], {}, "tvist run")
+    )
+    assert "bad?.script" in (tmp_path / "r.html").read_text(encoding="utf-8")

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from tvist_plant.plant import PlantError
 from tvist_server import punctual
 from tvist_server.clock import Lockstep, Mailbox, Realtime
 
@@ -25,6 +26,9 @@ class FakeHost:
         self.enough = enough
         self.reached = threading.Event()
         self.threads = set()
+
+    def leave_arm(self):
+        self.left = True
 
     def tick(self):
         self.ticks += 1
@@ -99,6 +103,20 @@ def test_an_arm_that_does_not_begin_its_tick_keeps_no_client_waiting_and_is_told
     assert ["does not begin" in why for why in robot.host.warned] == [True, True]
 
 
+def test_an_arm_that_fails_while_it_begins_its_tick_has_it_from_the_clock_and_stops():
+    def fails(_):
+        raise PlantError("no cable")
+
+    host, failures = FakeHost(), []
+    host.fail = failures.append
+    clock = Realtime([Mailbox(host, pace=fails)], lambda: None, PERIOD)
+    clock.start()
+    assert host.reached.wait(WAIT)
+    clock.close()
+    assert set(failures) == {"no cable"}
+    assert host.failure is None
+
+
 @pytest.mark.parametrize("error", [ArithmeticError, KeyboardInterrupt, GeneratorExit])
 def test_a_tick_that_fails_ends_all_robots_of_the_thread_and_says_so(caplog, error):
     class Failing(FakeHost):
@@ -110,6 +128,7 @@ def test_a_tick_that_fails_ends_all_robots_of_the_thread_and_says_so(caplog, err
     clock.start()
     clock._thread.join(WAIT)
     assert all("see the log" in robot.host.failure for robot in robots)
+    assert all(robot.host.left for robot in robots)
     assert "on purpose" in caplog.text
 
 

@@ -65,6 +65,13 @@ def test_a_program_of_polyscope_that_is_one_script_is_that_script(folder, pack):
     assert folder.read("saved-1.urp") == 'def saved_1():\ntextmsg("a < b")\nend\n'
 
 
+def test_a_packed_program_whose_end_is_missing_is_refused(folder):
+    whole = gzip.compress(b"def p():\n  textmsg(1)\nend\n" + b"# more\n" * 1000)
+    (folder.path / "cut.urp").write_bytes(whole[:-9])
+    with pytest.raises(UserFileError, match="its end is missing"):
+        folder.read("cut.urp")
+
+
 LINE = "".join(f"<ExpressionChar character='{letter}'/>" for letter in "sync()")
 EXTERNAL = (
     "<Contributed strategyClass='com.fzi.externalcontrol.ExternalControlNode'><dataModel/></Contributed>"

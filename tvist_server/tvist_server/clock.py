@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 
 from tvist_controller.host import Host
+from tvist_plant.plant import PlantError
 from tvist_server.jobs import Do, Jobs
 from tvist_server.lateness import Lateness, Punctuality
 from tvist_server.overload import Overload
@@ -121,6 +122,8 @@ class Clock(ABC):
             log.exception("the controller's thread ended")
             for robot in self._robots:
                 robot.host.failure = "the controller's thread ended by an error: see the log"
+                with contextlib.suppress(Exception):  # each arm is left, whatever the others do
+                    robot.host.leave_arm()
 
     @abstractmethod
     def _run(self) -> None: ...
@@ -207,7 +210,7 @@ class Realtime(Clock):
         begin, silent = schedule.begin if pace is None else Followed(self._period, now()).begin, False
         while self._running:
             if pace is not None:
-                if not pace(LONGEST_SLEEP):
+                if not self._begins(robots[0], pace):
                     silent = self._do_without_tick(robots[0], silent)
                     continue
                 silent = False
@@ -233,6 +236,15 @@ class Realtime(Clock):
         for robot in robots:
             robot.jobs.do_waiting()
         self._hand_on()
+
+    def _begins(self, robot: Mailbox, pace: Callable[[float], bool]) -> bool:
+        """Wait until the arm begins its next tick; one that fails there has it from this clock, and stops."""
+        try:
+            return pace(LONGEST_SLEEP)
+        except PlantError as error:
+            robot.host.fail(str(error))
+            time.sleep(self._period)
+            return True
 
     def _do_without_tick(self, robot: Mailbox, silent: bool) -> bool:
         """Answer the clients of an arm that has fallen silent, and tell them once; return True."""

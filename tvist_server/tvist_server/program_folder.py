@@ -102,6 +102,8 @@ def _text(path: Path, data: bytes) -> str:
             data = unpack.decompress(data, LARGEST)
         except zlib.error as error:
             raise UserFileError(f"program {path} is packed, and cannot be unpacked: {error}") from error
+        if not (unpack.eof or unpack.unconsumed_tail):
+            raise UserFileError(f"program {path} is packed, and its end is missing")
         if unpack.unconsumed_tail:
             raise UserFileError(f"program {path} has more than {LARGEST >> 20} MiB when it is unpacked")
     if data.lstrip().startswith(_XML):

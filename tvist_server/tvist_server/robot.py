@@ -186,9 +186,7 @@ class ServedRobot:
 
     def leave_arm(self) -> None:
         """Leave an arm that has power without it; the controller's thread has ended."""
-        power = self.controller.motion.power
-        if power is not None:
-            power.end()
+        self._host.leave_arm()
 
     def close(self) -> None:
         """Close its gateways; the controller's thread has ended."""

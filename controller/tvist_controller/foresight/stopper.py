@@ -11,10 +11,12 @@ from tvist_controller.foresight.stops import StopPlan, StopPlanner
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.trajectory import Forecast, JointStop, PathStop, StuckError, Trajectory
+from tvist_controller.trajectory import Forecast, JointStop, PathStop, SlowedStop, StuckError, Trajectory
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
+LONG = 0.2
+"""Time for which a motion along a curve may run out before a stop is sought that plays it more slowly [s]."""
 EVEN = 1e-12
 """Differences between steps below this are rounding errors [rad]."""
 
@@ -126,18 +128,29 @@ class Outlook:
             stop = self.stops.under(ahead, state, forecast, deceleration)
         if stop is None and ahead is not None:
             ahead.until(MAX_AHEAD)
+            asked = None
             if not ahead.rests:  # it lasts so long that any stop is sooner
                 stop = self.stops.on_path(state, newest, forecast, deceleration, certain=False)
             else:
                 last, asked = ahead.last, self.stops.asked(np.array(ahead.references))
                 stop = self.stops.under(ahead, state, forecast, deceleration, asked)
                 lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead.references[-1])
+            curved = forecast.path.posture_of is not None
+            lasts = math.inf if lets_run_out.duration is None else lets_run_out.duration
+            if stop is None and curved and lasts > LONG and cycle.mode is not LineMode.STOPPING:
+                slowed = self.stops.slowed(ahead, state, forecast, deceleration, asked)
+                if slowed is not None and slowed.duration < lasts:
+                    return self._plan(slowed, deceleration, slowed.duration, slowed.end)
         if stop is not None:
             return self._plan(stop, deceleration, stop.duration, stop.end)
         return None if cycle.mode is LineMode.STOPPING else lets_run_out
 
     def _plan(
-        self, stop: JointStop | PathStop | None, wanted: float | None, duration: float, end: Floats
+        self,
+        stop: JointStop | PathStop | SlowedStop | None,
+        wanted: float | None,
+        duration: float,
+        end: Floats,
     ) -> StopPlan:
         kept = None if stop is None else stop.acceleration
         way = float(np.abs(end - self._cycle.line.shaped.position).max())

@@ -11,10 +11,10 @@ import numpy as np
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import GENTLEST_STOP, StopTorque, torque_along
-from tvist_controller.trajectory import Forecast, JointStop, MotionLimits, PathStop
+from tvist_controller.trajectory import Forecast, JointStop, MotionLimits, PathStop, SlowedStop
 from tvist_plant.description import RobotDescription
 
-S = TypeVar("S", JointStop, PathStop)
+S = TypeVar("S", JointStop, PathStop, SlowedStop)
 
 STEP = 0.8
 """Ratio of one tried deceleration to the previous one [-]."""
@@ -54,7 +54,7 @@ class References(Protocol):
 class StopPlan:
     """A stop and its limits."""
 
-    trajectory: JointStop | PathStop | None
+    trajectory: JointStop | PathStop | SlowedStop | None
     """Trajectory of the stop; None if the present motion runs out by itself."""
     acceleration: float | None
     """Acceleration limit of the stop [rad/s^2]; None for the motion's own."""
@@ -158,6 +158,42 @@ class StopPlanner:
             return all(share <= limit + ROUNDING for share, limit in zip(shares, along, strict=True))
 
         return self._quickest_on_path(state, newest, forecast, wanted, permitted, asked)
+
+    def slowed(
+        self, ahead: References, state: Target, forecast: Forecast, wanted: float | None, asked: Floats | None
+    ) -> SlowedStop | None:
+        """Return the quickest stop that plays a motion more and more slowly, see `SlowedStop`; arguments as of `under`.
+
+        Returns:
+            None if none keeps the torques and the acceleration of stops.
+        """
+        samples, path = np.array(ahead.samples), forecast.path
+        joints = Target(*path.states(state.q, state.qd, state.qdd))
+        fastest = float(np.abs(joints.qd).max())
+        if fastest < SLOW or len(samples) < 4:
+            return None
+        torque = StopTorque(
+            self._dynamics, joints, self._torque, np.zeros_like(joints.q) if asked is None else asked
+        )
+        along = [path.forwards(x - samples[1]) for x in samples[2:]]
+
+        def permitted(stop: SlowedStop) -> bool:
+            shares = (stop.share((number + 1) * self.period) for number in range(len(along)))
+            behind = all(share <= limit + ROUNDING for share, limit in zip(shares, along, strict=True))
+            return behind and stop.hardest <= self.highest
+
+        stops = (
+            SlowedStop(
+                path,
+                samples,
+                acceleration=acceleration,
+                jerk=0.5 * self.jerk,
+                fastest=fastest,
+                period=self.period,
+            )
+            for acceleration in self._ladder(wanted)
+        )
+        return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def asked(self, ahead: Floats) -> Floats:
         """Largest torques that a motion needs from now on, shape (n,) [N m].

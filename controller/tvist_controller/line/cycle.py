@@ -193,7 +193,7 @@ class ControlCycle:
         signals = line.rest_at(q)
         target = Target(*signals[Q:TORQUE])
         command = line.drives.command(target, signals, line.dynamics.payload_parameters)
-        if isinstance(plant, Placeable):
+        if measured is None and isinstance(plant, Placeable):
             measured = plant.reset(command, payload=carried, seed=seed)
         assert measured is not None, "what cannot be placed is measured"
         self.sample = Sample(

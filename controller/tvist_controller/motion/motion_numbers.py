@@ -101,6 +101,11 @@ class Motions:
         """Number of the running motion's present part, and the length covered on it [m]; None if it has no length."""
         return self._running.progress if isinstance(self._running, RunningMove) else None
 
+    @property
+    def stops_at(self) -> tuple[int, float] | None:
+        """Where the running motion ends, of which a stop has begun, as `progress`; None if it ends elsewhere."""
+        return self._running.stops_at if isinstance(self._running, RunningMove) else None
+
     def set_speed(self, fraction: float) -> None:
         """Scale the time of the running motion and of later ones."""
         self.wanted_speed = fraction

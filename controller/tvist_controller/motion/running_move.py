@@ -110,6 +110,16 @@ class RunningMove:
         return self._parts - 1 - len(self.coming), float(self._cycle.line.shaped.along.newest.q[0])
 
     @property
+    def stops_at(self) -> tuple[int, float] | None:
+        """Where a stop that has begun ends, as `progress`; None if no stop on the path has begun."""
+        forecast, present = self._cycle.trajectory.forecast, self.progress
+        if present is None or forecast is None or forecast.path is not self._trajectory.path:
+            return None
+        if self._held and self._cycle.trajectory is self._trajectory:
+            return present  # it is paused, and does not go on to its end
+        return present[0], float(forecast.end[0])
+
+    @property
     def rate(self) -> float:
         """Rate of its time [-]."""
         return self._trajectory.rate

@@ -277,7 +277,7 @@ class ProgramArm:
         if event.kind == "protective_stop":
             self._guided = self._driver = None
             if journey is not None and moving is not None:
-                journey.outcome = event.kind
+                journey.stop()
         if event.id is None or self._own or event.id not in {moving, self._guided}:
             return False
         stopped = event.kind == "motion_stopped" and event.code != "plant_failure"

@@ -67,6 +67,8 @@ class Journey:
         """Number of the motion while it runs."""
         self.outcome: str | None = None
         """Event that ended it."""
+        self._stops_at: tuple[int, float] | None = None
+        """Where the protective stop ends that has ended it, see `stop`."""
         self.skipped = False
         """True after a call of `abort`; a motion that was being planned then is not started."""
         self.over = False
@@ -109,6 +111,10 @@ class Journey:
         if fault is not None:
             raise fault
 
+    def stop(self) -> None:
+        """Note that a protective stop has begun: what it passes has been passed when the program is resumed."""
+        self.outcome, self._stops_at = "protective_stop", self._motion.motions.stops_at
+
     # ------------------------------------------------------------------ in every tick
 
     def step(self) -> None:
@@ -141,8 +147,9 @@ class Journey:
             self._start(legs, plan)
             while self.outcome is None:
                 yield
-                self._pass_blends()
+                self._pass_blends(self._motion.motions.progress)
                 self._go_on()
+            self._pass_blends(self._stops_at)
             self._marks, ended = [], len(self._marks)
             if self.outcome == "motion_done":
                 self._tell_stop(ended)
@@ -169,7 +176,7 @@ class Journey:
             raise Fault(refusal.reply.why) from refusal
         assert isinstance(reply, Accepted)
         assert isinstance(plan.found, PlannedMove)
-        self.number, self.outcome = reply.id, None
+        self.number, self.outcome, self._stops_at = reply.id, None, None
         self._further, self._ends, self._refuses = None, False, False
         self._marks = list(plan.found.marks) or [(0, float("inf"))]
         self._count = len(legs)
@@ -224,9 +231,8 @@ class Journey:
         self._count += count
         return True
 
-    def _pass_blends(self) -> None:
-        """Do what the program does behind the blends that the arm has begun."""
-        progress = self._motion.motions.progress
+    def _pass_blends(self, progress: tuple[int, float] | None) -> None:
+        """Do what the program does behind the blends that the arm has begun where it has come to, see `progress`."""
         while progress is not None and len(self._marks) > 1 and progress > self._marks[0]:
             del self._marks[0]
             self._pass(1)

@@ -179,7 +179,7 @@ class SafetyControl:
     def recover(self, error: PlantError, seed: int) -> Sample:
         """Go on after the arm has failed: a simulated one is placed at rest at its reference, in a protective stop.
 
-        One that cannot be placed gets no power until the safety system is restarted.
+        One that cannot be placed, or fails again at once, gets no power until the safety system is restarted.
 
         Args:
             error: The plant's error.
@@ -189,18 +189,19 @@ class SafetyControl:
             Signals with the new state.
         """
         motion, cycle = self._motion, self._motion.cycle
-        placeable = isinstance(cycle.line.plant, Placeable)
-        why = f"{error}: the simulation put the arm at rest at its reference" if placeable else str(error)
-        motion.abandon(why, "plant_failure")
-        position = cycle.line.shaped.position
+        placed = isinstance(cycle.line.plant, Placeable)
+        why, position = str(error), cycle.line.shaped.position
         try:
             sample = cycle.reset(position, seed=seed)
-        except ValueError:  # `power_on` asks it again
-            if placeable:
-                raise
-            sample = cycle.reset(position, measured=cycle.sample.measured)
+            if placed:
+                sample = cycle.step()
+        except (ValueError, PlantError):  # it goes on failing; `power_on` asks it again
+            placed, sample = False, cycle.reset(position, measured=cycle.sample.measured)
+        if placed:
+            why = f"{why}: the simulation put the arm at rest at its reference"
+        motion.abandon(why, "plant_failure")
         self._protection.forget()
-        if not placeable:
+        if not placed:
             if motion.power is not None:
                 motion.power.stop()
             motion.activity = Activity.POWER_OFF
@@ -211,7 +212,7 @@ class SafetyControl:
         if after(motion.activity, "plant_failure") is not None:
             motion.go("plant_failure")
         self._emit("protective_stop", code="plant_failure", why=why)
-        return cycle.step()
+        return sample
 
     def put(self, mode: ResetMode | None) -> None:
         """Set the robot mode of an arm that was placed somewhere at rest; None for the present mode, at rest."""

@@ -9,6 +9,7 @@ from typing import Any
 from msgspec import Struct
 
 from tvist_controller.sources.own_files import OwnFileError, ends, is_file, run_file
+from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import Plant
 from tvist_plant.user_file import named
@@ -60,15 +61,15 @@ class OwnPlant:
         """
         try:
             made = self.maker(description, carried)
+            if isinstance(made, Plant):
+                return called(made, description.joints)
         except (Exception, SystemExit) as error:
             if ends(error):
                 raise
             raise OwnPlantError(f"plant {self.place}: making it raises {named(error)}") from error
-        if not isinstance(made, Plant):
-            raise OwnPlantError(
-                f"plant {self.place}: it makes a {type(made).__name__}, which is no plant: that has payload and step"
-            )
-        return made
+        raise OwnPlantError(
+            f"plant {self.place}: it makes a {type(made).__name__}, which is no plant: that has payload and step"
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the plant as its name, since a maker cannot be pickled."""

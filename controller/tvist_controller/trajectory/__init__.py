@@ -11,6 +11,7 @@ from tvist_controller.trajectory.motion import PlannedMotion, at_least, quickest
 from tvist_controller.trajectory.path import JointLine, Path, Way
 from tvist_controller.trajectory.path_stop import PathStop
 from tvist_controller.trajectory.servo import Servo
+from tvist_controller.trajectory.slowed_stop import SlowedStop
 from tvist_controller.trajectory.stop import JointStop
 from tvist_controller.trajectory.stream import SetpointStream
 from tvist_controller.trajectory.tool_speed import ToolKinematics, ToolSpeed
@@ -32,6 +33,7 @@ __all__ = [
     "Rest",
     "Servo",
     "SetpointStream",
+    "SlowedStop",
     "StuckError",
     "ToolKinematics",
     "ToolSpeed",

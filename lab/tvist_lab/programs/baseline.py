@@ -46,7 +46,9 @@ def read_baseline(path: Path, files: Sequence[str]) -> Mapping[str, Run]:
             for name, value in _points(run).items():  # whether they can be compared
                 _differ(name, value, value)
             _warned(run)
-    except (msgspec.DecodeError, UserFileError, AttributeError, KeyError, TypeError) as error:
+    except (
+        msgspec.DecodeError, UserFileError, AttributeError, KeyError, TypeError, OverflowError, RecursionError,
+    ) as error:  # fmt: skip
         raise BaselineError(f"baseline {path} is not what tvist run --lockstep --json prints") from error
     if in_real_time:
         raise BaselineError(f"baseline {path} is of a run in real time: make it with --lockstep")
@@ -100,8 +102,9 @@ def _warned(run: Run) -> Counter[str]:
 
 
 def _differ(name: str, before: Any, now: Any) -> bool:
-    if before is None or now is None or isinstance(before, str):
+    if before is None or now is None or isinstance(before, str) or isinstance(now, str):
         return bool(before != now)
+    before, now = float(before), float(now)
     share = next((share for end, share in SHARES.items() if name.endswith(end)), None)
     if share is not None:
         return bool(abs(now - before) > share * (1.0 + abs(before)))

@@ -1,4 +1,4 @@
-"""The last second before a failure: kept in memory, and written to a file when the simulated arm fails."""
+"""The last second before a failure: kept in memory, and written to a file when the arm fails."""
 
 import logging
 import os
@@ -9,6 +9,7 @@ from threading import Thread
 from typing import Any
 
 from tvist_controller.reporting.sink import Sink
+from tvist_plant.user_file import named
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
@@ -21,7 +22,8 @@ log = logging.getLogger(__name__)
 KEPT = 500
 """Number of ticks kept before the failure: one second."""
 MAX_FILES = 10
-"""Largest number of files of one robot, so that repeated failures do not fill the disk."""
+"""Largest number of files of one robot, and of exceptions in the log, so that repeated failures do not fill the disk.
+"""
 
 
 class BlackBox(Sink):
@@ -43,6 +45,7 @@ class BlackBox(Sink):
         self._kept: deque[Recorded] = deque()
         self._failed = False
         self._written = 0
+        self._said = set[str]()
 
     def state(self, state: State) -> None:
         """Keep a state; the first state after a failure is the last one in its file."""
@@ -57,6 +60,13 @@ class BlackBox(Sink):
     def event(self, event: Event) -> None:
         self._kept.append(event)
         self._failed |= event.code == "plant_failure"
+
+    def raised(self, error: Exception) -> None:
+        """Log an exception of somebody's own arm with its traceback, but not the same one in every tick."""
+        said = named(error)
+        if said not in self._said and len(self._said) < MAX_FILES:
+            self._said.add(said)
+            log.error("robot %s: a method of the arm has failed", self._info().name, exc_info=error)
 
     def truth(self, truth: Truth) -> None:
         self._kept.append(truth)
@@ -100,4 +110,4 @@ class BlackBox(Sink):
                 recorder.error
                 or f"the last second before it is in {path}: look with tvist log analyze {path}"
             )
-            log.error("robot %s: the simulated arm failed; %s", info.name, why)
+            log.error("robot %s: the arm failed; %s", info.name, why)
