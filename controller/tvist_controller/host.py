@@ -121,14 +121,14 @@ class Host:
             for sink in self._sinks:
                 sink.io(io)
         report, events = self.controller.complete_tick()
-        told = self.controller.setup.truth
-        truth = None
         for sink in self._sinks:
             for event in events:
                 sink.event(event)
             sink.report(report)
-            if told or sink.wants_truth:
-                truth = truth or self.controller.truth()
+        published = self.controller.setup.truth
+        wanting = [sink for sink in self._sinks if published or sink.wants_truth]
+        if wanting and (truth := self.controller.truth()) is not None:
+            for sink in wanting:
                 sink.truth(truth)
         if self.controller.session.lease is not self.standing.lease:
             self.standing = self._standing()
