@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,28 +39,32 @@ class Track:
         shown: What it looks like.
         states: Its states in the order of their ticks.
         truths: Its truths; a state without one is drawn stiff.
+        origin: Simulation time from which the run counts [s].
 
     Raises:
         TrackError: There is no state.
     """
 
-    def __init__(self, shown: Shown, states: Sequence[State], truths: Sequence[Truth]) -> None:
+    def __init__(
+        self, shown: Shown, states: Sequence[State], truths: Sequence[Truth], origin: float = 0.0
+    ) -> None:
         if not states:
             raise TrackError("there is no state in it, so there is nothing to show")
-        self.shown, self._states = shown, states
+        self.shown, self._states, self._origin = shown, states, origin
         self._truths = {truth.tick: truth for truth in truths}
         self.has_truth = bool(self._truths)
-        self.signals: Signals = signals_of(shown.look, states, self._truths)
+        found = signals_of(shown.look, states, self._truths)
+        self.signals: Signals = replace(found, time=found.time - origin)
 
     @property
     def start(self) -> float:
-        """Simulation time of the first moment [s]."""
-        return self._states[0].timestamp
+        """Time of the first moment [s]."""
+        return self._states[0].timestamp - self._origin
 
     @property
     def end(self) -> float:
-        """Simulation time of the last moment [s]."""
-        return self._states[-1].timestamp
+        """Time of the last moment [s]."""
+        return self._states[-1].timestamp - self._origin
 
     @property
     def stops(self) -> list[float]:
@@ -74,7 +78,7 @@ class Track:
         """What the page is told: rows of poses and samples of signals, as base64 of 32-bit floats.
 
         Args:
-            start: Simulation time from which the page counts [s].
+            start: Time from which the page counts [s].
         """
         states = self._states[::EVERY]
         rows = [self.shown.look.row(state, self._truths.get(state.tick)) for state in states]
@@ -85,7 +89,7 @@ class Track:
             "reach": self.shown.look.reach,
             "truth": self.has_truth,
             "width": len(rows[0]),
-            "times": _packed(np.array([state.timestamp for state in states]) - start),
+            "times": _packed(np.array([state.timestamp for state in states]) - self._origin - start),
             "rows": _packed(np.array(rows)),
             "samples": {name: _packed(values) for name, values in signals.items()},
         }
