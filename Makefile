@@ -61,7 +61,7 @@ format: setup
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-# The site needs no package of tvist: it is made from the files. So its environment is a small one of its own.
+# The site is made from the files, in a small environment of its own; only the pages of the commands come from the program.
 DOCS_READY := .venv-docs/.ready
 SITE := NO_MKDOCS_2_WARNING=1 .venv-docs/bin/python -m tools.site
 
@@ -70,10 +70,10 @@ $(DOCS_READY): docs/requirements.lock
 	.venv-docs/bin/pip install --quiet --disable-pip-version-check --require-hashes -r docs/requirements.lock
 	@touch $@
 
-docs: $(DOCS_READY)
+docs: setup $(DOCS_READY)
 	$(SITE)
 
-docs-serve: $(DOCS_READY)
+docs-serve: setup $(DOCS_READY)
 	$(SITE) --serve
 
 COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \

@@ -259,7 +259,7 @@ class TestSnippets:
         if "import urx" in text:
             pytest.importorskip("urx")  # needs older packages than this project
         if "mine.py" in text:
-            pytest.skip("test_own_shaper.py runs it beside its file")
+            pytest.skip("test_tutorials.py runs it beside its file")
         if "first.mcap" in text:
             folder = request.getfixturevalue("story")[0]
         script = tmp_path / "test_snippet.py"

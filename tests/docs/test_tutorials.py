@@ -1,0 +1,168 @@
+"""The tutorials, followed literally: their files are written, their commands are run in their order; and the examples
+of all commands."""
+
+import re
+import shlex
+import shutil
+import signal
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from tests import forked
+from tests.conformance.served import Served, finished
+from tests.docs.test_docs import DOCS, FENCE, ROOT, run
+from tests.places import free_endpoint
+
+from tvist_cli.examples import EXAMPLES
+from tvist_cli.main import GROUPS, OF_GROUPS, application
+from tvist_client.blocking import Robot
+
+pytestmark = pytest.mark.realtime
+
+PAGES = {name: (DOCS / "tutorials" / f"{name}.md").read_text("utf-8") for name in ("program-in-ci", "your-log")}
+SHAPER = (DOCS / "tutorials" / "your-shaper.md").read_text("utf-8")
+COMPARED = (DOCS / "how-to" / "change-a-shaper.md").read_text("utf-8")
+WAVE = ROOT / "clients" / "examples" / "wave.script"
+SWEEP = 'shapers = ["zv"]\npayloads = [2.5]\nmoves = 2\n'
+SERVED = ("check", "move", "watch", "log record", "fleet", "stop", "unlock", "view")
+"""Commands whose examples are about the robot of `serve`'s example."""
+
+
+def blocks(text, kind):
+    return [match["text"] for match in FENCE.finditer(text) if match["kind"] == kind]
+
+
+def with_files(folder, text):
+    """A folder with the files that a page has its readers save."""
+    for name, written in re.findall(r"^Save this as `([\w.]+)`.*?^```\w+\n(.*?)^```$", text, re.M | re.S):
+        (folder / name).write_text(written, encoding="utf-8")
+    shutil.copy(WAVE, folder)
+    return folder
+
+
+def commands(text):
+    """The words of a page's commands, and the exit code that it says."""
+    for line in "".join(blocks(text, "sh")).splitlines():
+        program, *words = shlex.split(line, comments=True)
+        assert program == "tvist"
+        yield words, int(re.search(r"# exit code (\d)|$", line)[1] or 0)
+
+
+def pictures(text):
+    """Names of the figures that a page says its commands write."""
+    return re.findall(r"`(\w+/\w+\.png)`", text)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_tutorial_says_and_leaves_what_its_commands_do(page, tmp_path):
+    folder, text, told = with_files(tmp_path, PAGES[page]), PAGES[page], ""
+    for words, code in commands(text):
+        at = words.index(">") if ">" in words else len(words)
+        ended = finished("-m", "tvist_cli", *words[:at], cwd=folder)
+        assert ended.returncode == code, ended.stdout + ended.stderr
+        told += " ".join([*ended.stdout.split(), *ended.stderr.split(), ""])
+        if words[at:]:
+            (folder / words[-1]).write_text(ended.stdout, encoding="utf-8")
+    for line in "".join(blocks(text, "text")[-3 if page == "program-in-ci" else 0 :]).splitlines():
+        assert line == "…" or " ".join(line.split()) in told
+    assert pictures(text)
+    assert all((folder / name).exists() for name in pictures(text))
+
+
+@pytest.mark.nightly
+def test_every_command_about_a_shaper_works_in_its_order(tmp_path, monkeypatch):
+    folder = with_files(tmp_path, SHAPER)
+    monkeypatch.chdir(folder)
+    written = [words for words, _ in commands(SHAPER)]
+    before = written[: [words[0] for words in written].index("serve")]
+    (_, *how), *after = written[len(before) :]
+    said = [run("-m", "tvist_cli", *words, cwd=folder) for words in before]
+    with Served(*how) as served:
+        assert "shaper early" in served.said
+        for words in after:
+            if words[0] == "log":
+                assert served.end(signal.SIGINT) == 0
+            at = [] if words[0] == "log" else ["--endpoint", served.endpoint]
+            said.append(run("-m", "tvist_cli", *words, *at, cwd=folder))
+            if words[0] == "move":
+                with Robot.connect(served.endpoint) as robot:
+                    chosen = words[words.index("--shaper") + 1] if "--shaper" in words else "early"
+                    assert robot.info().shaper == chosen
+                    assert "early" in robot.info().shapers
+    assert [words[0] for words in [*before, *after]] == [
+        "shapers", "evaluate", "evaluate", "shaperbench", "move", "move", "move", "log"
+    ]  # fmt: skip
+    for told, name in zip(said[:4], ("early", "bell", "early", "early"), strict=True):
+        assert name in told
+    assert all(line in said[0] for line in blocks(SHAPER, "text")[0].splitlines())
+    assert all((folder / name).exists() for name in pictures(SHAPER))
+    assert "every state equal to the last bit" in said[-1]
+
+
+def test_the_comparison_of_shapers_prints_what_the_page_says(tmp_path):
+    folder = with_files(tmp_path, SHAPER)
+    (script,) = [text for text in blocks(COMPARED, "python") if "asyncio.run" in text]
+    (folder / "compare.py").write_text(script, encoding="utf-8")
+    assert run("-W", "error", "compare.py", cwd=folder) == blocks(COMPARED, "text")[0]
+
+
+@pytest.mark.parametrize("command", EXAMPLES)
+def test_help_has_an_example_in_80_columns_and_names_each_thing_once(command, tmp_path):
+    words, said = command.split(), tmp_path / "help"
+    with said.open("w", encoding="utf-8") as stream:
+        application(words).help_print(words, console=Console(file=stream, width=80))
+    told = said.read_text(encoding="utf-8")
+    assert f"Example: {EXAMPLES[command]}"[:80] in told
+    assert EXAMPLES[command].split()[: len(words) + 1] == ["tvist", *words]
+    assert max(map(len, told.splitlines())) <= 80
+    assert not re.search(r"\[default: ?(\(\))?\]|\b([A-Z]+) --(?i:\2)\b", told)
+
+
+def test_every_command_has_an_example():
+    names = [name for group in GROUPS.values() for name in group if name != "log"]
+    inside = [f"{name} {one}" for name, those in OF_GROUPS.items() for one in those]
+    assert sorted(EXAMPLES) == sorted(names + inside)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with what examples read."""
+    folder = with_files(tmp_path_factory.mktemp("examples"), "")
+    (folder / "sweep.toml").write_text(SWEEP, encoding="utf-8")
+    shutil.copy(Path(__file__).parents[1] / "journals" / "live_moves.mcap", folder / "first.mcap")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def served(place):
+    """The robot of `serve`'s example."""
+    how = shlex.split(EXAMPLES["serve"].replace("first.mcap", str(place / "served.mcap")))[2:]
+    with Served(*how) as robot:
+        yield robot
+
+
+def until(sign, *words, cwd):
+    """Run a program until it says a word on stderr, then interrupt it."""
+    with forked.Popen(["python", "-m", "tvist_cli", *words], stderr=-1, text=True, cwd=cwd) as process:
+        said = ""
+        while sign not in said:
+            assert (line := process.stderr.readline()), said
+            said += line
+        process.send_signal(signal.SIGINT)
+        assert process.wait() in (0, 130)
+
+
+@pytest.mark.parametrize("command", [name for name in EXAMPLES if name not in ("demo", "serve")])
+def test_the_example_works(command, place, request):
+    """Those of `serve` and `demo` are run by the fixture, and by a test of the command line."""
+    words = shlex.split(EXAMPLES[command])[1:]
+    if command in SERVED:
+        endpoint = request.getfixturevalue("served").endpoint
+        words += [endpoint] if command in ("check", "watch", "unlock", "view") else ["--endpoint", endpoint]
+    if command == "view":
+        until("http://", *words, "--port", "0", cwd=place)
+    elif command == "router":
+        until("listens", *words, "--listen", free_endpoint(), cwd=place)
+    else:
+        assert run("-m", "tvist_cli", *words, cwd=place) or command in ("log report", "log export", "log record")
