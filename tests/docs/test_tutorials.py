@@ -5,6 +5,7 @@ import re
 import shlex
 import shutil
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,9 @@ from tvist_client.blocking import Robot
 
 pytestmark = pytest.mark.realtime
 
-PAGES = {name: (DOCS / "tutorials" / f"{name}.md").read_text("utf-8") for name in ("program-in-ci", "your-log")}
+PAGES = {
+    name: (DOCS / "tutorials" / f"{name}.md").read_text("utf-8") for name in ("program-in-ci", "your-log")
+}
 SHAPER = (DOCS / "tutorials" / "your-shaper.md").read_text("utf-8")
 COMPARED = (DOCS / "how-to" / "change-a-shaper.md").read_text("utf-8")
 WAVE = ROOT / "clients" / "examples" / "wave.script"
@@ -35,7 +38,9 @@ def blocks(text, kind):
 
 def with_files(folder, text):
     """A folder with the files that a page has its readers save."""
-    for name, written in re.findall(r"^Save this as `([\w.]+)`.*?^```\w+\n(.*?)^```$", text, re.M | re.S):
+    for name, written in re.findall(
+        r"^Save this as `([\w.]+)`.*?^```\w+\n(.*?)^```$", text, re.MULTILINE | re.DOTALL
+    ):
         (folder / name).write_text(written, encoding="utf-8")
     shutil.copy(WAVE, folder)
     return folder
@@ -144,10 +149,11 @@ def served(place):
 
 def until(sign, *words, cwd):
     """Run a program until it says a word on stderr, then interrupt it."""
-    with forked.Popen(["python", "-m", "tvist_cli", *words], stderr=-1, text=True, cwd=cwd) as process:
+    with forked.Popen([sys.executable, "-m", "tvist_cli", *words], stderr=-1, text=True, cwd=cwd) as process:
         said = ""
         while sign not in said:
-            assert (line := process.stderr.readline()), said
+            line = process.stderr.readline()
+            assert line, said
             said += line
         process.send_signal(signal.SIGINT)
         assert process.wait() in (0, 130)
@@ -165,4 +171,8 @@ def test_the_example_works(command, place, request):
     elif command == "router":
         until("listens", *words, "--listen", free_endpoint(), cwd=place)
     else:
-        assert run("-m", "tvist_cli", *words, cwd=place) or command in ("log report", "log export", "log record")
+        assert run("-m", "tvist_cli", *words, cwd=place) or command in (
+            "log report",
+            "log export",
+            "log record",
+        )

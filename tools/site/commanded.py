@@ -12,7 +12,7 @@ PYTHON = ROOT / ".venv" / "bin" / "python"
 """What has the program installed: the site itself is made without it."""
 FOLDER = "commands"
 """Folder of these pages in the site."""
-LINK = re.compile(r"\[[^\[\]]*\]\([^)]*\)|^#.*$|<picture>.*?</picture>", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\[[^\[\]]*\]\([^)]*\)|^#[^\n]*$|<picture>.*?</picture>", re.MULTILINE | re.DOTALL)
 SPAN = re.compile(r"`tvist (?P<words>[a-z]+(?: [a-z]+)?)[^`\n]*`")
 
 
@@ -37,7 +37,9 @@ def with_links(text: str, page: Path, commands: set[str]) -> str:
         commands: Words of all commands.
     """
     # Headings, links and blocks stay as they are.
-    kept = [match.span() for match in (*LINK.finditer(text), *CODE.finditer(text)) if match[0][:6] != "`tvist"]
+    kept = [
+        match.span() for match in (*LINK.finditer(text), *CODE.finditer(text)) if match[0][:6] != "`tvist"
+    ]
     places = []
     for match in SPAN.finditer(text):
         words = match["words"] if match["words"] in commands else match["words"].partition(" ")[0]

@@ -76,7 +76,9 @@ def _plain(text: Any) -> str:
 
 def _cell(text: str) -> str:
     parts = " ".join(text.replace("|", "\\|").split()).split("`")
-    parts[::2] = [OPTION.sub(r"`\g<0>`", part.replace("*", "\\*").replace("<", "&lt;")) for part in parts[::2]]
+    parts[::2] = [
+        OPTION.sub(r"`\g<0>`", part.replace("*", "\\*").replace("<", "&lt;")) for part in parts[::2]
+    ]
     return "`".join(parts)
 
 

@@ -8,7 +8,8 @@ from tools.site.commanded import page_of
 from tools.site.reference import FOLDER, Module
 from tools.site.tree import HOME, INDEX, ROOT, linked
 
-HEADING = re.compile(r"^(?:(?P<level>##+) |<summary>)(?P<title>.+?)(?:</summary>)?$")
+HEADING = re.compile(r"^(?:(?P<level>##+) |.*<summary>)(?P<title>.+?)(?:</summary>)?$")
+COMMANDS = "cli/README.md"
 ENTRY = re.compile(r"^(?:- |\d+\. )\[(?P<title>[^\]]+)\]\((?P<target>[^)#\s]+\.md)\)")
 
 Section = list[dict[str, Any]]
@@ -19,11 +20,10 @@ def navigation(modules: list[Module], commands: dict[str, list[str]]) -> Section
 
     Lists that the index folds are groups of their section.
 
-    A page that the index names twice is in the section that names it last: what begins the index leads a newcomer
-    to pages that have their places below.
+    A page that the index names twice is in the section that names it first.
     """
     sections: Section = []
-    places: dict[str, Section] = {}
+    placed = {COMMANDS}
     stack: list[tuple[int, Section]] = [(1, sections)]
     for line in INDEX.read_text(encoding="utf-8").splitlines():
         if heading := HEADING.match(line):
@@ -34,11 +34,10 @@ def navigation(modules: list[Module], commands: dict[str, list[str]]) -> Section
             stack.append((level, inside))
         elif entry := ENTRY.match(line):
             path = linked(INDEX, entry["target"]).relative_to(ROOT).as_posix()
-            if before := places.get(path):
-                before[:] = [item for item in before if path not in item.values()]
-            places[path] = stack[-1][1]
-            stack[-1][1].append({entry["title"].replace("`", ""): path})
-    told: Section = [{"Overview": "cli/README.md"}]
+            if path not in placed:
+                placed.add(path)
+                stack[-1][1].append({entry["title"].replace("`", ""): path})
+    told: Section = [{"Overview": COMMANDS}]
     told += [{group: [{n: page_of(n).as_posix()} for n in names]} for group, names in commands.items()]
     api: Section = [{"Overview": f"{FOLDER}/README.md"}]
     for module in modules:

@@ -48,7 +48,9 @@ class Module:
             rows += f"| [{part}]({path.name}) | {links} |\n"
             filled = "\n".join(f"::: {self.name}.{name}\n{SHOWN}" for name in names)
             found[path] = f"# `{self.name}`: {part}\n\nImport these from `{self.name}`.\n\n{filled}"
-        return {self.page: f"# `{self.name}`\n\n{self.about}.\n\n| part | exports |\n|---|---|\n{rows}"} | found
+        return {
+            self.page: f"# `{self.name}`\n\n{self.about}.\n\n| part | exports |\n|---|---|\n{rows}"
+        } | found
 
 
 def modules() -> list[Module]:
