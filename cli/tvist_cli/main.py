@@ -5,12 +5,14 @@ import shutil
 import signal
 import sys
 import textwrap
+import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tvist_cli.examples import EXAMPLES
 from tvist_cli.study_names import STUDY
 from tvist_server.ending import end_like_interrupted, ending_signals
 
@@ -147,9 +149,14 @@ def _overview() -> str:
     return "\n".join(lines[:-1])
 
 
+@cache
+def examples() -> dict[str, str]:
+    """Return a command line for each command that does something by itself, by its words such as `log analyze`."""
+    return tomllib.loads(Path(__file__).with_name("examples.toml").read_text(encoding="utf-8"))
+
+
 def _example(command: str) -> str | None:
-    """The line below a command's help; None for a command that does nothing without another one."""
-    return f"Example: `{EXAMPLES[command]}`" if command in EXAMPLES else None
+    return f"Example: `{examples()[command]}`" if command in examples() else None
 
 
 def _known(chain: Sequence[str]) -> Mapping[str, str]:

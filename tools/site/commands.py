@@ -1,104 +1,117 @@
 """`python -m tools.site.commands FOLDER`: writes a page of each command, made from its own help.
 
-Runs where the program is installed; the rest of the site is made without it.
+This runs where the program is installed; the rest of the site is made without it.
 """
 
 import io
 import json
 import re
+import subprocess
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-
-from tvist_cli.examples import EXAMPLES
-from tvist_cli.help_boxes import named_once
-from tvist_cli.main import GROUPS, OF_GROUPS, application
+from tools.site.tree import ROOT
 
 if TYPE_CHECKING:
     from cyclopts.help import HelpEntry, HelpPanel
-    from rich.console import ConsoleOptions
+    from rich.console import Console, ConsoleOptions
 
+FOLDER = "commands"
+"""Folder of these pages in the site."""
+OVERVIEW = "cli/README.md"
+"""The page that lists the commands."""
 OPTION = re.compile(r"(?<!\w)--[a-z][\w-]*")
+NAMED = re.compile(r"`tvist (?P<command>[a-z ]+)`")
 
 
-def grouped() -> dict[str, list[str]]:
-    """Return the commands by group, those of a command behind it."""
-    return {
-        group: [name for command in commands for name in [command, *_within(command)] if name in EXAMPLES]
-        for group, commands in GROUPS.items()
-    }
+def page_of(command: str) -> str:
+    """Return where the page of a command, such as `log analyze`, is in the site."""
+    return f"{FOLDER}/{command.replace(' ', '-')}.md"
 
 
-def _within(command: str) -> list[str]:
-    return [f"{command} {name}" for name in OF_GROUPS.get(command, {})]
+def written(site: Path) -> dict[str, list[str]]:
+    """Write the pages into the sources of the site, and return the commands by group."""
+    command = [str(ROOT / ".venv" / "bin" / "python"), "-m", "tools.site.commands", str(site)]
+    made = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)
+    groups = dict(json.loads(made.stdout))
+    names = {name for group in groups.values() for name in group}
+    overview = site / OVERVIEW
+    overview.write_text(
+        NAMED.sub(
+            lambda it: f"[{it[0]}](../{page_of(it['command'])})" if it["command"] in names else it[0],
+            overview.read_text(encoding="utf-8"),
+        ),
+        encoding="utf-8",
+    )
+    return groups
 
 
-class Markdown:
-    """What the parser gives a help text to: keeps it as Markdown."""
+class Tables:
+    """Writes the boxes of a help text as tables in Markdown."""
 
-    show_metavar = True
+    def __call__(self, console: "Console", options: "ConsoleOptions", panel: "HelpPanel") -> None:  # noqa: ARG002
+        """Write a box below its title, if there is anything in it."""
+        from tvist_cli.help_boxes import named_once
 
-    def __init__(self) -> None:
-        self.usage = self.about = ""
-        self.boxes: list[str] = []
-
-    def render_usage(self, _console: Console, _options: "ConsoleOptions", usage: Any) -> None:
-        """Keep the line that shows how to call the command."""
-        self.usage = str(usage).strip()
-
-    def render_description(self, _console: Console, _options: "ConsoleOptions", description: Any) -> None:
-        """Keep what the command does."""
-        self.about = _plain(description)
-
-    def __call__(self, _console: Console, _options: "ConsoleOptions", panel: "HelpPanel") -> None:
-        """Keep the rows of a box, under its title."""
-        if rows := list(map(_row, map(named_once, panel.entries))):
-            self.boxes.append(f"## {panel.title}\n\n| | |\n|---|---|\n" + "".join(rows))
+        if rows := [_row(named_once(entry)) for entry in panel.entries]:
+            console.file.write(f"## {panel.title}\n\n| | |\n|---|---|\n{''.join(rows)}\n")
 
 
 def _row(entry: "HelpEntry") -> str:
     told = _plain(entry.description)
     if entry.choices and not all(choice in told for choice in entry.choices):
         told += f" One of {', '.join(entry.choices)}."
-    if entry.default is not None:
-        told += f" [{entry.default}]"
-    if entry.required:
-        told += " (required)"
-    names = "<br>".join(f"`{name}`" for name in entry.display_labels_with_metavar)
-    return f"| {names} | {_cell(told)} |\n"
-
-
-def _plain(text: Any) -> str:
-    return str(getattr(text, "primary_renderable", text) or "").strip()
-
-
-def _cell(text: str) -> str:
-    parts = " ".join(text.replace("|", "\\|").split()).split("`")
+    told += f" [{entry.default}]" if entry.default is not None else ""
+    told += " (required)" if entry.required else ""
+    parts = " ".join(told.replace("|", "\\|").split()).split("`")
     parts[::2] = [
         OPTION.sub(r"`\g<0>`", part.replace("*", "\\*").replace("<", "&lt;")) for part in parts[::2]
     ]
-    return "`".join(parts)
+    return (
+        f"| {'<br>'.join(f'`{name}`' for name in entry.display_labels_with_metavar)} | {'`'.join(parts)} |\n"
+    )
+
+
+def _plain(text: Any) -> str:
+    return str(getattr(text, "primary_renderable", text) or "")
 
 
 def page(command: str) -> str:
-    """Return the page of a command, such as `log analyze`, in Markdown."""
-    words, kept = command.split(), Markdown()
+    """Return the page of a command in Markdown: what it does, its example, its options."""
+    from rich.console import Console
+
+    from tvist_cli.main import application
+
+    words, said = command.split(), io.StringIO()
     app = application(words)
-    app.help_format, app.help_formatter = "plaintext", kept
-    app.help_print(words, console=Console(file=io.StringIO()))
-    head = f"# tvist {command}\n\n{kept.about}\n\n```sh\n{EXAMPLES[command]}\n```\n\n"
-    return f"{head}Usage: `{kept.usage}`\n\n" + "\n".join(kept.boxes)
+    app.help_format, app.help_formatter = "plaintext", Tables()
+    app.help_print(words, console=Console(file=said, width=10_000))
+    usage, _, text = said.getvalue().strip().partition("\n")
+    text, _, example = text.rpartition("Example: ")
+    about, box, options = text.partition("## ")
+    block = example.strip("`\n ")
+    return (
+        f"# tvist {command}\n\n{about.strip()}\n\n```sh\n{block}\n```\n\nUsage: `{usage}`\n\n{box}{options}"
+    )
 
 
 def main() -> None:
-    """Write the pages into a folder, and their groups beside them as one line of JSON on the standard output."""
-    folder, groups = Path(sys.argv[1]), grouped()
-    folder.mkdir(parents=True, exist_ok=True)
-    for names in groups.values():
-        for name in names:
-            (folder / f"{name.replace(' ', '-')}.md").write_text(page(name), encoding="utf-8")
+    """Write the pages, and print the commands by group, those of a command behind it, as JSON."""
+    from tvist_cli.main import GROUPS, OF_GROUPS, examples
+
+    groups: dict[str, list[str]] = {}
+    for group, commands in GROUPS.items():
+        names = [
+            name
+            for one in commands
+            for name in [one, *(f"{one} {inner}" for inner in OF_GROUPS.get(one, ()))]
+        ]
+        groups[group] = [name for name in names if name in examples()]
+        for name in groups[group]:
+            path = Path(sys.argv[1], page_of(name))
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(page(name), encoding="utf-8")
     print(json.dumps(groups))
 
 

@@ -4,12 +4,11 @@ import re
 from pathlib import Path
 from typing import Any
 
-from tools.site.commanded import page_of
+from tools.site.commands import OVERVIEW, page_of
 from tools.site.reference import FOLDER, Module
 from tools.site.tree import HOME, INDEX, ROOT, linked
 
 HEADING = re.compile(r"^(?:(?P<level>##+) |.*<summary>)(?P<title>.+?)(?:</summary>)?$")
-COMMANDS = "cli/README.md"
 ENTRY = re.compile(r"^(?:- |\d+\. )\[(?P<title>[^\]]+)\]\((?P<target>[^)#\s]+\.md)\)")
 
 Section = list[dict[str, Any]]
@@ -23,7 +22,7 @@ def navigation(modules: list[Module], commands: dict[str, list[str]]) -> Section
     A page that the index names twice is in the section that names it first.
     """
     sections: Section = []
-    placed = {COMMANDS}
+    placed = {OVERVIEW}
     stack: list[tuple[int, Section]] = [(1, sections)]
     for line in INDEX.read_text(encoding="utf-8").splitlines():
         if heading := HEADING.match(line):
@@ -37,8 +36,8 @@ def navigation(modules: list[Module], commands: dict[str, list[str]]) -> Section
             if path not in placed:
                 placed.add(path)
                 stack[-1][1].append({entry["title"].replace("`", ""): path})
-    told: Section = [{"Overview": COMMANDS}]
-    told += [{group: [{n: page_of(n).as_posix()} for n in names]} for group, names in commands.items()]
+    told: Section = [{"Overview": OVERVIEW}]
+    told += [{group: [{n: page_of(n)} for n in names]} for group, names in commands.items()]
     api: Section = [{"Overview": f"{FOLDER}/README.md"}]
     for module in modules:
         first, *more = module.pages

@@ -4,7 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
-from tools.site import commanded, reference, sources
+from tools.site import commands, reference, sources
 from tools.site.navigation import navigation
 from tools.site.tree import HOME, ROOT, collect, linked, links
 
@@ -29,12 +29,9 @@ def stage(folder: Path) -> Path:
     shutil.rmtree(folder, ignore_errors=True)
     pages, others = collect()
     to = folder / "pages"
-    commands = commanded.write(to)
-    named = {name for names in commands.values() for name in names}
     for page in pages:
-        inside = page.relative_to(ROOT)
-        text = commanded.with_links(_with_links_of_the_site(page), inside, named)
-        _write(to / inside, (FIRST if page == HOME else "") + text)
+        text = (FIRST if page == HOME else "") + _with_links_of_the_site(page)
+        _write(to / page.relative_to(ROOT), text)
     for path in (path for path in others if path.suffix in sources.PICTURES):
         _place(to / path.relative_to(ROOT)).write_bytes(path.read_bytes())
     modules = reference.modules()
@@ -48,7 +45,7 @@ def stage(folder: Path) -> Path:
         "INHERIT": str(Path(__file__).with_name("mkdocs.yml")),
         "docs_dir": str(to),
         "site_dir": str(folder / "html"),
-        "nav": navigation(modules, commands),
+        "nav": navigation(modules, commands.written(to)),
         "theme": {"logo": str(LOGO), "favicon": str(LOGO)},
         "plugins": {
             "mkdocstrings": {
