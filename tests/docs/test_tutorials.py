@@ -1,6 +1,7 @@
 """The tutorials, followed literally: their files are written, their commands are run in their order; and the examples
 of all commands."""
 
+import contextlib
 import re
 import shlex
 import shutil
@@ -16,20 +17,19 @@ from tests.docs.test_docs import DOCS, FENCE, ROOT, run
 from tests.places import free_endpoint
 
 from tvist_cli.main import GROUPS, OF_GROUPS, application, examples
-from tvist_client.blocking import Robot
 
 pytestmark = pytest.mark.realtime
 
 EXAMPLES = examples()
-PAGES = {
-    name: (DOCS / "tutorials" / f"{name}.md").read_text("utf-8") for name in ("program-in-ci", "your-log")
-}
-SHAPER = (DOCS / "tutorials" / "your-shaper.md").read_text("utf-8")
 COMPARED = (DOCS / "how-to" / "change-a-shaper.md").read_text("utf-8")
 WAVE = ROOT / "clients" / "examples" / "wave.script"
 SWEEP = 'shapers = ["zv"]\npayloads = [2.5]\nmoves = 2\n'
 SERVED = ("check", "move", "watch", "log record", "fleet", "stop", "unlock", "view")
 """Commands whose examples are about the robot of `serve`'s example."""
+
+
+def tutorial(name):
+    return (DOCS / "tutorials" / f"{name}.md").read_text("utf-8")
 
 
 def blocks(text, kind):
@@ -54,55 +54,36 @@ def commands(text):
         yield words, int(re.search(r"# exit code (\d)|$", line)[1] or 0)
 
 
-def pictures(text):
-    """Names of the figures that a page says its commands write."""
-    return re.findall(r"`(\w+/\w+\.png)`", text)
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_a_tutorial_says_and_leaves_what_its_commands_do(page, tmp_path):
-    folder, text, told = with_files(tmp_path, PAGES[page]), PAGES[page], ""
-    for words, code in commands(text):
-        at = words.index(">") if ">" in words else len(words)
-        ended = finished("-m", "tvist_cli", *words[:at], cwd=folder)
-        assert ended.returncode == code, ended.stdout + ended.stderr
-        told += " ".join([*ended.stdout.split(), *ended.stderr.split(), ""])
-        if words[at:]:
-            (folder / words[-1]).write_text(ended.stdout, encoding="utf-8")
-    for line in "".join(blocks(text, "text")[-3 if page == "program-in-ci" else 0 :]).splitlines():
-        assert line == "…" or " ".join(line.split()) in told
-    assert pictures(text)
-    assert all((folder / name).exists() for name in pictures(text))
-
-
-@pytest.mark.nightly
-def test_every_command_about_a_shaper_works_in_its_order(tmp_path, monkeypatch):
-    folder = with_files(tmp_path, SHAPER)
+@pytest.mark.parametrize(
+    "page", ["program-in-ci", "your-log", pytest.param("your-shaper", marks=pytest.mark.nightly)]
+)
+def test_a_tutorial_says_and_leaves_what_its_commands_do(page, tmp_path, monkeypatch):
+    text, told, served = tutorial(page), "", None
+    folder = with_files(tmp_path, text)
     monkeypatch.chdir(folder)
-    written = [words for words, _ in commands(SHAPER)]
-    before = written[: [words[0] for words in written].index("serve")]
-    (_, *how), *after = written[len(before) :]
-    said = [run("-m", "tvist_cli", *words, cwd=folder) for words in before]
-    with Served(*how) as served:
-        assert "shaper early" in served.said
-        for words in after:
-            if words[0] == "log":
+    with contextlib.ExitStack() as stack:
+        for words, code in commands(text):
+            at = words.index(">") if ">" in words else len(words)
+            if words[0] == "serve":
+                served = stack.enter_context(Served(*words[1:]))
+                continue
+            if words[0] == "log" and served is not None:
                 assert served.end(signal.SIGINT) == 0
-            at = [] if words[0] == "log" else ["--endpoint", served.endpoint]
-            said.append(run("-m", "tvist_cli", *words, *at, cwd=folder))
-            if words[0] == "move":
-                with Robot.connect(served.endpoint) as robot:
-                    chosen = words[words.index("--shaper") + 1] if "--shaper" in words else "early"
-                    assert robot.info().shaper == chosen
-                    assert "early" in robot.info().shapers
-    assert len(said) == 8
-    assert all(line in said[0] for line in blocks(SHAPER, "text")[0].splitlines())
-    assert all((folder / name).exists() for name in pictures(SHAPER))
-    assert "every state equal to the last bit" in said[-1]
+            where = ["--endpoint", served.endpoint] if words[0] == "move" else []
+            ended = finished("-m", "tvist_cli", *words[:at], *where, cwd=folder)
+            assert ended.returncode == code, ended.stdout + ended.stderr
+            told += " ".join([*ended.stdout.split(), *ended.stderr.split(), ""])
+            if words[at:]:
+                (folder / words[-1]).write_text(ended.stdout, encoding="utf-8")
+    for line in "".join(blocks(text, "text")[page == "program-in-ci" :]).splitlines():  # its first is a file
+        assert line == "…" or " ".join(line.split()) in told
+    pictures = re.findall(r"`(\w+/\w+\.png)`", text)
+    assert pictures
+    assert all((folder / name).exists() for name in pictures)
 
 
 def test_the_comparison_of_shapers_prints_what_the_page_says(tmp_path):
-    folder = with_files(tmp_path, SHAPER)
+    folder = with_files(tmp_path, tutorial("your-shaper"))
     (script,) = [text for text in blocks(COMPARED, "python") if "asyncio.run" in text]
     (folder / "compare.py").write_text(script, encoding="utf-8")
     assert run("-W", "error", "compare.py", cwd=folder) == blocks(COMPARED, "text")[0]

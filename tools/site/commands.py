@@ -36,14 +36,12 @@ def written(site: Path) -> dict[str, list[str]]:
     made = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)
     groups = dict(json.loads(made.stdout))
     names = {name for group in groups.values() for name in group}
+
+    def linked(it: re.Match[str]) -> str:
+        return f"[{it[0]}](../{page_of(it['command'])})" if it["command"] in names else it[0]
+
     overview = site / OVERVIEW
-    overview.write_text(
-        NAMED.sub(
-            lambda it: f"[{it[0]}](../{page_of(it['command'])})" if it["command"] in names else it[0],
-            overview.read_text(encoding="utf-8"),
-        ),
-        encoding="utf-8",
-    )
+    overview.write_text(NAMED.sub(linked, overview.read_text(encoding="utf-8")), encoding="utf-8")
     return groups
 
 
@@ -90,28 +88,21 @@ def page(command: str) -> str:
     usage, _, text = said.getvalue().strip().partition("\n")
     text, _, example = text.rpartition("Example: ")
     about, box, options = text.partition("## ")
-    block = example.strip("`\n ")
-    return (
-        f"# tvist {command}\n\n{about.strip()}\n\n```sh\n{block}\n```\n\nUsage: `{usage}`\n\n{box}{options}"
-    )
+    shown = f"```sh\n{example.strip('` ')}\n```\n\nUsage: `{usage}`"
+    return f"# tvist {command}\n\n{about.strip()}\n\n{shown}\n\n{box}{options}"
 
 
 def main() -> None:
-    """Write the pages, and print the commands by group, those of a command behind it, as JSON."""
-    from tvist_cli.main import GROUPS, OF_GROUPS, examples
+    """Write the pages, and print the commands by group as JSON."""
+    from tvist_cli.main import GROUPS, examples
 
-    groups: dict[str, list[str]] = {}
-    for group, commands in GROUPS.items():
-        names = [
-            name
-            for one in commands
-            for name in [one, *(f"{one} {inner}" for inner in OF_GROUPS.get(one, ()))]
-        ]
-        groups[group] = [name for name in names if name in examples()]
-        for name in groups[group]:
-            path = Path(sys.argv[1], page_of(name))
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(page(name), encoding="utf-8")
+    groups = {
+        group: [name for name in examples() if name.partition(" ")[0] in commands]
+        for group, commands in GROUPS.items()
+    }
+    Path(sys.argv[1], FOLDER).mkdir(parents=True, exist_ok=True)
+    for name in examples():
+        Path(sys.argv[1], page_of(name)).write_text(page(name), encoding="utf-8")
     print(json.dumps(groups))
 
 

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import tomllib
 from pathlib import Path
 
 from tools.site import commands, reference, sources
@@ -41,7 +42,9 @@ def stage(folder: Path) -> Path:
     _write(to / reference.FOLDER / "README.md", reference.overview(modules))
     _place(to / LOGO).write_bytes((ROOT / LOGO).read_bytes())
     shutil.copytree(ASSETS, to / "assets")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     configuration = {
+        "copyright": f"tvist {project['version']}, {project['license']}",
         "INHERIT": str(Path(__file__).with_name("mkdocs.yml")),
         "docs_dir": str(to),
         "site_dir": str(folder / "html"),
@@ -60,7 +63,7 @@ def stage(folder: Path) -> Path:
         },
     }
     if sources.REPOSITORY:
-        configuration |= {"repo_url": sources.REPOSITORY, "edit_uri": "edit/main/"}
+        configuration["repo_url"] = sources.REPOSITORY
     path = folder / "mkdocs.yml"
     _write(path, json.dumps(configuration, indent=2))  # JSON is YAML
     return path
