@@ -151,9 +151,7 @@ class TestBuilt:
             text = re.sub(r"<[^>]*>", "", (site / "html" / page).read_text(encoding="utf-8"))
             assert example in text
             assert f"Usage: tvist {command}" in text
-            assert page.name in (site / "html" / "cli" / "index.html").read_text(
-                "utf-8"
-            )
+            assert page.name in (site / "html" / "cli" / "index.html").read_text("utf-8")
         assert "--keep STR" in re.sub(
             r"<[^>]*>", "", (site / "html" / "commands" / "serve.html").read_text("utf-8")
         )
