@@ -1,17 +1,13 @@
 """The boxes with options that --help prints."""
 
-from typing import TYPE_CHECKING
-
 from cyclopts.help import DefaultFormatter, HelpEntry, HelpPanel
-
-if TYPE_CHECKING:
-    from rich.console import Console, ConsoleOptions
+from rich.console import Console, ConsoleOptions
 
 
 class HelpBoxes(DefaultFormatter):
     """Shows what is given by its place under one name; its option, `--target` of TARGET, works but needs no showing."""
 
-    def __call__(self, console: "Console", options: "ConsoleOptions", panel: HelpPanel) -> None:
+    def __call__(self, console: Console, options: ConsoleOptions, panel: HelpPanel) -> None:
         """Print a box of a help text."""
         super().__call__(console, options, panel.copy(entries=list(map(named_once, panel.entries))))
 
