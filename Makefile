@@ -61,7 +61,8 @@ format: setup
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-# The site is made from the files, in a small environment of its own; only the pages of the commands come from the program.
+# The site needs no package of tvist: it is made from the files. So its environment is a small one of its own.
+# Only the pages of the commands are made by the program, in its own environment.
 DOCS_READY := .venv-docs/.ready
 SITE := NO_MKDOCS_2_WARNING=1 .venv-docs/bin/python -m tools.site
 
