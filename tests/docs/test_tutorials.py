@@ -101,6 +101,12 @@ def test_help_has_an_example_in_80_columns_and_names_each_thing_once(command, tm
     assert not re.search(r"\[default: ?(\(\))?\]|\b([A-Z]+) --(?i:\2)\b", told)
 
 
+def test_the_list_of_commands_folds_at_80_columns(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    told = finished("-m", "tvist_cli", "--help").stdout.splitlines()
+    assert 60 < max(map(len, told)) <= 80
+
+
 def test_every_command_has_an_example():
     names = [name for group in GROUPS.values() for name in group if name != "log"]
     inside = [f"{name} {one}" for name, those in OF_GROUPS.items() for one in those]
