@@ -66,6 +66,7 @@ page:
 	cd view/page && npm ci --ignore-scripts --no-audit --no-fund && node build.mjs
 
 # The site needs no package of tvist: it is made from the files. So its environment is a small one of its own.
+# Only the pages of the commands are made by the program, in its own environment.
 DOCS_READY := .venv-docs/.ready
 SITE := NO_MKDOCS_2_WARNING=1 .venv-docs/bin/python -m tools.site
 
@@ -74,10 +75,10 @@ $(DOCS_READY): docs/requirements.lock
 	.venv-docs/bin/pip install --quiet --disable-pip-version-check --require-hashes -r docs/requirements.lock
 	@touch $@
 
-docs: $(DOCS_READY)
+docs: setup $(DOCS_READY)
 	$(SITE)
 
-docs-serve: $(DOCS_READY)
+docs-serve: setup $(DOCS_READY)
 	$(SITE) --serve
 
 COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \

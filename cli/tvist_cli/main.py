@@ -1,11 +1,16 @@
 """Entry point of the `tvist` program and its list of commands; each command is imported when it is called."""
 
 import os
+import shutil
 import signal
 import sys
+import textwrap
+import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tvist_cli.study_names import STUDY
@@ -84,8 +89,8 @@ def main() -> None:
 
 
 def _default(value: object) -> str | None:
-    """The default as a help text shows it: none for a switch that is off."""
-    if value is None or value is False:
+    """The default as a help text shows it: none for a switch that is off, or for what is empty."""
+    if value in (None, False, "", ()):
         return None
     return "on" if value is True else f"{value:g}" if isinstance(value, float) else str(value)
 
@@ -101,6 +106,7 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
 
     import cyclopts
 
+    from tvist_cli.help_boxes import HelpBoxes
     from tvist_cli.misuse import check_whole, finite
 
     app = cyclopts.App(
@@ -108,13 +114,16 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
         help=ABOUT,
         version=version("tvist"),
         help_format="markdown",  # joins the lines of a docstring
+        help_formatter=HelpBoxes(),
         default_parameter=cyclopts.Parameter(negative=(), validator=finite, show_default=_default),
         config=check_whole,
         suppress_keyboard_interrupt=False,  # `main` says that it was interrupted
     )
     _add(app, "tvist_cli.commands", COMMANDS, called[:1])
     for name, commands in OF_GROUPS.items():
-        group = cyclopts.App(name=name, help=COMMANDS[name], sort_key=list(COMMANDS).index(name))
+        group = cyclopts.App(
+            name=name, help=COMMANDS[name], sort_key=list(COMMANDS).index(name), help_epilogue=_example(name)
+        )
         app.command(group)
         _add(group, f"tvist_cli.commands.{name}", commands, called[1:2] if called[:1] == [name] else ())
         if name == "study":
@@ -125,18 +134,29 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
 
 def _overview() -> str:
     """Return the help of the program, made without the parser, which takes longer to import."""
-    width = max(map(len, COMMANDS)) + 2
-    lines = ["Usage: tvist COMMAND", "", ABOUT, ""]
-    for group, commands in GROUPS.items():
-        lines += [f"{group}:", *(f"  {name:<{width}}{what}" for name, what in commands.items()), ""]
-    return "\n".join(
-        [
-            *lines,
-            "Options:",
-            f"  {'--help':<{width}}Print this list; after a command, print what it does and its options.",
-            f"  {'--version':<{width}}Print the version.",
-        ]
-    )
+    indent, columns = " " * (max(map(len, COMMANDS)) + 4), min(shutil.get_terminal_size().columns, 120)
+    lines = ["Usage: tvist COMMAND", "", *textwrap.wrap(ABOUT, columns), ""]
+    options = {
+        "--help": "Print this list; after a command, print what it does and its options.",
+        "--version": "Print the version.",
+    }
+    for group, commands in {**GROUPS, "Options": options}.items():
+        lines.append(f"{group}:")
+        for name, what in commands.items():
+            first = f"  {name}".ljust(len(indent))
+            lines += textwrap.wrap(what, columns, initial_indent=first, subsequent_indent=indent)
+        lines.append("")
+    return "\n".join(lines[:-1])
+
+
+@cache
+def examples() -> dict[str, str]:
+    """Return a command line for each command that does something by itself, by its words such as `log analyze`."""
+    return tomllib.loads(Path(__file__).with_name("examples.toml").read_text(encoding="utf-8"))
+
+
+def _example(command: str) -> str | None:
+    return f"Example: `{examples()[command]}`" if command in examples() else None
 
 
 def _known(chain: Sequence[str]) -> Mapping[str, str]:
@@ -149,7 +169,11 @@ def _add(app: "cyclopts.App", package: str, commands: Mapping[str, str], called:
         if name in OF_GROUPS:
             continue
         app.command(
-            f"{package}.{name}:{name}", name=name, help=None if name in called else what, sort_key=place
+            f"{package}.{name}:{name}",
+            name=name,
+            help=None if name in called else what,
+            help_epilogue=_example(" ".join([*package.split(".")[2:], name])),
+            sort_key=place,
         )
 
 

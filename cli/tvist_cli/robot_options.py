@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Annotated, Any, TypeVar
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 from msgspec import inspect as types
 from msgspec.structs import FieldInfo, fields
 
@@ -15,6 +15,23 @@ from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.config_file import from_mapping, read_toml
 
 Command = TypeVar("Command", bound=Callable[..., object])
+_BOXES = {
+    "Robot": "name robot robots workers profile start state programs",
+    "Arm and shaper": (
+        "plant cell payload overload calibration shaper shape_servo quiet floor compensate_sag seed truth"
+    ),
+    "Clock": "clock speed realtime_priority processor lock_memory",
+    "Recording": "record keep dump",
+    "Network": "listen connect namespace metrics security insecure",
+    "UR's interfaces": "ur ur_address ur_ports ur_allow",
+}
+"""The boxes of the help, each with its fields."""
+_BOX_OF = {
+    field: box
+    for name, inside in _BOXES.items()
+    for box in [Group.create_ordered(name)]
+    for field in inside.split()
+}
 _IN_ANY_CASE = ("profile", "shaper", "clock")
 
 
@@ -69,7 +86,7 @@ def _option(field: FieldInfo) -> inspect.Parameter:
     name = "ur-port" if field.name == "ur_ports" else field.name.replace("_", "-")
     # What a profile may switch on can be switched off.
     negative = f"--no-{name}" if read is bool and kind is not may_be else ()
-    about = Parameter(name=f"--{name}", negative=negative, help=_help(field))
+    about = Parameter(name=f"--{name}", negative=negative, help=_help(field), group=_BOX_OF[field.name])
     return inspect.Parameter(
         field.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[read | None, about]
     )

@@ -1,7 +1,7 @@
 """`python -m tvist_protocol.generate`: everything in `protocol/` that is made from the message types.
 
-The tables of README.md, `schemas/`, `asyncapi.json`, and the MessagePack beside each golden message. Runs in
-a checkout, and needs the `msgpack` package: golden bytes must not come from the codec they are to test.
+The tables of README.md and messages.md, `schemas/`, `asyncapi.json`, and the MessagePack beside each golden message.
+Runs in a checkout, and needs the `msgpack` package: golden bytes must not come from the codec they are to test.
 """
 
 import json
@@ -17,22 +17,26 @@ from tvist_protocol.tables import tables
 
 FOLDER = Path(__file__).parents[1]
 """`protocol/` in a checkout."""
+SENT = {"commands", "setpoint", "parts"}
+"""The tables of messages.md; the others are in README.md."""
 
 
 def generated(folder: Path) -> dict[Path, bytes]:
     """Return the content that every generated file should have, by its path.
 
     Args:
-        folder: `protocol/`, whose README.md and golden JSON are read.
+        folder: `protocol/`, whose two pages and golden JSON are read.
 
     Raises:
-        ValueError: README.md and the tables do not have the same names.
+        ValueError: A page and its tables do not have the same names.
     """
     files = {folder / "asyncapi.json": _json(asyncapi())}
     files |= {folder / "schemas" / f"{tag(kind)}.json": _json(json_schema(kind)) for kind in MESSAGES}
     files |= {source.with_suffix(".msgpack"): _msgpack(source) for source in golden(folder)}
-    readme = folder / "README.md"
-    files[readme] = filled(readme.read_text(encoding="utf-8"), tables()).encode()
+    parts = tables()
+    for page, names in {"messages.md": SENT, "README.md": parts.keys() - SENT}.items():
+        text = (folder / page).read_text(encoding="utf-8")
+        files[folder / page] = filled(text, {name: parts[name] for name in names}).encode()
     return files
 
 

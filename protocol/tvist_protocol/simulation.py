@@ -48,7 +48,7 @@ class SimulationStep(ClientMessage, frozen=True, kw_only=True, tag="simulation.s
 
 
 class SimulationInject(ClientMessage, frozen=True, kw_only=True, tag="simulation.inject"):
-    """Cause one of the [faults](#faults) on purpose."""
+    """Cause one of the faults on purpose."""
 
     token: Token
     """Token of the lease."""

@@ -2,6 +2,7 @@
 
 import doctest
 import functools
+import html
 import importlib.util
 import itertools
 import json
@@ -25,7 +26,15 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 TUTORIAL = DOCS / "tutorials" / "first-motion.md"
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
-LINKED = sorted({*PAGES, *ROOT.glob("*.md"), *ROOT.glob("*/README.md"), *ROOT.glob("*/*/README.md")})
+LINKED = sorted(
+    {
+        *PAGES,
+        *ROOT.glob("*.md"),
+        *ROOT.glob("*/README.md"),
+        *ROOT.glob("*/*/README.md"),
+        ROOT / "protocol" / "messages.md",
+    }
+)
 ENDPOINT = "tcp/127.0.0.1:7447"
 
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
@@ -93,12 +102,18 @@ class TestLinks:
             "importlinter"
         ]
         layers = [layer.split(" | ") for layer in contracts["contracts"][0]["layers"]]
-        text = (DOCS / "explanations" / "architecture.md").read_text(encoding="utf-8")
-        (picture,) = [
-            match["text"] for match in FENCE.finditer(text) if match["text"].startswith(" tvist_cli")
-        ]
-        drawn = [re.findall(r"tvist_\w+", line) for line in picture.splitlines()]
+        picture = (DOCS / "images" / "architecture.svg").read_text(encoding="utf-8")
+        rows = [re.findall(r">(tvist_\w+)<", line) for line in picture.splitlines()]
+        drawn = [row for row in rows if row]
         assert drawn == layers
+
+    def test_the_picture_of_the_protocol_has_its_keys_and_who_sends_them(self):
+        text = (ROOT / "protocol" / "README.md").read_text(encoding="utf-8")
+        keys = dict(re.findall(r"^\| `tvist/<robot>/([^`]+)` \| \w+ \| (\w+) \|", text, re.MULTILINE))
+        picture = (DOCS / "images" / "protocol.svg").read_text(encoding="utf-8")
+        arrows = re.findall(r'd="M(150|600),\d+H\d+"/>\n<text[^>]*>([^<]+)<', picture)
+        drawn = {html.unescape(key): "client" if x == "150" else "server" for x, key in arrows}
+        assert drawn == keys
 
     def test_the_readme_counts_what_the_paper_page_does_not_match(self):
         rows = re.findall(
@@ -259,7 +274,7 @@ class TestSnippets:
         if "import urx" in text:
             pytest.importorskip("urx")  # needs older packages than this project
         if "mine.py" in text:
-            pytest.skip("test_own_shaper.py runs it beside its file")
+            pytest.skip("test_tutorials.py runs it beside its file")
         if "first.mcap" in text:
             folder = request.getfixturevalue("story")[0]
         script = tmp_path / "test_snippet.py"

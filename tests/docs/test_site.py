@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 from markdown_it import MarkdownIt
-from tools.site import navigation, reference, sources, stage, tree
+from tools.site import commands, navigation, reference, sources, stage, tree
+
+from tvist_cli.main import examples
 
 ROOT = Path(__file__).parents[2]
 BUILDER = ROOT / ".venv-docs" / "bin" / "python"
@@ -33,7 +35,7 @@ def listed(section):
 
 def test_the_navigation_names_every_page_once(collected):
     pages, _ = collected
-    nav = list(listed(navigation.navigation([])))
+    nav = list(listed(navigation.navigation([], {})))
     assert len(nav) == len(set(nav))
     named = {path.relative_to(ROOT).as_posix() for path in pages}
     assert named - set(nav) <= {
@@ -43,9 +45,9 @@ def test_the_navigation_names_every_page_once(collected):
 
 
 def test_the_navigation_has_the_kinds_of_documents():
-    titles = [title for item in navigation.navigation([]) for title in item]
-    kinds = ["Tutorials", "How-to guides", "Explanations", "Reference", "Decisions", "Packages", "Project"]
-    assert titles == ["Home", *kinds, "API"]
+    titles = [title for item in navigation.navigation([], {}) for title in item]
+    kinds = ["Tutorials", "How-to guides", "Explanations", "Reference", "Commands", "API", "Project"]
+    assert titles == ["Home", *kinds]
 
 
 def test_every_package_that_is_imported_has_a_page():
@@ -55,18 +57,22 @@ def test_every_package_that_is_imported_has_a_page():
     assert not [module.name for module in modules if not module.about]
 
 
-def test_a_link_to_a_source_file_leads_to_its_page(collected):
-    _, others = collected
-    sink = ROOT / "controller" / "tvist_controller" / "reporting" / "sink.py"
-    assert sink in others
-    assert sources.page_of(sink).as_posix() == "controller/tvist_controller/reporting/sink.py.md"
-    assert sink.read_text(encoding="utf-8").rstrip() in sources.shown(sink)
+@pytest.mark.parametrize(
+    ("repository", "shown"),
+    [("", "see ci, or x"), ("https://h/o/r", "see [ci](https://h/o/r/blob/main/.ci/run), or x")],
+)
+def test_a_link_to_a_source_file_leads_to_the_repository(repository, shown, monkeypatch):
+    monkeypatch.setattr(sources, "REPOSITORY", repository)
+    text = "see [ci](.ci/run), or x"
+    (link,) = tree.links(text)
+    assert sources.to_repository(text, link.start(), link.end(), ROOT / ".ci" / "run") == shown
 
 
 @pytest.mark.parametrize(
     ("text", "targets"),
     [
         ("see [a](b.md) and ![c](d.png)", ["b.md", "d.png"]),
+        ('<source srcset="a.webp"> <img src="b.gif">', ["a.webp", "b.gif"]),
         ("`[a](b.md)` is code", []),
         ("```md\n[a](b.md)\n```\n[`x`](y.md#z)", ["y.md#z"]),
         ("[out](https://example.org)", []),
@@ -118,14 +124,42 @@ class TestBuilt:
                 assert article.count(f"<{tag}>") == shown.count(f"<{tag}>"), f"{inside}: {tag}"
 
     def test_what_a_package_exports_is_on_its_page(self, site):
-        page = (site / "html" / "api" / "tvist_client.html").read_text(encoding="utf-8")
-        for name in ("Robot", "Arm", "Motion", "RefusedError"):
+        for part, name in {
+            "robot": "Robot",
+            "arm": "Arm",
+            "motion": "Motion",
+            "errors": "RefusedError",
+        }.items():
+            page = (site / "html" / "api" / f"tvist_client-{part}.html").read_text(encoding="utf-8")
             assert f'id="tvist_client.{name}"' in page
+
+    def test_the_blocking_client_is_there_with_its_arguments(self, site):
+        page = (site / "html" / "api" / "tvist_client.blocking.html").read_text(encoding="utf-8")
+        of = page.partition('id="tvist_client.blocking.Arm.move_j"')[2].partition("<h3")[0]
+        for argument in ("q", "velocity", "acceleration", "jerk", "duration"):
+            assert f"<code>{argument}</code>" in of
+
+    def test_no_page_is_a_source_file_or_a_wall(self, site):
+        pages = list((site / "html").rglob("*.html"))
+        assert not [page for page in pages if re.search(r"\.(py|toml|json|yaml)\.html$|\._", page.name)]
+        for page in (site / "html" / "api").glob("*.html"):
+            assert len(re.sub(r"<[^>]*>", " ", page.read_text(encoding="utf-8")).split()) < 8000, page.name
+
+    def test_every_command_has_its_page_with_an_example_and_its_options(self, site):
+        for command, example in examples().items():
+            page = Path(commands.page_of(command)).with_suffix(".html")
+            text = re.sub(r"<[^>]*>", "", (site / "html" / page).read_text(encoding="utf-8"))
+            assert example in text
+            assert f"Usage: tvist {command}" in text
+            assert page.name in (site / "html" / "cli" / "index.html").read_text("utf-8")
+        assert "--keep STR" in re.sub(
+            r"<[^>]*>", "", (site / "html" / "commands" / "serve.html").read_text("utf-8")
+        )
 
     def test_the_search_knows_the_pages(self, site):
         text = (site / "html" / "search" / "search_index.js").read_text(encoding="utf-8")
         found = json.loads(text.removeprefix("var __index = "))
-        assert {"docs/tutorials/first-motion.html", "api/tvist_shaping.html"} <= {
+        assert {"docs/tutorials/first-motion.html", "api/tvist_shaping.html", "commands/move.html"} <= {
             entry["location"].partition("#")[0] for entry in found["docs"]
         }
 

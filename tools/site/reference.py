@@ -1,7 +1,10 @@
-"""Pages of the API reference, one for each module that other people import, filled from its docstrings."""
+"""Pages of the API reference, one for each module that other people import, filled from its docstrings.
+
+What a module exports from many others is a page for each of these, below the module's.
+"""
 
 import ast
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from tools.site.tree import ROOT
@@ -10,6 +13,9 @@ PROGRAMS = {"tvist_cli", "tvist_server", "tvist_view"}
 """Packages that are run and not imported. Every other package has an API."""
 FOLDER = "api"
 """Folder of these pages in the site."""
+MANY = 15
+"""A module that exports more has a page for each module that it exports from."""
+SHOWN = "    options: { show_root_heading: true, show_root_toc_entry: true }\n"
 
 
 @dataclass(frozen=True)
@@ -22,43 +28,77 @@ class Module:
     """Folder that contains its package."""
     about: str
     """First line of its docstring, without the full stop."""
+    parts: dict[str, list[str]] = field(default_factory=dict)
+    """What it exports, by the module that it comes from; empty if it all stands on one page."""
 
     @property
     def page(self) -> Path:
         """Path of its page in the site."""
         return Path(FOLDER, f"{self.name}.md")
 
+    @property
+    def pages(self) -> dict[Path, str]:
+        """Its pages with their text in Markdown, the places that MkDocs fills included."""
+        if not self.parts:
+            return {self.page: f"# `{self.name}`\n\n::: {self.name}\n"}
+        rows, found = "", dict[Path, str]()
+        for part, names in self.parts.items():
+            path = Path(FOLDER, f"{self.name}-{part}.md")
+            links = ", ".join(f"[`{name}`]({path.name}#{self.name}.{name})" for name in names)
+            rows += f"| [{part}]({path.name}) | {links} |\n"
+            filled = "\n".join(f"::: {self.name}.{name}\n{SHOWN}" for name in names)
+            found[path] = f"# `{self.name}`: {part}\n\nImport these from `{self.name}`.\n\n{filled}"
+        return {
+            self.page: f"# `{self.name}`\n\n{self.about}.\n\n| part | exports |\n|---|---|\n{rows}"
+        } | found
+
 
 def modules() -> list[Module]:
     """Return the modules with a page, by name.
 
-    These are the modules that say in `__all__` what they export. A package without any such module has a page for each
-    module that is not private.
+    These are the modules that say in `__all__` what they export, in a package without any such module all; never
+    private ones.
     """
     found: list[Module] = []
     for package in sorted(ROOT.glob("*/tvist_*/__init__.py"), key=lambda path: path.parent.name):
         root = package.parent.parent
         if package.parent.name in PROGRAMS:
             continue
-        parsed = {path: ast.parse(path.read_text(encoding="utf-8")) for path in package.parent.rglob("*.py")}
-        exporting = {path: tree for path, tree in parsed.items() if _exports(tree)}
-        shown = exporting or {path: tree for path, tree in parsed.items() if not path.stem.startswith("_")}
-        for path, tree in shown.items():
+        public = [
+            path
+            for path in package.parent.rglob("*.py")
+            if path.stem == "__init__" or not path.stem.startswith("_")
+        ]
+        parsed = {path: ast.parse(path.read_text(encoding="utf-8")) for path in public}
+        exporting = {path: exports for path, tree in parsed.items() if (exports := _exports(tree))}
+        for path in exporting or parsed:
             parts = path.relative_to(root).with_suffix("").parts
             name = ".".join(part for part in parts if part != "__init__")
-            about = (ast.get_docstring(tree) or "").partition("\n")[0].rstrip(".")
-            found.append(Module(name, root, about))
+            about = (ast.get_docstring(parsed[path]) or "").partition("\n")[0].rstrip(".")
+            exports = exporting.get(path, set())
+            split = _origins(parsed[path], exports) if len(exports) > MANY else {}
+            found.append(Module(name, root, about, split))
     return sorted(found, key=lambda module: module.name)
 
 
-def _exports(tree: ast.Module) -> bool:
-    targets = [target for node in tree.body if isinstance(node, ast.Assign) for target in node.targets]
-    return any(isinstance(target, ast.Name) and target.id == "__all__" for target in targets)
+def _exports(tree: ast.Module) -> set[str]:
+    """Names in `__all__`."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and any(
+            isinstance(target, ast.Name) and target.id == "__all__" for target in node.targets
+        ):
+            return set(ast.literal_eval(node.value))
+    return set()
 
 
-def page(module: Module) -> str:
-    """Return a module's page, in Markdown, with the place that MkDocs fills."""
-    return f"# `{module.name}`\n\n::: {module.name}\n"
+def _origins(tree: ast.Module, exports: set[str]) -> dict[str, list[str]]:
+    """The names of an `__all__`, by the last word of the module that they are imported from."""
+    found: dict[str, list[str]] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names = [one.asname or one.name for one in node.names]
+            found.setdefault(node.module.rpartition(".")[2], []).extend(sorted(exports.intersection(names)))
+    return {part: names for part, names in sorted(found.items()) if names}
 
 
 def overview(listed: list[Module]) -> str:

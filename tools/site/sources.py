@@ -1,35 +1,33 @@
-"""Pages for what is linked and is no page: source files, and folders."""
+"""Where a link leads that is to no page of the site: to a picture, or to the repository."""
 
 import os
+import re
 from pathlib import Path
 
 from tools.site.tree import ROOT
 
-LANGUAGES = {".py": "python", ".toml": "toml", ".json": "json", ".yaml": "yaml", ".yml": "yaml"}
-"""How to highlight files, by their ending; others are shown as text."""
-SHOWN_AS_IS = {".png", ".gif", ".svg"}
+PICTURES = {".png", ".gif", ".svg", ".webp"}
 """Endings of files that a browser shows by itself: they are copied."""
+REPOSITORY = os.environ.get("TVIST_REPOSITORY", "")
+"""Address of the repository, to which links to its files lead; without it they are plain text."""
 
 
-def page_of(path: Path) -> Path:
-    """Return where the site shows a file or folder that is no page, relative to the repository."""
-    inside = path.relative_to(ROOT)
-    if path.suffix in SHOWN_AS_IS:
-        return inside
-    return inside / "folder.md" if path.is_dir() else inside.with_name(f"{inside.name}.md")
+def to_repository(text: str, start: int, end: int, path: Path) -> str:
+    """Return a page's text with a link to a file or folder that is no page changed.
 
-
-def shown(path: Path) -> str:
-    """Return the page of a source file or folder, in Markdown."""
-    name = path.relative_to(ROOT)
-    # These pages repeat what others explain, so the search leaves them out.
-    head = f"---\nsearch:\n  exclude: true\n---\n\n# `{name}`\n\n"
-    if path.is_dir():
-        inside = sorted(entry for entry in path.iterdir() if not entry.name.startswith(("_", ".")))
-        return head + "".join(f"- `{entry.name}{'/' if entry.is_dir() else ''}`\n" for entry in inside)
-    text = path.read_text(encoding="utf-8")
-    fence = "`" * 6
-    return f"{head}{fence}{LANGUAGES.get(path.suffix, 'text')}\n{text.rstrip()}\n{fence}\n"
+    Args:
+        text: Text of the page.
+        start: Where the link's target begins.
+        end: Where it ends.
+        path: The file or folder.
+    """
+    if REPOSITORY:
+        kind = "tree" if path.is_dir() else "blob"
+        address = f"{REPOSITORY}/{kind}/main/{path.relative_to(ROOT).as_posix()}"
+        return text[:start] + address + text[end:]
+    opens = re.compile(r"\[[^\[\]]*\]\($").search(text[:start])
+    assert opens is not None, text[:end][-80:]
+    return text[: opens.start()] + opens[0][1:-2] + text[end + 1 :]
 
 
 def way(page: Path, to: Path) -> str:

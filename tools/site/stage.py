@@ -2,13 +2,17 @@
 
 import json
 import shutil
+import tomllib
 from pathlib import Path
 
-from tools.site import reference, sources
+from tools.site import commands, reference, sources
 from tools.site.navigation import navigation
-from tools.site.tree import ROOT, collect, linked, links
+from tools.site.tree import HOME, ROOT, collect, linked, links
 
 ASSETS = Path(__file__).parent / "assets"
+LOGO = Path("docs/images/logo.svg")
+FIRST = "---\nhide: [navigation, toc]\n---\n\n"
+"""What stands above the front page: it has the whole width."""
 
 
 def stage(folder: Path) -> Path:
@@ -27,22 +31,25 @@ def stage(folder: Path) -> Path:
     pages, others = collect()
     to = folder / "pages"
     for page in pages:
-        _write(to / page.relative_to(ROOT), _with_links_of_the_site(page))
-    for path in others:
-        if path.suffix in sources.SHOWN_AS_IS:
-            _place(to / sources.page_of(path)).write_bytes(path.read_bytes())
-        else:
-            _write(to / sources.page_of(path), sources.shown(path))
+        text = (FIRST if page == HOME else "") + _with_links_of_the_site(page)
+        _write(to / page.relative_to(ROOT), text)
+    for path in (path for path in others if path.suffix in sources.PICTURES):
+        _place(to / path.relative_to(ROOT)).write_bytes(path.read_bytes())
     modules = reference.modules()
     for module in modules:
-        _write(to / module.page, reference.page(module))
+        for path, text in module.pages.items():
+            _write(to / path, text)
     _write(to / reference.FOLDER / "README.md", reference.overview(modules))
+    _place(to / LOGO).write_bytes((ROOT / LOGO).read_bytes())
     shutil.copytree(ASSETS, to / "assets")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     configuration = {
+        "copyright": f"tvist {project['version']}, {project['license']}",
         "INHERIT": str(Path(__file__).with_name("mkdocs.yml")),
         "docs_dir": str(to),
         "site_dir": str(folder / "html"),
-        "nav": navigation(modules),
+        "nav": navigation(modules, commands.written(to)),
+        "theme": {"logo": str(LOGO), "favicon": str(LOGO)},
         "plugins": {
             "mkdocstrings": {
                 "handlers": {
@@ -55,6 +62,8 @@ def stage(folder: Path) -> Path:
             }
         },
     }
+    if sources.REPOSITORY:
+        configuration["repo_url"] = sources.REPOSITORY
     path = folder / "mkdocs.yml"
     _write(path, json.dumps(configuration, indent=2))  # JSON is YAML
     return path
@@ -65,12 +74,10 @@ def _with_links_of_the_site(page: Path) -> str:
     for match in reversed(links(text)):
         target, mark, anchor = match["target"].partition("#")
         path = linked(page, target)
-        if path.suffix == ".md":
-            shown = path.relative_to(ROOT)
-        else:
-            shown, mark, anchor = sources.page_of(path), "", ""
-        if target:
-            way = sources.way(page.relative_to(ROOT), shown)
+        if path.suffix != ".md" and path.suffix not in sources.PICTURES:
+            text = sources.to_repository(text, match.start(), match.end(), path)
+        elif target:
+            way = sources.way(page.relative_to(ROOT), path.relative_to(ROOT))
             text = text[: match.start()] + way + mark + anchor + text[match.end() :]
     return text
 

@@ -9,8 +9,8 @@ INDEX = ROOT / "docs" / "README.md"
 
 CODE = re.compile(r"^(?P<indent> *)```.*?^(?P=indent)```$|`[^`\n]+`", re.MULTILINE | re.DOTALL)
 """Fenced blocks and spans of code."""
-LINK = re.compile(r"(?<=\]\()(?P<target>[^)\s]+)(?=\))")
-"""Targets of links and images."""
+LINK = re.compile(r"""(?:(?<=\]\()|(?<= src=")|(?<= srcset="))(?P<target>[^)"\s]+)(?=[)"])""")
+"""Targets of links and images; images also in HTML."""
 OUTSIDE = ("http://", "https://", "mailto:")
 
 

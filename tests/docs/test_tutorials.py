@@ -1,0 +1,161 @@
+"""The tutorials, followed literally: their files are written, their commands are run in their order; and the examples
+of all commands."""
+
+import contextlib
+import re
+import shlex
+import shutil
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from tests import forked
+from tests.conformance.served import Served, finished
+from tests.docs.test_docs import DOCS, FENCE, ROOT, run
+from tests.places import free_endpoint
+
+from tvist_cli.main import GROUPS, OF_GROUPS, application, examples
+
+pytestmark = pytest.mark.realtime
+
+EXAMPLES = examples()
+COMPARED = (DOCS / "how-to" / "change-a-shaper.md").read_text("utf-8")
+WAVE = ROOT / "clients" / "examples" / "wave.script"
+SWEEP = 'shapers = ["zv"]\npayloads = [2.5]\nmoves = 2\n'
+SERVED = ("check", "move", "watch", "log record", "fleet", "stop", "unlock", "view")
+"""Commands whose examples are about the robot of `serve`'s example."""
+
+
+def tutorial(name):
+    return (DOCS / "tutorials" / f"{name}.md").read_text("utf-8")
+
+
+def blocks(text, kind):
+    return [match["text"] for match in FENCE.finditer(text) if match["kind"] == kind]
+
+
+def with_files(folder, text):
+    """A folder with the files that a page has its readers save."""
+    for name, written in re.findall(
+        r"^Save this as `([\w.]+)`.*?^```\w+\n(.*?)^```$", text, re.MULTILINE | re.DOTALL
+    ):
+        (folder / name).write_text(written, encoding="utf-8")
+    shutil.copy(WAVE, folder)
+    return folder
+
+
+def commands(text):
+    """The words of a page's commands, and the exit code that it says."""
+    for line in "".join(blocks(text, "sh")).splitlines():
+        program, *words = shlex.split(line, comments=True)
+        assert program == "tvist"
+        yield words, int(re.search(r"# exit code (\d)|$", line)[1] or 0)
+
+
+@pytest.mark.parametrize(
+    "page", ["program-in-ci", "your-log", pytest.param("your-shaper", marks=pytest.mark.nightly)]
+)
+def test_a_tutorial_says_and_leaves_what_its_commands_do(page, tmp_path, monkeypatch):
+    text, told, served = tutorial(page), "", None
+    folder = with_files(tmp_path, text)
+    monkeypatch.chdir(folder)
+    with contextlib.ExitStack() as stack:
+        for words, code in commands(text):
+            at = words.index(">") if ">" in words else len(words)
+            if words[0] == "serve":
+                served = stack.enter_context(Served(*words[1:]))
+                continue
+            if words[0] == "log" and served is not None:
+                assert served.end(signal.SIGINT) == 0
+            where = ["--endpoint", served.endpoint] if words[0] == "move" else []
+            ended = finished("-m", "tvist_cli", *words[:at], *where, cwd=folder)
+            assert ended.returncode == code, ended.stdout + ended.stderr
+            told += " ".join([*ended.stdout.split(), *ended.stderr.split(), ""])
+            if words[at:]:
+                (folder / words[-1]).write_text(ended.stdout, encoding="utf-8")
+    for line in "".join(blocks(text, "text")[page == "program-in-ci" :]).splitlines():  # its first is a file
+        assert line == "…" or " ".join(line.split()) in told
+    pictures = re.findall(r"`(\w+/\w+\.png)`", text)
+    assert pictures
+    assert all((folder / name).exists() for name in pictures)
+
+
+def test_the_comparison_of_shapers_prints_what_the_page_says(tmp_path):
+    folder = with_files(tmp_path, tutorial("your-shaper"))
+    (script,) = [text for text in blocks(COMPARED, "python") if "asyncio.run" in text]
+    (folder / "compare.py").write_text(script, encoding="utf-8")
+    assert run("-W", "error", "compare.py", cwd=folder) == blocks(COMPARED, "text")[0]
+
+
+@pytest.mark.parametrize("command", EXAMPLES)
+def test_help_has_an_example_in_80_columns_and_names_each_thing_once(command, tmp_path):
+    words, said = command.split(), tmp_path / "help"
+    with said.open("w", encoding="utf-8") as stream:
+        application(words).help_print(words, console=Console(file=stream, width=80))
+    told = said.read_text(encoding="utf-8")
+    assert f"Example: {EXAMPLES[command]}"[:80] in told
+    assert EXAMPLES[command].split()[: len(words) + 1] == ["tvist", *words]
+    assert max(map(len, told.splitlines())) <= 80
+    assert not re.search(r"\[default: ?(\(\))?\]|\b([A-Z]+) --(?i:\2)\b", told)
+
+
+def test_the_list_of_commands_folds_at_80_columns(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    told = finished("-m", "tvist_cli", "--help").stdout.splitlines()
+    assert 60 < max(map(len, told)) <= 80
+
+
+def test_every_command_has_an_example():
+    names = [name for group in GROUPS.values() for name in group if name != "log"]
+    inside = [f"{name} {one}" for name, those in OF_GROUPS.items() for one in those]
+    assert sorted(EXAMPLES) == sorted(names + inside)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with what examples read."""
+    folder = with_files(tmp_path_factory.mktemp("examples"), "")
+    (folder / "sweep.toml").write_text(SWEEP, encoding="utf-8")
+    shutil.copy(Path(__file__).parents[1] / "journals" / "live_moves.mcap", folder / "first.mcap")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def served(place):
+    """The robot of `serve`'s example."""
+    how = shlex.split(EXAMPLES["serve"].replace("first.mcap", str(place / "served.mcap")))[2:]
+    with Served(*how) as robot:
+        yield robot
+
+
+def until(sign, *words, cwd):
+    """Run a program until it says a word on stderr, then interrupt it."""
+    with forked.Popen([sys.executable, "-m", "tvist_cli", *words], stderr=-1, text=True, cwd=cwd) as process:
+        said = ""
+        while sign not in said:
+            line = process.stderr.readline()
+            assert line, said
+            said += line
+        process.send_signal(signal.SIGINT)
+        assert process.wait() in (0, 130)
+
+
+@pytest.mark.parametrize("command", [name for name in EXAMPLES if name not in ("demo", "serve")])
+def test_the_example_works(command, place, request):
+    """Those of `serve` and `demo` are run by the fixture, and by a test of the command line."""
+    words = shlex.split(EXAMPLES[command])[1:]
+    if command in SERVED:
+        endpoint = request.getfixturevalue("served").endpoint
+        words += [endpoint] if command in ("check", "watch", "unlock", "view") else ["--endpoint", endpoint]
+    if command == "view":
+        until("http://", *words, "--port", "0", cwd=place)
+    elif command == "router":
+        until("listens", *words, "--listen", free_endpoint(), cwd=place)
+    else:
+        assert run("-m", "tvist_cli", *words, cwd=place) or command in (
+            "log report",
+            "log export",
+            "log record",
+        )
