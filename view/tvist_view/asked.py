@@ -16,6 +16,10 @@ class Setting(Asked, frozen=True):
     """A message that changes a setting, also while the arm moves."""
 
 
+class Seen(Asked, tag="seen", frozen=True):
+    """The last picture has been drawn: the next one may come."""
+
+
 class Stop(Asked, tag="stop", frozen=True):
     """Stop the arm, whoever moves it."""
 
@@ -91,6 +95,8 @@ class Ready(Setting, tag="ready", frozen=True):
     """Release what a client can release, and switch the power on."""
 
 
-Message = Stop | Take | Give | Show | Move | Compare | Jog | Shape | Speed | Declare | Carry | Fault | Ready
+Message = (
+    Seen | Stop | Take | Give | Show | Move | Compare | Jog | Shape | Speed | Declare | Carry | Fault | Ready
+)
 read = msgspec.json.Decoder(Message).decode
 """Reads a message; raises `msgspec.ValidationError` or `msgspec.DecodeError`."""

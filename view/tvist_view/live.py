@@ -54,7 +54,9 @@ class LivePage:
                 except msgspec.MsgspecError as error:
                     watcher.say(f"the page asked for what cannot be done: {error}")
                     continue
-                if isinstance(message, asked.Show):
+                if isinstance(message, asked.Seen):
+                    watcher.free = True
+                elif isinstance(message, asked.Show):
                     await shown.go(watcher)
                     shown = self._robot(message.name)
                     shown.come(watcher)

@@ -28,6 +28,8 @@ class Watcher:
     waiting: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
     status: dict[str, Any] = field(default_factory=dict)
     count: int = 0
+    free: bool = True
+    """Whether the tab has drawn its last picture. What waits in a slow browser would delay all that comes later."""
 
     def put(self, kind: str, content: dict[str, Any]) -> None:
         """Have a message sent with the next picture."""
@@ -52,8 +54,9 @@ class Watcher:
                 await self.tab.send("status", status)
             running = robot.running
             running.update()
-            if (row := running.row()) is None or running.state is None:
+            if (row := running.row()) is None or running.state is None or not self.free:
                 continue
+            self.free = False
             if number % NOTES_EVERY == 0:
                 note = after_stop(running.signals())
             state, columns = running.state, running.since(self.count)

@@ -233,5 +233,6 @@ export class Live {
     this.alpha.show([seconds, this.columns[1]]);
     this.qdd.show([seconds, this.columns[2], this.columns[3]]);
     this.alpha.say(this.note ?? "");
+    this.send({ do: "seen" });
   }
 }
