@@ -119,17 +119,29 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
     What is wider than the terminal goes on below, each part with the first column; no word is broken.
     """
     widths = [
-        max(cell_len(word) for word in (*head.split(), *(word for row in rows for word in _unbroken(row[place]))))
+        max(
+            cell_len(word)
+            for word in (*head.split(), *(word for row in rows for word in _unbroken(row[place])))
+        )
         for place, head in enumerate(columns)
     ]
     for number, part in enumerate(_parts(widths, out.width)):
         drawn = Table(
-            title=None if number else title, title_justify="left", title_style="bold", show_edge=False, pad_edge=False
+            title=None if number else title,
+            title_justify="left",
+            title_style="bold",
+            show_edge=False,
+            pad_edge=False,
         )
-        tight = sum(max(widths[place], cell_len(columns[place])) + BETWEEN for place in part) - BETWEEN > out.width
+        tight = (
+            sum(max(widths[place], cell_len(columns[place])) + BETWEEN for place in part) - BETWEEN
+            > out.width
+        )
         for place in part:
             width = widths[place] if tight else None
-            drawn.add_column(columns[place], justify="right" if place else "left", width=width, no_wrap=not place)
+            drawn.add_column(
+                columns[place], justify="right" if place else "left", width=width, no_wrap=not place
+            )
         for row in rows:
             drawn.add_row(*(row[place] for place in part))
         out.print(drawn)

@@ -25,7 +25,6 @@ from tvist_lab.figures.style import (
     UNSHAPED,
     Series,
     dashed,
-    dotted,
     legend,
     note,
     panels,
@@ -200,7 +199,11 @@ def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> F
         for name, curve in curves.items():
             panel.plot(1e3 * curve.time, curve.alpha, **looks[name].line())
         dashed(panel, STILL, color=FAINT, width=0.9)
-        panel.set(xlim=(-1e3 * BEFORE, 1e3 * AFTER), ylim=(0.0, HEADROOM * highest), xlabel="Time after the stop (ms)")
+        panel.set(
+            xlim=(-1e3 * BEFORE, 1e3 * AFTER),
+            ylim=(0.0, HEADROOM * highest),
+            xlabel="Time after the stop (ms)",
+        )
         panel.set_ylabel(ALPHA if place % columns == 0 else "")
         if one.said:
             remark(panel, one.said, (0.97, 0.95), ha="right", va="top")
@@ -247,19 +250,6 @@ def _looks(names: Iterable[str], unshaped: Sequence[str]) -> dict[str, Series]:
 
 
 def vibration_figure(unshaped: Recording, shaped: Recording, number: int) -> Figure:
-    """|α| of one move around its stop, unshaped and shaped; time is zero when the unshaped reference stops."""
-    figure, (panel,) = panels(1, 2.8)
-    for recording, style, label in ((unshaped, OF_UNSHAPED, "Unshaped"), (shaped, OF_SHAPED, "Shaped")):
-        motion = motions(recording)[0]
-        time = 1e3 * (recording.time - recording.time[motion.reference_stop])
-        panel.plot(time, amplitude(best_tool_acceleration(recording)), **style.line(1.2, label=label))
-        dotted(panel, time[motion.shaped_stop], color=style.color)
-    panel.plot([], [], color=FAINT, linewidth=0.9, linestyle=":", label="Stop of the reference")
-    panel.set(
-        xlim=(-150, 450),
-        xlabel="Time after the unshaped reference's stop (ms)",
-        ylabel=ALPHA,
-    )
-    title(panel, f"Move {number}")
-    legend(figure, panel, OF_ALPHA)
-    return figure
+    """|α| of one move around its stop, unshaped and shaped."""
+    curves = {name: (one, motions(one)[0]) for name, one in (("Unshaped", unshaped), ("Shaped", shaped))}
+    return compared_figure([Shown(f"Move {number}", curves)], ["Unshaped"])

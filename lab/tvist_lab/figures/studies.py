@@ -53,7 +53,9 @@ def study_figure(summary: Sequence[dict[str, Any]], by: Sequence[str], show: Seq
             x = [_place(entry, by) if numbers else places.index(_place(entry, by)) + aside for entry in mine]
             few = "least" in mine[0][name]
             shares = ("least", "most", "least") if few else ("p5", "p95", "median")
-            low, high, middle = (np.array([entry[name][share] for entry in mine], dtype=float) for share in shares)
+            low, high, middle = (
+                np.array([entry[name][share] for entry in mine], dtype=float) for share in shares
+            )
             if numbers:
                 panel.fill_between(x, low, high, color=tint(style.color), linewidth=0, zorder=1.0)
                 panel.plot(x, middle, **style.line(1.4, marker=style.marker, markersize=3.0, label=line))
@@ -144,7 +146,9 @@ def robustness_figure(rows: Sequence[dict[str, Any]]) -> Figure:
             panel.hlines(y, p5, median, color=style.color, linewidth=1.0)
             panel.plot(median, y, **style.points(3.5, label=f"±{100.0 * size:.0f} %"))
         panel.set(xlabel="Reduction (%)", ylim=(len(rows) - 0.5, -0.5))
-        panel.set_yticks(range(len(rows)), [f"{_label(row['name'])}, {row['delay_ms']:.0f} ms" for row in rows])
+        panel.set_yticks(
+            range(len(rows)), [f"{_label(row['name'])}, {row['delay_ms']:.0f} ms" for row in rows]
+        )
         title(panel, f"Wrong {kind}")
     legend(figure, max(axes, key=lambda panel: len(panel.get_legend_handles_labels()[1])),
            {"dot": "median, the worse of ±", "bar": "to the 5th percentile"})  # fmt: skip

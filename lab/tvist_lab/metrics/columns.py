@@ -10,10 +10,10 @@ COLUMNS = {
     "start\ns": "Time of the log at which the motion starts; since the first row if the log has the time of day.",
     "stop\ns": "Time of the log at which its target, the shaped reference, stops.",
     "longer\nΔ ms": "Time by which shaping lengthens the reference.",
-    "settling\nt_stb ms": "Time from first entering a band of 0.03 mm around the attained position until staying inside.",
+    "settling\nt_stb ms": "Time from first entering a band of 0.03 mm around where the tool ends until staying inside.",
     "cycle\nt_cycle ms": "Time from the start until the tool stays inside that band.",
     "overshoot\ne_os mm": "Largest distance from the attained position after first entering the band.",
-    "vibration\nRV m/s²": "Residual vibration: an exponential fitted to the peaks of 0.3 s after the stop, at the stop.",
+    "vibration\nRV m/s²": "Residual: an exponential fitted to the peaks of 0.3 s after the stop, at the stop.",
     "at rest\nafter ms": "Last time the tool's acceleration exceeds 0.1 m/s², from the start of the motion.",
     "peak\nm/s²": "Largest acceleration of the tool after the stop and the declared delay.",
     "frequency\nf_d Hz": "Damped frequency of the strongest mode after the stop, with its 95 % interval.",
@@ -22,8 +22,9 @@ COLUMNS = {
 """Heads of the columns, with symbol and unit in a second line, to what they mean."""
 WORDS = {
     "start_s": "start", "stop_s": "stop", "delay_ms": "longer", "stabilisation_ms": "settling", "cycle_ms": "cycle",
-    "overshoot_m": "overshoot", "residual_vibration_m_s2": "vibration", "still_after_ms": "at rest", "peak_m_s2": "peak",
-    "envelope_m_s2": "envelope", "peak_acceleration_rad_s2": "acceleration of the reference", "f_d_hz": "frequency",
+    "overshoot_m": "overshoot", "residual_vibration_m_s2": "vibration", "still_after_ms": "at rest",
+    "peak_m_s2": "peak", "envelope_m_s2": "envelope", "peak_acceleration_rad_s2": "acceleration of the reference",
+    "f_d_hz": "frequency",
     "f_d_interval_hz": "frequency", "zeta": "damping", "zeta_interval": "damping", "servo_lag_ms": "lag of the servo",
 }  # fmt: skip
 """Fields of a motion's figures in the words of the columns."""

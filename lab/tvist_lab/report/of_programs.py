@@ -13,7 +13,8 @@ PROGRAMS = (
     Shown("warnings", "warnings", 0),
 )  # fmt: skip
 STOPS = (
-    Shown("move", "number", 0), Shown("line", "line", 0), Shown("start\ns", "timestamp", 3), Shown("time\ns", "seconds", 3),
+    Shown("move", "number", 0), Shown("line", "line", 0), Shown("start\ns", "timestamp", 3),
+    Shown("time\ns", "seconds", 3),
     Shown("next after\ns", "rested_s", 3), Shown("shake\nm/s²", "peak_after_stop_m_s2", 3),
 )  # fmt: skip
 WORDS = {
@@ -49,7 +50,10 @@ def programs_page(results: Sequence[Mapping[str, Any]], limits: Mapping[str, flo
     if said := [_placed(result, one) for result in results for one in result.get("warnings", ())]:
         sections.append(Section("Warnings", points=said))
     facts = {"Command": command, **{_words(name): f"{value:g}" for name, value in limits.items()}}
-    sections += [Section("What the words mean", facts=WORDS, explains=True), Section("This report", facts=facts)]
+    sections += [
+        Section("What the words mean", facts=WORDS, explains=True),
+        Section("This report", facts=facts),
+    ]
     title = results[0]["file"] if len(results) == 1 else count
     return Page(f"Run of {title}", [verdict], sections)
 

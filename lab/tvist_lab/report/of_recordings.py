@@ -26,7 +26,15 @@ from tvist_lab.report.page import Page, PageTable, Picture, Section, picture
 from tvist_lab.report.verdict import shaping_of, verdict_on_one, verdict_on_pairs, verdict_on_two
 from tvist_lab.words import counted
 
-PAIRED = ("motion", "shaper", "without\nm/s²", "with\nm/s²", "less\n%", "at rest\nearlier by ms", "longer\nΔ ms")
+PAIRED = (
+    "motion",
+    "shaper",
+    "without\nm/s²",
+    "with\nm/s²",
+    "less\n%",
+    "at rest\nearlier by ms",
+    "longer\nΔ ms",
+)
 """Columns of the table of motions that were made without and with a shaper."""
 OF_PAIRS = {
     "without": "Largest acceleration of the tool after the unshaped motion, later than 10 ms after its stop.",
@@ -123,7 +131,9 @@ def _pairs(file: _File) -> Section:
     """The table of what shaping changed about each motion."""
     rows = [
         (
-            f"{one.name}" if one.name.startswith("motions") else f"{one.name}\nmotions {one.unshaped + 1}, {one.shaped + 1}",
+            f"{one.name}"
+            if one.name.startswith("motions")
+            else f"{one.name}\nmotions {one.unshaped + 1}, {one.shaped + 1}",
             one.shaper or "–",
             number(one.change.before.peak, 3),
             number(one.change.after.peak, 3),
@@ -159,7 +169,15 @@ def _changes(base: _File, other: _File, comparison: Comparison) -> PageTable:
     ]
     for numbers, name in ((comparison.only_in_a, base.name), (comparison.only_in_b, other.name)):
         rows += [(f"{number}, only in {name}", *["–"] * 6) for number in numbers]
-    columns = ("motions", "vibration\nRV", "peak", "at rest", "settling\nt_stb", "cycle\nt_cycle", "overshoot\ne_os")
+    columns = (
+        "motions",
+        "vibration\nRV",
+        "peak",
+        "at rest",
+        "settling\nt_stb",
+        "cycle\nt_cycle",
+        "overshoot\ne_os",
+    )
     return PageTable(columns, rows, f"From {base.name} to {other.name}")
 
 

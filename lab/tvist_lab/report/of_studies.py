@@ -25,7 +25,8 @@ WAYS = (
 )  # fmt: skip
 OF_FEW = (
     Shown("", "name"), Shown("less\nleast %", "reduction_percent.min", 1),
-    Shown("less than waiting\nleast %", "less_than_waiting_percent.min", 1), Shown("delay\nlongest ms", "delay_ms.max", 0),
+    Shown("less than waiting\nleast %", "less_than_waiting_percent.min", 1),
+    Shown("delay\nlongest ms", "delay_ms.max", 0),
     Shown("still\nlatest ms", "still_after_unshaped_stop_ms.max", 0), _DRIVEN,
 )  # fmt: skip
 """The same of fewer moves than a median needs."""
@@ -39,7 +40,7 @@ WORDS = {
     "less": "Reduction of the largest acceleration of the tool, later than 10 ms after the reference stops.",
     "less than waiting": "The same against an unshaped arm that waits as long as the shaper is late.",
     "delay": "Time by which shaping lengthens a move.",
-    "still": "Last time |α| exceeds 0.1 m/s², from the stop of the unshaped reference; of a single move, from its start.",
+    "still": "Last time |α| exceeds 0.1 m/s², from the unshaped reference's stop; of a single move, from its start.",
     "largest q̈": "Largest acceleration of a joint.",
 }
 P5 = "The fifth percentile: 95 of 100 moves are better."
@@ -126,7 +127,11 @@ def shaperbench_page(result: Mapping[str, Any], figures: Mapping[str, Figure]) -
     """
     entries = ranked(result)
     made = result["moves"] * len(result["arms"]) * len(result["payload_errors"])
-    columns = IN_REPORT if made >= MANY else [one for one in IN_REPORT if "p5" not in one.title and "p90" not in one.title]
+    columns = (
+        IN_REPORT
+        if made >= MANY
+        else [one for one in IN_REPORT if "p5" not in one.title and "p90" not in one.title]
+    )
     caption = "* keeps the limits, and no other shaper that keeps them is better in both still and vibration"
     shown = PageTable(titles(columns), cells(entries, columns), caption)
     captions = {

@@ -93,7 +93,9 @@ def _on_shaper(pairs: Sequence[Pair], results: Sequence[MotionResult], name: str
         yield f"{name}: what {shaper} changed about the vibration after the stop could not be measured."
         return
     lead = f"{name}: {either(less, '%', LESS)} vibration after the stop with {shaper} than without a shaper"
-    peaks = [peak for change in changes for peak in (change.before.peak, change.after.peak) if peak is not None]
+    peaks = [
+        peak for change in changes for peak in (change.before.peak, change.after.peak) if peak is not None
+    ]
     if max(peaks) < NOTICEABLE:
         lead += ", though neither is noticeable"
     gained = [change.gain_ms for change in changes if change.gain_ms is not None]

@@ -10,7 +10,7 @@ from typing import Any
 import polars as pl
 
 from tvist_lab.study.case import Case
-from tvist_lab.study.columns import Shares, OF_STATUS, Column, column_of, columns_of, schema_of, summarized
+from tvist_lab.study.columns import OF_STATUS, Column, Shares, column_of, columns_of, schema_of, summarized
 from tvist_lab.study.engine import Plan
 from tvist_lab.study.foreign import run_file
 from tvist_lab.study.measures import MEASURES, OF_PEAKS

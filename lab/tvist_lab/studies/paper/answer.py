@@ -76,7 +76,8 @@ def checks(report: dict[str, Any], difference: str | None) -> dict[str, str]:
 def _change(report: dict[str, Any], motion: str) -> Change:
     methods = report["baselines"][motion]
     one, other = (
-        AfterStop(methods[name]["peak_m_s2"], methods[name]["still_after_ms"]) for name in ("unshaped", "shaped")
+        AfterStop(methods[name]["peak_m_s2"], methods[name]["still_after_ms"])
+        for name in ("unshaped", "shaped")
     )
     return Change(one, other)
 
