@@ -4,33 +4,31 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class AfterStop:
-    """How the tool vibrates after one motion."""
-
-    peak: float | None
-    """Largest |α| [m/s²]; None if it was not measurable."""
-    still_ms: float | None
-    """Time from the start of the motion until the tool is at rest [ms]; None if it never was."""
-
-
-@dataclass(frozen=True)
 class Change:
-    """The same motion without and with a shaper."""
+    """The same motion without and with a shaper; what was not measurable is None."""
 
-    before: AfterStop
-    after: AfterStop
+    before: float | None
+    """Largest |α| after the unshaped motion [m/s²]."""
+    after: float | None
+    """Largest |α| after the shaped one [m/s²]."""
+    still_before: float | None
+    """Time from the start of the unshaped motion until the tool is at rest [ms]."""
+    still_after: float | None
+    """The same of the shaped one [ms]."""
 
     @property
     def less_percent(self) -> float | None:
         """By how much the tool vibrates less [%], negative where it is more; None where it is not defined."""
-        before, after = self.before.peak, self.after.peak
-        return None if before is None or after is None or before == 0.0 else 100.0 * (1.0 - after / before)
+        if self.before is None or self.after is None or self.before == 0.0:
+            return None
+        return 100.0 * (1.0 - self.after / self.before)
 
     @property
     def gain_ms(self) -> int | None:
         """By how much earlier the tool is at rest [ms], negative where it is later; None where it never is."""
-        before, after = self.before.still_ms, self.after.still_ms
-        return None if before is None or after is None else round(before - after)
+        if self.still_before is None or self.still_after is None:
+            return None
+        return round(self.still_before - self.still_after)
 
     def less(self) -> str:
         """How much less or more it vibrates."""
@@ -43,7 +41,7 @@ class Change:
         """What the shaped tool did, with regard to rest."""
         if self.gain_ms is not None:
             return f"came to rest {abs(self.gain_ms)} ms {'earlier' if self.gain_ms >= 0 else 'later'}"
-        if self.after.still_ms is not None:
+        if self.still_after is not None:
             return "came to rest, which the unshaped one did not"
         return "was not at rest when the recording ended"
 

@@ -1,6 +1,6 @@
 """How the tool shakes after a motion: without and with shaping, and in several recordings."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tvist_lab.change import AfterStop, Change
+from tvist_lab.change import Change
 from tvist_lab.figures.recorded import Recorded
 from tvist_lab.figures.style import (
     ALPHA,
@@ -101,7 +101,7 @@ def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure
         ylabel="Acceleration of the tool (m/s²)",
     )
     _name(panel, before, f"without shaping: {before.peak:.2f} m/s²", 0.90 * top, UNSHAPED)
-    change = Change(AfterStop(before.peak, None), AfterStop(after.peak, None))
+    change = Change(before.peak, after.peak, None, None)
     words = f"with shaping: {after.peak:.2f} m/s², {change.less()}"
     _name(panel, after, words, 0.76 * top, SHAPED)
     dashed(panel, STILL, color=FAINT, width=0.9)
@@ -180,7 +180,7 @@ def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> F
     """|α| of several motions, a panel for each, all to one scale; each on a clock that begins with the motion.
 
     Args:
-        motions: The motions, of which those that cannot be drawn are left out. At most eight names of curves differ.
+        motions: The motions; those that cannot be drawn are left out, and of more than eight names of curves the rest.
         unshaped: Names of the curves that are drawn in the colour of what is not shaped.
 
     Raises:
@@ -192,12 +192,18 @@ def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> F
     columns = min(len(drawn), 2 if len(drawn) in (2, 4) else 3)
     rows = -(-len(drawn) // columns)
     figure, axes = panels(rows, 0.9 + 2.1 * rows, columns=columns, share_x=False, share_y=True)
-    looks = _looks(dict.fromkeys(name for _, curves in drawn for name in curves), unshaped)
-    highest = max(curve.peak for _, curves in drawn for curve in curves.values())
+    names = list(dict.fromkeys(name for _, curves in drawn for name in curves))
+    # What is not shaped has the colour of its own, unless it is compared with its like.
+    plain = [name for name in names if name in unshaped]
+    names = plain + [name for name in names if name not in plain] if len(plain) == 1 else names
+    styles = (OF_UNSHAPED, OF_SHAPED, *SERIES[2:]) if len(plain) == 1 else SERIES
+    looks = dict(zip(names, styles, strict=False))
+    highest = max(peak for _, curves in drawn for _, _, peak in curves.values())
     for place, (panel, (one, curves)) in enumerate(zip(axes, drawn, strict=False)):
         title(panel, one.name)
-        for name, curve in curves.items():
-            panel.plot(1e3 * curve.time, curve.alpha, **looks[name].line())
+        for name in filter(curves.__contains__, looks):
+            time, size, _ = curves[name]
+            panel.plot(1e3 * time, size, **looks[name].line())
         dashed(panel, STILL, color=FAINT, width=0.9)
         panel.set(
             xlim=(-1e3 * BEFORE, 1e3 * AFTER),
@@ -215,19 +221,8 @@ def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> F
     return figure
 
 
-class _Around(NamedTuple):
-    """A curve around a stop."""
-
-    time: Floats
-    """Shape (T,) [s]."""
-    alpha: Floats
-    """|α|, shape (T,) [m/s²]."""
-    peak: float
-    """Its largest value after its own stop and 10 ms [m/s²], at least the limit of rest."""
-
-
-def _around_stop(recorded: Mapping[str, Recorded]) -> dict[str, _Around]:
-    """Each curve after the stop of the first one, without what shows none."""
+def _around_stop(recorded: Mapping[str, Recorded]) -> dict[str, tuple[Floats, Floats, float]]:
+    """Time after the stop of the first curve [s], |α|, and its peak after the curve's own stop and 10 ms [m/s²]."""
     curves = {}
     (first, motion), *_ = recorded.values()
     stop = float(first.time[motion.arm_stop(first)] - first.time[motion.start])
@@ -235,18 +230,9 @@ def _around_stop(recorded: Mapping[str, Recorded]) -> dict[str, _Around]:
         with suppress(NotMeasurableError):
             time, alpha = felt(recording, its, slice(its.start, its.end), smooth=True)
             size, rests = amplitude(alpha), time >= recording.time[its.arm_stop(recording)] + AFTER_STOP
-            peak = float(np.max(size[rests], initial=STILL))
-            curves[name] = _Around(time - recording.time[its.start] - stop, size, peak)
+            late = time - recording.time[its.start] - stop
+            curves[name] = (late, size, float(np.max(size[rests], initial=STILL)))
     return curves
-
-
-def _looks(names: Iterable[str], unshaped: Sequence[str]) -> dict[str, Series]:
-    """The style of each curve: what is not shaped has its own, if it is alone."""
-    free = list(SERIES)
-    alone = [name for name in names if name in unshaped]
-    if len(alone) == 1:
-        free.remove(OF_UNSHAPED)
-    return {name: OF_UNSHAPED if alone == [name] else free.pop(0) for name in names}
 
 
 def vibration_figure(unshaped: Recording, shaped: Recording, number: int) -> Figure:

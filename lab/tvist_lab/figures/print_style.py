@@ -46,16 +46,9 @@ def is_below(box: Legend) -> bool:
 
 def _recolor(artist: Any, name: str) -> None:
     """Exchange a colour of an artist, or those of its parts."""
-    get, put = getattr(artist, f"get_{name}", None), getattr(artist, f"set_{name}", None)
-    if get is None or put is None:
-        return
-    color = get()
-    if isinstance(color, str):
-        if color != "none" and (new := COLORS.get(to_hex(color))):
-            put(new)
-    elif np.ndim(color) == 2:
-        parts = [to_hex(part) for part in color]
-        if any(part in COLORS for part in parts):
-            put([COLORS.get(part, part) for part in parts])
-    elif np.ndim(color) == 1 and len(color) == 4 and (new := COLORS.get(to_hex(color))):
-        put(new)
+    color = getattr(artist, f"get_{name}", lambda: "none")()
+    parts = [color] if isinstance(color, str) or np.ndim(color) == 1 else list(color)
+    printed = [COLORS.get(to_hex(part)) if len(part) else None for part in parts]
+    if any(printed):
+        new = [one or part for one, part in zip(printed, parts, strict=True)]
+        getattr(artist, f"set_{name}")(new if len(new) > 1 else new[0])

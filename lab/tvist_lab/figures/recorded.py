@@ -1,7 +1,6 @@
 """Figures 12 to 14: everything recorded of a motion, unshaped and shaped on one clock."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -40,22 +39,11 @@ SYMBOLS = {
 """What the symbols on the axes mean."""
 
 
-class _Mode(NamedTuple):
-    """A panel of the mode that the shaper uses."""
-
-    column: str
-    symbol: str
-    meaning: str
-    unit: str
-    range: tuple[float, float]
-    """What the axis shows at least."""
-    step: float
-
-
-MODE = (
-    _Mode("estimated_f_d", "$f_d$", "damped frequency", "Hz", (5.0, 16.0), 5.0),
-    _Mode("estimated_zeta", r"$\zeta$", "damping ratio", "–", (0.1, 0.4), 0.1),
-)
+MODE = {
+    "estimated_f_d": ("$f_d$", "damped frequency", "Hz", (5.0, 16.0), 5.0),
+    "estimated_zeta": (r"$\zeta$", "damping ratio", "–", (0.1, 0.4), 0.1),
+}
+"""Columns of the shaper's mode: symbol, meaning, unit, what the axis shows at least, and the distance of its ticks."""
 
 Recorded = tuple[Recording, MotionRows]
 """A recording and one of its motions."""
@@ -92,7 +80,7 @@ def observed_figure(name: str, recorded: Recorded) -> Figure:
 
 def _figure(name: str, drawn: Sequence[tuple[Recorded, Series, str]]) -> Figure:
     """Draw the panels from recordings with their styles and names; a mode that is constant has none."""
-    shown = [mode for mode in MODE if _varies([recorded for recorded, _, _ in drawn], mode.column)]
+    shown = [column for column in MODE if _varies([recorded for recorded, _, _ in drawn], column)]
     heights = (1.25, 1.0, 1.25, *(0.85 for _ in shown))
     figure, axes = panels(len(heights), 8.6 * sum(heights) / 5.2, ratios=heights)
     for recorded, style, label in drawn:
@@ -113,14 +101,16 @@ def _figure(name: str, drawn: Sequence[tuple[Recorded, Series, str]]) -> Figure:
     errors.set(ylabel=r"$E$ (mm)", ylim=(0.0, NEAR), yticks=np.linspace(0.0, NEAR, 4))
     alphas.set_ylabel(ALPHA)
     alphas.set_ylim(bottom=0.0)
-    for panel, mode in zip(modes, shown, strict=True):
-        panel.set_ylabel(f"Estimated {mode.symbol} ({mode.unit})")
+    symbols = dict(SYMBOLS)
+    for panel, column in zip(modes, shown, strict=True):
+        symbol, meaning, unit, (low, high), step = MODE[column]
+        symbols[symbol] = meaning
         bottom, top = panel.get_ylim()
-        panel.set_ylim(min(bottom, mode.range[0]), max(top, mode.range[1]))
-        panel.yaxis.set_major_locator(MultipleLocator(mode.step))
+        panel.set(ylabel=f"Estimated {symbol} ({unit})", ylim=(min(bottom, low), max(top, high)))
+        panel.yaxis.set_major_locator(MultipleLocator(step))
     ends = [recording.time[m.shaped_stop] - recording.time[m.start] for (recording, m), _, _ in drawn]
     axes[-1].set(xlabel="Time (s)", xlim=(-LEAD, max(ends) + REST))
-    legend(figure, accelerations, SYMBOLS | {mode.symbol: mode.meaning for mode in shown})
+    legend(figure, accelerations, symbols)
     return figure
 
 
@@ -133,9 +123,7 @@ def _varies(drawn: Sequence[Recorded], column: str) -> bool:
     )
 
 
-def _draw(
-    axes: Sequence[Axes], recorded: Recorded, style: Series, label: str, shown: Sequence[_Mode]
-) -> None:
+def _draw(axes: Sequence[Axes], recorded: Recorded, style: Series, label: str, shown: Sequence[str]) -> None:
     """Draw one recording into the panels."""
     recording, motion = recorded
     start = recording.time[motion.start]
@@ -153,8 +141,8 @@ def _draw(
     E = distance(recording, motion)
     errors.plot(recording.time[motion.start : motion.end] - start, 1e3 * E, **how)
     alphas.plot(time, amplitude(tool_acceleration(recording))[rows], **{**how, "linewidth": 0.8})
-    for panel, mode in zip(modes, shown, strict=True):
-        for values in recording[mode.column][rows].T:
+    for panel, column in zip(modes, shown, strict=True):
+        for values in recording[column][rows].T:
             panel.plot(time, values, **{**how, "linewidth": 1.5})
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_lab.change import AfterStop, Change
+from tvist_lab.change import Change
 from tvist_lab.metrics.common_clock import peak_after_stop
 from tvist_lab.metrics.comparison import SAME, Way
 from tvist_lab.metrics.errors import NotMeasurableError
@@ -56,23 +56,22 @@ def pairs(measured: Measured) -> list[Pair]:
             free = shapers[other] is None and not unshaped.stopped and (other, shaper) not in taken
             if free and _same(recording, unshaped, motion):
                 taken.add((other, shaper))
-                change = Change(after_stop(measured, other), after_stop(measured, place))
+                peaks = (_peak(measured, one) for one in (other, place))
+                rests = (measured.results[one].still_after_ms for one in (other, place))
                 name = _name(recording, unshaped) or f"motions {other + 1} and {place + 1}"
-                made.append(Pair(other, place, shaper, name, change))
+                made.append(Pair(other, place, shaper, name, Change(*peaks, *rests)))
                 break
     return sorted(made, key=lambda pair: (pair.unshaped, pair.shaped))
 
 
-def after_stop(measured: Measured, place: int) -> AfterStop:
-    """How the tool vibrates after a motion: by the truth if it was recorded, otherwise by the sensor."""
-    result = measured.results[place]
-    peak = result.peak_m_s2
-    if TRUTH in measured.recording:
-        try:
-            peak = peak_after_stop(measured.recording, measured.motions[place])
-        except NotMeasurableError:
-            peak = None
-    return AfterStop(peak, result.still_after_ms)
+def _peak(measured: Measured, place: int) -> float | None:
+    """Largest |α| after a motion: by the truth if it was recorded, otherwise by the sensor [m/s²]."""
+    if TRUTH not in measured.recording:
+        return measured.results[place].peak_m_s2
+    try:
+        return peak_after_stop(measured.recording, measured.motions[place])
+    except NotMeasurableError:
+        return None
 
 
 def _shaper(recording: Recording, motion: MotionRows, delay: float | None) -> str | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tvist_lab.figures.after_stop import Shown, compared_figure
 from tvist_lab.figures.ring_down import ring_down_figure
-from tvist_lab.figures.style import literal
+from tvist_lab.figures.style import SERIES, literal
 from tvist_lab.metrics import (
     COLUMNS,
     Comparison,
@@ -26,16 +26,18 @@ from tvist_lab.report.page import Page, PageTable, Picture, Section, picture
 from tvist_lab.report.verdict import shaping_of, verdict_on_one, verdict_on_pairs, verdict_on_two
 from tvist_lab.words import counted
 
-PAIRED = (
-    "motion",
-    "shaper",
-    "without\nm/s²",
-    "with\nm/s²",
-    "less\n%",
-    "at rest\nearlier by ms",
-    "longer\nΔ ms",
-)
+PAIRED = ("motion", "shaper", "without\nm/s²", "with\nm/s²", "less\n%", "at rest\nms earlier", "longer\nΔ ms")
 """Columns of the table of motions that were made without and with a shaper."""
+CHANGES = (
+    "motions",
+    "vibration\nRV",
+    "peak",
+    "at rest",
+    "settling\nt_stb",
+    "cycle\nt_cycle",
+    "overshoot\ne_os",
+)
+"""Columns of the table of what differs between two files."""
 OF_PAIRS = {
     "without": "Largest acceleration of the tool after the unshaped motion, later than 10 ms after its stop.",
     "with": "The same after the shaped motion.",
@@ -131,12 +133,10 @@ def _pairs(file: _File) -> Section:
     """The table of what shaping changed about each motion."""
     rows = [
         (
-            f"{one.name}"
-            if one.name.startswith("motions")
-            else f"{one.name}\nmotions {one.unshaped + 1}, {one.shaped + 1}",
+            f"{one.name}\n{one.unshaped + 1} and {one.shaped + 1}",
             one.shaper or "–",
-            number(one.change.before.peak, 3),
-            number(one.change.after.peak, 3),
+            number(one.change.before, 3),
+            number(one.change.after, 3),
             number(one.change.less_percent, 0),
             number(one.change.gain_ms, 0),
             number(file.measured.results[one.shaped].delay_ms, 0),
@@ -169,16 +169,7 @@ def _changes(base: _File, other: _File, comparison: Comparison) -> PageTable:
     ]
     for numbers, name in ((comparison.only_in_a, base.name), (comparison.only_in_b, other.name)):
         rows += [(f"{number}, only in {name}", *["–"] * 6) for number in numbers]
-    columns = (
-        "motions",
-        "vibration\nRV",
-        "peak",
-        "at rest",
-        "settling\nt_stb",
-        "cycle\nt_cycle",
-        "overshoot\ne_os",
-    )
-    return PageTable(columns, rows, f"From {base.name} to {other.name}")
+    return PageTable(CHANGES, rows, f"From {base.name} to {other.name}")
 
 
 def _panels(files: Sequence[_File], comparisons: Sequence[Comparison]) -> list[Shown]:
@@ -236,6 +227,8 @@ def _missing(files: Sequence[_File], panels: Sequence[Shown]) -> list[str]:
     items = [f"{file.name}, {note}" for file in files for note in grouped_notes(file.measured.results)]
     if len(panels) > PICTURES:
         items.append(f"{files[0].name}: only the first {PICTURES} of {len(panels)} motions are drawn")
+    if (curves := len({name for one in panels for name in one.curves})) > len(SERIES):
+        items.append(f"only the first {len(SERIES)} of {curves} curves are drawn")
     return items
 
 

@@ -77,7 +77,7 @@ def verdict_on_pairs(pairs: Sequence[Pair], results: Sequence[MotionResult], nam
     of_shaper.sort(key=lambda group: -median(one.change.less_percent or 0.0 for one in group))
     said = [sentence for group in of_shaper for sentence in _on_shaper(group, results, name)]
     if alone := len(results) - len({place for one in pairs for place in (one.unshaped, one.shaped)}):
-        said.append(f"{counted(alone, 'motion')} of {name} have no partner with or without a shaper.")
+        said.append(f"Made only with or only without a shaper: {counted(alone, 'motion')} of {name}.")
     return said
 
 
@@ -93,9 +93,7 @@ def _on_shaper(pairs: Sequence[Pair], results: Sequence[MotionResult], name: str
         yield f"{name}: what {shaper} changed about the vibration after the stop could not be measured."
         return
     lead = f"{name}: {either(less, '%', LESS)} vibration after the stop with {shaper} than without a shaper"
-    peaks = [
-        peak for change in changes for peak in (change.before.peak, change.after.peak) if peak is not None
-    ]
+    peaks = [peak for change in changes for peak in (change.before, change.after) if peak is not None]
     if max(peaks) < NOTICEABLE:
         lead += ", though neither is noticeable"
     gained = [change.gain_ms for change in changes if change.gain_ms is not None]

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tvist_lab.change import AfterStop, Change
+from tvist_lab.change import Change
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL
 
 POSES = {"Q1": "stretched out", "Q2": "stretched out to the side", "Q3": "folded"}
@@ -18,7 +18,7 @@ def answer(report: dict[str, Any], motion: str) -> list[str]:
     """
     start, end = motion.split("-")
     change, longer = _change(report, motion), report["baselines"][motion]["shaped"]["delay_ms"]
-    before, after = (_number(one.peak) for one in (change.before, change.after))
+    before, after = map(_number, (change.before, change.after))
     others = [f"{name}: {_change(report, name).in_short()}" for name in report["baselines"] if name != motion]
     yet = "yet " if change.gain_ms is not None and change.gain_ms > 0 else ""
     return [
@@ -74,12 +74,8 @@ def checks(report: dict[str, Any], difference: str | None) -> dict[str, str]:
 
 
 def _change(report: dict[str, Any], motion: str) -> Change:
-    methods = report["baselines"][motion]
-    one, other = (
-        AfterStop(methods[name]["peak_m_s2"], methods[name]["still_after_ms"])
-        for name in ("unshaped", "shaped")
-    )
-    return Change(one, other)
+    methods = [report["baselines"][motion][name] for name in ("unshaped", "shaped")]
+    return Change(*(method[figure] for figure in ("peak_m_s2", "still_after_ms") for method in methods))
 
 
 def _number(value: float | None) -> str:
