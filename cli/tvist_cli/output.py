@@ -118,29 +118,18 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
     What is wider than the terminal goes on below, each part with the first column; no word is broken.
     """
-    widths = [
-        max(
-            cell_len(word)
-            for word in (*head.split(), *(word for row in rows for word in _unbroken(row[place])))
-        )
-        for place, head in enumerate(columns)
-    ]
+    rigid = [[*head.split(), *(word for row in rows for word in _unbroken(row[place]))]
+             for place, head in enumerate(columns)]  # fmt: skip
+    widths = [max(map(cell_len, words)) for words in rigid]
     for number, part in enumerate(_parts(widths, out.width)):
-        drawn = Table(
-            title=None if number else title,
-            title_justify="left",
-            title_style="bold",
-            show_edge=False,
-            pad_edge=False,
-        )
-        tight = (
-            sum(max(widths[place], cell_len(columns[place])) + BETWEEN for place in part) - BETWEEN
-            > out.width
-        )
+        drawn = Table(title="" if number else title, title_justify="left", title_style="bold", show_edge=False,
+                      pad_edge=False)  # fmt: skip
         for place in part:
-            width = widths[place] if tight else None
             drawn.add_column(
-                columns[place], justify="right" if place else "left", width=width, no_wrap=not place
+                columns[place],
+                justify="right" if place else "left",
+                no_wrap=not place,
+                min_width=widths[place],
             )
         for row in rows:
             drawn.add_row(*(row[place] for place in part))
@@ -157,12 +146,13 @@ def _parts(widths: Sequence[int], room: int) -> list[list[int]]:
     """As few parts of a table as there is room for, of about the same width; each begins with the first column."""
 
     def packed(limit: int) -> list[list[int]]:
-        parts, used = [[0]], widths[0]
+        parts = [[0]]
         for place in range(1, len(widths)):
-            used += BETWEEN + widths[place]
-            if used > limit and len(parts[-1]) > 1:
+            if (
+                len(parts[-1]) > 1
+                and sum(widths[one] + BETWEEN for one in [*parts[-1], place]) - BETWEEN > limit
+            ):
                 parts.append([0])
-                used = widths[0] + BETWEEN + widths[place]
             parts[-1].append(place)
         return parts
 

@@ -6,6 +6,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from tvist_lab.report.page import Page, PageTable, Section, picture
+from tvist_lab.report.verdict import LESS
 from tvist_lab.studies.evaluate import example
 from tvist_lab.studies.leaderboard import IN_REPORT, ranked
 from tvist_lab.study.measures import MEASURES
@@ -87,9 +88,10 @@ def _verdict_on_evaluation(result: Mapping[str, Any]) -> list[str]:
         return [f"No move vibrates enough unshaped to show what {name} does."]
     many = len(less) >= MANY
     delays = [move["delay_ms"] for move in result["moves"]]
-    worst = f", {result['reduction_percent']['p5']:.0f} % less in all but one of twenty," if many else ""
+    p5 = result["reduction_percent"]["p5"]
+    worst = f", {either([p5], '%', LESS)} in all but one of twenty," if many else ""
     lead = (
-        f"{name} leaves {either(less, '%', ('less', 'more'))} vibration after the stop ({sample(len(less), 'move')})"
+        f"{name} leaves {either(less, '%', LESS)} vibration after the stop ({sample(len(less), 'move')})"
         f"{worst} and makes a move {spread(delays, 'ms')} longer."
     )
     share, late = ("median", "median") if many else ("min", "max")
@@ -127,11 +129,7 @@ def shaperbench_page(result: Mapping[str, Any], figures: Mapping[str, Figure]) -
     """
     entries = ranked(result)
     made = result["moves"] * len(result["arms"]) * len(result["payload_errors"])
-    columns = (
-        IN_REPORT
-        if made >= MANY
-        else [one for one in IN_REPORT if "p5" not in one.title and "p90" not in one.title]
-    )
+    columns = [one for one in IN_REPORT if made >= MANY or "\np" not in one.title]
     caption = "* keeps the limits, and no other shaper that keeps them is better in both still and vibration"
     shown = PageTable(titles(columns), cells(entries, columns), caption)
     captions = {
@@ -141,6 +139,8 @@ def shaperbench_page(result: Mapping[str, Any], figures: Mapping[str, Figure]) -
     sections = [Section("Shapers", tables=[shown]), _drawn(figures, captions)]
     if others := [f"{row['name']}: it {row['fault']}" for row in result["shapers"] if not row["ranked"]]:
         sections.append(Section("Not ranked", points=others))
+    residual = {"vibration": "Envelope of the acceleration within 3 to 60 Hz after the shaped stop."}
+    sections.append(Section("What the words mean", facts=WORDS | residual, explains=True))
     sections.append(Section("Arms", facts=result["arms"]))
     errors = ", ".join(f"{100 * error:+.0f} %" for error in result["payload_errors"])
     facts = {
@@ -173,12 +173,7 @@ def _verdict_on_ranking(ranked: Sequence[Mapping[str, Any]], arms: int) -> list[
     return [lead, f"{quiet['name']} leaves the least vibration: {quiet['residual_m_s2']['median']:.3f} m/s²."]
 
 
-def study_page(
-    study: Study,
-    result: Mapping[str, Any],
-    figures: Mapping[str, Figure],
-    command: str,
-) -> Page:
+def study_page(study: Study, result: Mapping[str, Any], figures: Mapping[str, Figure], command: str) -> Page:
     """Build the report of a study of one's own.
 
     Args:
