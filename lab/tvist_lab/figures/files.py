@@ -77,12 +77,13 @@ def save(figure: Figure, path: str | Path, *, dpi: int = DPI, columns: int = 2, 
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)
     # The label remembers that a figure has its style already, so that it can be written twice.
-    if style == "paper" and figure.get_label() != style:
-        file.with_suffix(".txt").write_text(for_print(figure) + "\n", encoding="utf-8")
-    if style == "slides" and figure.get_label() != style:
+    if style == "paper":
+        figure.set_label(str(figure.get_label()) or for_print(figure))
+        file.with_suffix(".txt").write_text(f"{figure.get_label()}\n", encoding="utf-8")
+    elif style == "slides" and not figure.get_label():
+        figure.set_label(style)
         _scale(figure, LARGER)
         figure.set_size_inches(figure.get_figwidth(), LARGER**0.5 * figure.get_figheight())
-    figure.set_label(style)
     fit(figure, columns)
     with mpl.rc_context(FONTS):
         figure.savefig(file, dpi=dpi, metadata=STABLE.get(file.suffix))

@@ -39,7 +39,7 @@ def pairs(measured: Measured) -> list[Pair]:
     """Pair each unshaped motion with the same one by each shaper, in the order in which they were made.
 
     Motions are the same if their references before shaping start and end at the same joint angles within 0.02 rad, and
-    take equally long within 2 %. Whether a motion was shaped follows from its reference's delay.
+    take equally long within 2 %. Whether one was shaped is known from the recording's events, or else from its delay.
     """
     recording, found = measured.recording, measured.motions
     if REFERENCE not in recording:
@@ -78,10 +78,11 @@ def _shaper(recording: Recording, motion: MotionRows, delay: float | None) -> st
     """Name of the shaper of a motion, empty if it is not known; None if there was none."""
     tick = recording["tick"][motion.start] if "tick" in recording else np.inf
     told = [one.why for one in recording.events if one.kind == "shaper_changed" and one.tick <= tick + 1]
+    if told:
+        name = str(told[-1]).split(" with ")[0]
+        return None if name == "none" else name
     begun = "" if recording.info is None else recording.info.shaper
-    name = str(told[-1] or "").split(" with ")[0] if told else begun
-    named = "" if name == "none" else name
-    return None if not named and (delay or 0.0) < TICK_MS else named
+    return None if (delay or 0.0) < TICK_MS else begun.replace("none", "")
 
 
 def _same(recording: Recording, one: MotionRows, other: MotionRows) -> bool:

@@ -62,7 +62,7 @@ def evaluation_page(result: Mapping[str, Any], figures: Mapping[str, Figure], co
     drawn = example(result["moves"]) + 1
     captions = {
         "moves": "Vibration after each move, unshaped and shaped.",
-        "one_move": f"Move {drawn}, which vibrates like the median of all moves.",
+        "one_move": f"Move {drawn}, the middle one by how much it vibrates unshaped.",
     }
     sections = [Section("Shapers", tables=[PageTable(titles(columns), rows)]), _drawn(figures, captions)]
     sections.append(Section("Moves", tables=[_moves(result["moves"])]))
