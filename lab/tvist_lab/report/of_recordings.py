@@ -71,7 +71,8 @@ def recordings_page(paths: Sequence[Path], command: str, columns: str | None = N
     files = _files(paths, columns)
     base, *others = files
     compared = [(other, compare(base.measured, other.measured)) for other in others]
-    sections = [_pairs(file) for file in files if file.pairs]
+    paired = [_pairs(file) for file in files if file.pairs]
+    sections = [Section("Without and with a shaper", tables=paired)] if paired else []
     if compared:
         sections.append(Section("Comparison", tables=[_changes(base, *pair) for pair in compared]))
     panels = _panels(files, [comparison for _, comparison in compared])
@@ -79,7 +80,7 @@ def recordings_page(paths: Sequence[Path], command: str, columns: str | None = N
     sections.append(Section("Motions", tables=[_table(file) for file in files]))
     if missing := _missing(files, panels):
         sections.append(Section("What could not be measured, and why", points=missing))
-    meanings = COLUMNS | (OF_PAIRS if any(file.pairs for file in files) else {})
+    meanings = COLUMNS | (OF_PAIRS if paired else {})
     sections.append(Section("What the columns mean", facts=meanings, explains=True))
     sections += [Section(f"Provenance of {file.name}", facts=_provenance(file)) for file in files]
     sections.append(Section("This report", facts={"Command": command}))
@@ -129,7 +130,7 @@ def _table(file: _File) -> PageTable:
     return PageTable(tuple(COLUMNS), rows, file.name)
 
 
-def _pairs(file: _File) -> Section:
+def _pairs(file: _File) -> PageTable:
     """The table of what shaping changed about each motion."""
     rows = [
         (
@@ -143,7 +144,7 @@ def _pairs(file: _File) -> Section:
         )
         for one in file.pairs
     ]
-    return Section("Without and with a shaper", tables=[PageTable(PAIRED, rows, file.name)])
+    return PageTable(PAIRED, rows, file.name)
 
 
 def _changes(base: _File, other: _File, comparison: Comparison) -> PageTable:
