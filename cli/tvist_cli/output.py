@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import msgspec
-from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.segment import Segment
@@ -25,10 +24,6 @@ if TYPE_CHECKING:
 
 WIDTH = 120
 """Number of columns when the output is not a terminal."""
-BETWEEN = 3
-"""Width of what is between two columns of a table."""
-SENTENCE = 24
-"""Length from which on a cell may be broken between its words."""
 
 
 class _Screen(Console):
@@ -114,50 +109,14 @@ def progress(
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table with text aligned left and numbers aligned right.
-
-    What is wider than the terminal goes on below, each part with the first column; no word is broken.
-    """
-    rigid = [[*head.split(), *(word for row in rows for word in _unbroken(row[place]))]
-             for place, head in enumerate(columns)]  # fmt: skip
-    widths = [max(map(cell_len, words)) for words in rigid]
-    for number, part in enumerate(_parts(widths, out.width)):
-        drawn = Table(title="" if number else title, title_justify="left", title_style="bold", show_edge=False,
-                      pad_edge=False)  # fmt: skip
-        for place in part:
-            drawn.add_column(
-                columns[place],
-                justify="right" if place else "left",
-                no_wrap=not place,
-                min_width=widths[place],
-            )
-        for row in rows:
-            drawn.add_row(*(row[place] for place in part))
-        out.print(drawn)
-        out.print()
-
-
-def _unbroken(cell: str) -> Sequence[str]:
-    """What must stay on one line: a short cell as a whole, and each word of a sentence."""
-    return [cell] if cell_len(cell) <= SENTENCE else cell.split()
-
-
-def _parts(widths: Sequence[int], room: int) -> list[list[int]]:
-    """As few parts of a table as there is room for, of about the same width; each begins with the first column."""
-
-    def packed(limit: int) -> list[list[int]]:
-        parts = [[0]]
-        for place in range(1, len(widths)):
-            if (
-                len(parts[-1]) > 1
-                and sum(widths[one] + BETWEEN for one in [*parts[-1], place]) - BETWEEN > limit
-            ):
-                parts.append([0])
-            parts[-1].append(place)
-        return parts
-
-    count = len(packed(room))
-    return packed(next(limit for limit in range(1, room + 1) if len(packed(limit)) == count))
+    """Print a table with text aligned left and numbers aligned right."""
+    drawn = Table(title=title, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
+    for number, column in enumerate(columns):
+        drawn.add_column(column, no_wrap=number == 0, justify="left" if number == 0 else "right")
+    for row in rows:
+        drawn.add_row(*row)
+    out.print(drawn)
+    out.print()
 
 
 def words(meanings: Mapping[str, str]) -> None:
