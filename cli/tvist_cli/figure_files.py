@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure
+from tvist_cli.failure import Failure, told
 from tvist_cli.output import say
 
 if TYPE_CHECKING:
@@ -30,14 +30,19 @@ class FigureOptions:
     """Resolution of figures in dots per inch; in pdf and svg, of the bitmaps within them [150]."""
     columns: Literal[1, 2] | None = None
     """Width of figures in columns of a journal: 1 for 89 mm, 2 for 183 mm [2]."""
+    style: str | None = None
+    """Style of figures: paper, with headings and explanations in a text beside each; slides, with larger type; or a
+    style file of matplotlib, FILE.mplstyle."""
 
     def into(self, folder: Path) -> "FigureFiles":
         """Return the folder together with what was asked for."""
         from tvist_lab.figures import FigureFiles
+        from tvist_lab.figures.files import STYLES
         from tvist_lab.figures.style import DPI
 
         self.check(folder)
-        return FigureFiles(folder, self.format or "png", self.dpi or DPI, self.columns or 2)
+        style = self.style if self.style in STYLES else None
+        return FigureFiles(folder, self.format or "png", self.dpi or DPI, self.columns or 2, style or "")
 
     def check(self, folder: Path | None, *files: Path | None) -> None:
         """Refuse what cannot be done, before anything is computed.
@@ -47,19 +52,38 @@ class FigureOptions:
             files: Other files that will be written at the end; None for those that were not given.
 
         Raises:
-            Failure: The resolution is out of range, there are no figures to which an option could apply, or a file's
-                folder does not exist.
+            Failure: The resolution is out of range, there is no such style, there are no figures to which an option
+                could apply, or a file's folder does not exist.
         """
         for file in files:
             if file is not None and not file.parent.is_dir():
                 raise Failure(f"{file} cannot be written: there is no folder {file.parent}")
-        for name in ("format", "dpi", "columns"):
+        for name in ("format", "dpi", "columns", "style"):
             if folder is None and getattr(self, name) is not None:
                 raise Failure(f"--{name} is about figures: give --figures DIR too, or leave it out", code=2)
         if self.dpi is not None and not LEAST_DPI <= self.dpi <= MOST_DPI:
             raise Failure(f"dpi is {self.dpi}: must be {LEAST_DPI} to {MOST_DPI}", code=2)
+        if self.style is not None:
+            _check_style(self.style)
         if folder is not None and folder.exists() and not folder.is_dir():
             raise Failure(f"{folder} exists already and is no folder: choose another name")
+
+
+def _check_style(style: str) -> None:
+    """Refuse what is no style; a style file is used from now on."""
+    from tvist_lab.figures.files import STYLES
+    from tvist_lab.figures.own_style import SUFFIX, StyleError, use
+
+    if style in STYLES:
+        return
+    if not style.endswith(SUFFIX):
+        raise Failure(
+            f"style is {style!r}: must be {', '.join(STYLES)} or a file that ends in {SUFFIX}", code=2
+        )
+    with told(StyleError, code=2):
+        idle = use(Path(style))
+    if idle:
+        say(f"{style}: no effect here have {', '.join(idle)}: tvist or its options set them")
 
 
 AS_USUAL = FigureOptions()

@@ -124,10 +124,10 @@ class Places:
             if draw is None or self.figures is self.report is None:
                 return
             drawn = draw()
-            if self.figures is not None:
-                write(self.look.into(self.figures), drawn)
             if self.report is not None and web_page is not None:
                 write_report(self.report, web_page(drawn))
+            if self.figures is not None:  # last, since a style changes the figures
+                write(self.look.into(self.figures), drawn)
 
 
 def give(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, json: bool) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,7 @@ def found():
 @pytest.fixture(scope="module")
 def make(figures, recorded, found):
     """Make a figure by its name, from small data."""
-    from tvist_lab.figures import compared_figure
+    compared_figure = figures.compared_figure
 
     def judged(count, *, counts=True):
         return [
@@ -89,7 +90,10 @@ def make(figures, recorded, found):
         "identified": lambda: figures.identified_figure(calibration, q, f_d, zeta, f_d, zeta),
         "map": lambda: figures.workspace_map_figure(found, "f_d_hz", "an arm", 1),
         "map over two columns": lambda: figures.workspace_map_figure(found, "zeta", "an arm", 2),
-        "compared": lambda: compared_figure("motion 1", [("one", recorded[0]), ("other", recorded[1])]),
+        "compared": lambda: compared_figure(
+            [figures.Shown("Q1 → Q2", {"without": recorded[0], "with zv": recorded[1]}, "90 % less")] * 4,
+            ["without"],
+        ),
         "sweep": lambda: figures.sweep_figure(entries(), ["5 kg", "1 kg"] * 2),
         "no move that counts": lambda: figures.residual_by_move_figure(judged(2, counts=False)),
     }
@@ -194,6 +198,102 @@ def test_a_figure_can_be_written_twice_without_shrinking(figures, tmp_path):
     for columns in (1, 1, 2):
         figures.save(figure, tmp_path / "x.png", dpi=50, columns=columns)
     assert figure.axes[0].xaxis.label.get_fontsize() == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize("name", ["map", "after_stop", "ring_down", "robustness"])
+def test_in_print_headings_and_explanations_are_a_text_beside_the_figure(figures, make, tmp_path, name):
+    plain, printed = make(name), make(name)
+    headings = [panel.get_title(loc="left") for panel in plain.axes if panel.get_title(loc="left")]
+    file = figures.FigureFiles(tmp_path, columns=1, style="paper").write(printed, "x")
+    caption = file.with_suffix(".txt").read_text(encoding="utf-8")
+    shown = [text.get_text() for text in words_of(printed)]
+    for place, heading in enumerate(headings):
+        assert heading in caption
+        assert heading not in shown
+        assert len(headings) == 1 or f"{'abc'[place]}: {heading}." in caption
+    assert not any(
+        ": " in text for box in printed.legends for text in [one.get_text() for one in box.get_texts()]
+    )
+    again = file.read_bytes(), caption
+    figures.FigureFiles(tmp_path, columns=1, style="paper").write(printed, "x")
+    assert (file.read_bytes(), file.with_suffix(".txt").read_text(encoding="utf-8")) == again
+
+
+def test_on_slides_text_and_lines_are_larger(figures, tmp_path):
+    usual, slide = figures.figure_4(), figures.figure_4()
+    figures.save(usual, tmp_path / "usual.png")
+    for _ in range(2):
+        figures.save(slide, tmp_path / "slide.png", style="slides")
+    sizes = [one.axes[0].xaxis.label.get_fontsize() for one in (usual, slide)]
+    assert sizes[1] == pytest.approx(1.4 * sizes[0])
+
+
+@pytest.fixture
+def own_style():
+    """The module of style files; what a test uses is forgotten after it."""
+    import matplotlib as mpl
+
+    from tvist_lab.figures import own_style
+
+    with mpl.rc_context():
+        yield own_style
+    own_style._OWN.clear()
+
+
+def test_a_style_file_of_matplotlib_takes_precedence(figures, own_style, tmp_path):
+    (tmp_path / "mine.mplstyle").write_text(
+        "# a journal's\nfont.family: serif\nfont.size: 6\naxes.grid: False\nfigure.figsize: 1, 1\n"
+    )
+    assert own_style.use(tmp_path / "mine.mplstyle") == ("figure.figsize",)
+    assert own_style.use(tmp_path / "mine.mplstyle") == (), "said once"
+    figure = figures.figure_4()
+    figures.save(figure, tmp_path / "x.png", columns=1)
+    panel = figure.axes[0]
+    assert panel.xaxis.label.get_fontsize() == pytest.approx(6.0 * 9.0 / 8.0)
+    assert panel.get_xticklabels()[0].get_fontfamily() == ["serif"]
+    assert not panel.xaxis.get_gridlines()[0].get_visible()
+    assert 25.4 * figure.get_figwidth() == pytest.approx(89.0)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, "cannot be read: No such file"),
+        ("font.size: 8\nfont.colour: red\n", "line 2: 'font.colour' is no setting of matplotlib"),
+        ("font.size: large one\n", "font.size"),
+        ("just words\n", "line 1: 'just words' is no setting"),
+    ],
+)
+def test_a_style_file_that_is_none_is_refused_in_a_sentence(own_style, tmp_path, content, words):
+    path = tmp_path / "bad.mplstyle"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(own_style.StyleError, match=words):
+        own_style.use(path)
+    assert not own_style.own()
+
+
+@pytest.mark.parametrize("shares", [("median", "p5", "p95"), ("least", "most")])
+def test_a_study_draws_lines_over_numbers_and_dots_with_bars_over_names(figures, shares):
+    summary = [
+        {"shaper": "zv", "kg": kg, "way": f"way {kg:g}", "delay_ms": dict.fromkeys(shares, 50.0)}
+        for kg in (1.0, 5.0)
+    ]
+    for axis, dashes in (("kg", "-"), ("way", "None")):
+        (panel,) = figures.study_figure(summary, [axis], ["delay_ms"]).axes
+        lines = panel.get_lines()
+        assert {line.get_linestyle() for line in lines} == {dashes}
+        assert len(lines) == (1 if "median" in shares else 2)
+        assert panel.collections
+
+
+def test_poses_are_marked_on_a_map(figures, found):
+    marked = replace(found, poses={"Q1": (0.0, 0.5), "Q2": (0.0, 0.5), "Q3": (1.0, 1.0)})
+    figure = figures.workspace_map_figure(marked, "f_d_hz", "an arm", 1)
+    assert all(
+        [text.get_text() for text in panel.texts][-2:] == ["Q1, Q2", "Q3"] for panel in figure.axes[:3]
+    )
+    assert all(text.get_rotation() == 0.0 for panel in figure.axes[:3] for text in panel.texts)
 
 
 def test_a_figure_of_no_counted_move_has_no_empty_panel(make):

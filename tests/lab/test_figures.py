@@ -1,6 +1,7 @@
 """The figures show the numbers they stand for, and curves can be told apart without colours and by the colour-blind."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from tvist_shaping import SHAPERS, custom, residual
 
 TICKS = 1500
 UNSHAPED = "#D55E00"
+MODE = ("estimated_f_d", "estimated_zeta")
 DEUTERANOPIA = np.array(
     [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
 )
@@ -47,7 +49,12 @@ def test_figure_7_shows_rounded_delays_jump_and_fractional_ones_not(figures):
 
 
 def test_figures_12_to_14_have_the_papers_five_panels_on_one_clock(figures, recorded):
-    figure = figures.motion_figure("Q1 → Q2", *recorded)
+    rising = np.linspace(10.0, 12.0, TICKS)[:, None]
+    changing = [
+        (replace(one, columns={**one.columns, **dict.fromkeys(MODE, rising)}), motion)
+        for one, motion in recorded
+    ]
+    figure = figures.motion_figure("Q1 → Q2", *changing)
     assert len(figure.axes) == 5
     assert [panel.get_ylabel().split()[-1] for panel in figure.axes] == [
         "(rad/s²)",
@@ -59,6 +66,7 @@ def test_figures_12_to_14_have_the_papers_five_panels_on_one_clock(figures, reco
     series, symbols = ([text.get_text() for text in box.get_texts()] for box in figure.legends)
     assert series == ["Unshaped", "Shaped"]
     assert all(any(word.startswith(symbol) for word in symbols) for symbol in ("$E$", "$f_d$", r"$\zeta$"))
+    assert len(figures.motion_figure("Q1 → Q2", *recorded).axes) == 3, "a mode that is constant has no panel"
     joints = texts(figure.axes[0])
     assert len(joints) == 3
     assert r"$\ddot q^*_1$, $\ddot q^*_2$" in joints
@@ -163,8 +171,9 @@ def lab(rgb):
 
 
 @pytest.mark.parametrize(("one", "other"), MAIN)
-def test_the_three_main_colours_differ_in_grey(style, one, other):
-    lightness = [lab(linear(style.SERIES[place].color))[0] for place in (one, other)]
+def test_the_three_main_colours_differ_in_grey_as_they_are_printed(style, one, other):
+    colors = [style.SERIES[place].color for place in (one, other)]
+    lightness = [lab(linear(style.IN_PRINT.get(color, color)))[0] for color in colors]
     assert abs(lightness[0] - lightness[1]) > 12.0
 
 

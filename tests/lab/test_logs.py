@@ -401,4 +401,4 @@ def test_notes_count_motions_instead_of_listing_them():
     from tvist_lab.metrics import MotionResult, grouped_notes
 
     results = [MotionResult(0.0, 1.0, notes={"f_d_hz": f"only 0.{n} s"} if n < 8 else {}) for n in range(10)]
-    assert grouped_notes(results) == ["8 of 10 motions, f_d_hz: as only 0.0 s"]
+    assert grouped_notes(results) == ["8 of 10 motions, frequency: as only 0.0 s"]

@@ -86,7 +86,7 @@ def test_what_was_not_measured_decides_nothing():
     assert shaping_of([replace(unknown, delay_ms=38.0)], "x").shaped is True
     mixed = [replace(unknown, delay_ms=delay) for delay in (0.0, 30.0, 40.0)]
     assert shaping_of(mixed, "x").sentence.startswith(
-        "2 of 3 motions of x were shaped: their targets end 35 ms"
+        "2 of 3 motions of x were shaped: their targets end 30 ms to 40 ms"
     )
 
 
@@ -108,9 +108,27 @@ def test_the_page_is_valid_and_small_and_loads_nothing(page):
     html5lib.HTMLParser(strict=True).parse(page)
     assert len(page.encode()) < 5e6
     for address in re.findall(r'(?:src|href)="([^"]*)"', page):
-        assert address.startswith("data:")
+        assert address.startswith(("data:", "#word-"))
+    assert set(re.findall(r'href="#([^"]*)"', page)) <= set(re.findall(r'id="([^"]*)"', page))
+    assert "t<sub>stb</sub>" in page
+    assert "prefers-color-scheme: dark" in page
     assert not re.search(r"https?://|@import|url\(|<script", page)
     assert page.count("<img") == page.count('alt="') > 1
+
+
+@pytest.mark.parametrize("width", [1100, 390])
+def test_no_table_of_the_page_is_wider_than_the_window(page, tmp_path, width):
+    from tests.view.browser import browser
+
+    (tmp_path / "page.html").write_text(page, encoding="utf-8")
+    with browser() as chromium:
+        shown = chromium.new_page(viewport={"width": width, "height": 800})
+        shown.goto((tmp_path / "page.html").as_uri())
+        cells = "[...document.querySelectorAll('table, td, h1, p, img')].map(one => one.getBoundingClientRect().right)"
+        assert max(shown.evaluate(cells)) <= width
+        assert shown.evaluate("document.documentElement.scrollWidth") <= width
+        text = shown.evaluate("Math.max(...[...document.querySelectorAll('p')].map(one => one.offsetWidth))")
+        assert text < 800
 
 
 def test_the_same_files_give_the_same_page(page, tmp_path):

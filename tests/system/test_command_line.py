@@ -256,7 +256,7 @@ class TestRecordAndAnalyze:
 
     def test_analyze_prints_a_table_for_people(self, recorded):
         said = tvist("log", "analyze", recorded[0]).assert_done().out
-        assert "RV m/s²" in said
+        assert all(words in said for words in ("RV m/s²", "overshoot", "e_os mm"))
         assert not said.startswith("{")
 
     def test_what_was_recorded_from_outside_cannot_be_replayed_and_says_why(self, recorded):
@@ -453,6 +453,11 @@ def test_the_demonstration_replays_equal_and_its_recording_gives_the_same_figure
     assert {path.suffix for path in (tmp_path / "demo").iterdir()} >= {".mcap", ".png"}
     assert (tmp_path / "demo" / "vibration-with-and-without-shaping.png").exists()
     assert [path.name for path in tmp_path.iterdir()] == ["demo"]
+    before, after = (said["baselines"]["Q1-Q3"][name]["peak_m_s2"] for name in ("unshaped", "shaped"))
+    page = ("--output", tmp_path / "demo.html", "--json")
+    first = tvist("log", "report", tmp_path / "demo" / "demo.mcap", *page).assert_done().json["verdict"][0]
+    assert f"{100.0 * (1.0 - after / before):.0f} %" in first
+    assert "less vibration after the stop with zv than without a shaper, at rest" in first
 
 
 def test_the_paper_in_one_run_prints_its_tables(tmp_path):

@@ -1,6 +1,7 @@
 """The commands of studies from a shell: seconds, one JSON object, the files that are asked for, words for people."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -36,6 +37,9 @@ def made_again(told, folder):
     for one in (told, made):
         assert (one["plant"], one["disturbances"]) == ("clean", [])
     assert 0.0 < told["free_of_collision"] <= 1.0
+    web_page = re.sub(r'"data:[^"]*"', "", (folder / "report.html").read_text(encoding="utf-8"))
+    assert "(2 moves)" in web_page
+    assert not any(word in web_page for word in ("p5", "median", "one of twenty"))
 
 
 def in_three_ways(told, _):

@@ -1,6 +1,6 @@
 """The paper's figures, drawn from recordings and from the shaping library."""
 
-from tvist_lab.figures.after_stop import after_stop_figure, compared_figure, vibration_figure
+from tvist_lab.figures.after_stop import Shown, after_stop_figure, compared_figure, vibration_figure
 from tvist_lab.figures.calibration import identified_figure, workspace_map_figure
 from tvist_lab.figures.convolution import figure_3
 from tvist_lab.figures.delay_filter import figure_8
@@ -26,6 +26,7 @@ __all__ = [
     "FORMATS",
     "FigureFiles",
     "Recorded",
+    "Shown",
     "after_stop_figure",
     "catalogue_figure",
     "compared_figure",

@@ -1,13 +1,16 @@
 """How the tool shakes after a motion: without and with shaping, and in several recordings."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from tvist_lab.change import Change
 from tvist_lab.figures.recorded import Recorded
 from tvist_lab.figures.style import (
     ALPHA,
@@ -22,10 +25,10 @@ from tvist_lab.figures.style import (
     UNSHAPED,
     Series,
     dashed,
-    dotted,
     legend,
     note,
     panels,
+    remark,
     tint,
     title,
 )
@@ -48,7 +51,7 @@ HEADROOM = 1.6
 WORDS_AT = 0.1
 """Where the curves' names begin [s]."""
 BEFORE, AFTER = 0.1, 0.6
-"""Time shown before and after the stop in the first of several recordings [s]."""
+"""Time shown before and after the stop of the first of several curves [s]."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,8 @@ def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure
         ylabel="Acceleration of the tool (m/s²)",
     )
     _name(panel, before, f"without shaping: {before.peak:.2f} m/s²", 0.90 * top, UNSHAPED)
-    words = f"with shaping: {after.peak:.2f} m/s², {_change(before.peak, after.peak)}"
+    change = Change(before.peak, after.peak, None, None)
+    words = f"with shaping: {after.peak:.2f} m/s², {change.less()}"
     _name(panel, after, words, 0.76 * top, SHAPED)
     dashed(panel, STILL, color=FAINT, width=0.9)
     _compare_rest(panel, before.still, after.still)
@@ -126,11 +130,6 @@ def _name(panel: Axes, curve: _Curve, words: str, height: float, color: str) -> 
         fontweight="bold",
         arrowprops={"arrowstyle": "-", "color": color, "linewidth": 0.9, "shrinkB": 4, "relpos": (0.0, 0.5)},
     )
-
-
-def _change(before: float, after: float) -> str:
-    percent = 100.0 * (after / before - 1.0)
-    return f"{abs(percent):.0f} % {'less' if percent <= 0.0 else 'more'}"
 
 
 def _compare_rest(panel: Axes, before: float | None, after: float | None) -> None:
@@ -166,51 +165,77 @@ def _curve(recorded: Recorded, length: float) -> _Curve:
     return _Curve(time, alpha, counts, peak, at, still)
 
 
-def compared_figure(name: str, recorded: Sequence[tuple[str, Recorded]]) -> Figure:
-    """|α| of one motion in up to eight recordings, on one clock that begins with the motion.
+class Shown(NamedTuple):
+    """A panel of `compared_figure`."""
+
+    name: str
+    """The motion, for the heading."""
+    curves: Mapping[str, Recorded]
+    """Name of each curve to what was recorded."""
+    said: str = ""
+    """What is written into the panel."""
+
+
+def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> Figure:
+    """|α| of several motions, a panel for each, all to one scale; each on a clock that begins with the motion.
 
     Args:
-        name: Name of the motion, used as the heading.
-        recorded: Name of each recording, and its motion.
+        motions: The motions; those that cannot be drawn are left out, and of more than eight names of curves the rest.
+        unshaped: Names of the curves that are drawn in the colour of what is not shaped.
 
     Raises:
-        NotMeasurableError: The accelerometer was not recorded, or too little of the rest.
+        NotMeasurableError: None of them has an accelerometer, or enough rest.
     """
-    figure, (panel,) = panels(1, 3.2)
-    title(panel, name)
-    first, motion = recorded[0][1]
-    stop = float(first.time[motion.arm_stop(first)] - first.time[motion.start])
-    highest = STILL
-    for (label, (recording, its)), look in zip(recorded, SERIES, strict=False):
-        time, alpha = felt(recording, its, slice(its.start, its.end), smooth=True)
-        time = time - recording.time[its.start] - stop
-        size = amplitude(alpha)
-        panel.plot(time, size, **look.line(label=label))
-        highest = max(highest, float(np.max(size[(time > 0.0) & (time < AFTER)], initial=0.0)))
-    dashed(panel, STILL, color=FAINT, width=0.9)
-    note(panel, f"{STILL:g} m/s²", (AFTER, STILL), (-2, 2), ha="right")
-    panel.set(
-        xlim=(-BEFORE, AFTER), ylim=(0.0, 1.25 * highest), xlabel=f"Time after the stop in {recorded[0][0]} (s)",
-        ylabel=ALPHA,
-    )  # fmt: skip
-    legend(figure, panel, OF_ALPHA)
+    drawn = [(one, curves) for one in motions if (curves := _around_stop(one.curves))]
+    if not drawn:
+        raise NotMeasurableError("no motion has an acceleration to draw")
+    columns = min(len(drawn), 2 if len(drawn) in (2, 4) else 3)
+    rows = -(-len(drawn) // columns)
+    figure, axes = panels(rows, 0.9 + 2.1 * rows, columns=columns, share_x=False, share_y=True)
+    names = list(dict.fromkeys(name for _, curves in drawn for name in curves))
+    # What is not shaped has the colour of its own, unless it is compared with its like.
+    plain = [name for name in names if name in unshaped]
+    names = plain + [name for name in names if name not in plain] if len(plain) == 1 else names
+    styles = (OF_UNSHAPED, OF_SHAPED, *SERIES[2:]) if len(plain) == 1 else SERIES
+    looks = dict(zip(names, styles, strict=False))
+    highest = max(peak for _, curves in drawn for _, _, peak in curves.values())
+    for place, (panel, (one, curves)) in enumerate(zip(axes, drawn, strict=False)):
+        title(panel, one.name)
+        for name in filter(curves.__contains__, looks):
+            time, size, _ = curves[name]
+            panel.plot(1e3 * time, size, **looks[name].line())
+        dashed(panel, STILL, color=FAINT, width=0.9)
+        panel.set(
+            xlim=(-1e3 * BEFORE, 1e3 * AFTER),
+            ylim=(0.0, HEADROOM * highest),
+            xlabel="Time after the stop (ms)",
+        )
+        panel.set_ylabel(ALPHA if place % columns == 0 else "")
+        if one.said:
+            remark(panel, one.said, (0.97, 0.95), ha="right", va="top")
+    for panel in axes[len(drawn) :]:
+        panel.remove()
+    for name, look in looks.items():
+        axes[0].plot([], [], **look.line(label=name))
+    legend(figure, axes[0], OF_ALPHA | {"dashed": f"at rest, {STILL:g} m/s²"})
     return figure
+
+
+def _around_stop(recorded: Mapping[str, Recorded]) -> dict[str, tuple[Floats, Floats, float]]:
+    """Time after the stop of the first curve [s], |α|, and its peak after the curve's own stop and 10 ms [m/s²]."""
+    curves = {}
+    (first, motion), *_ = recorded.values()
+    stop = float(first.time[motion.arm_stop(first)] - first.time[motion.start])
+    for name, (recording, its) in recorded.items():
+        with suppress(NotMeasurableError):
+            time, alpha = felt(recording, its, slice(its.start, its.end), smooth=True)
+            size, rests = amplitude(alpha), time >= recording.time[its.arm_stop(recording)] + AFTER_STOP
+            late = time - recording.time[its.start] - stop
+            curves[name] = (late, size, float(np.max(size[rests], initial=STILL)))
+    return curves
 
 
 def vibration_figure(unshaped: Recording, shaped: Recording, number: int) -> Figure:
-    """|α| of one move around its stop, unshaped and shaped; time is zero when the unshaped reference stops."""
-    figure, (panel,) = panels(1, 2.8)
-    for recording, style, label in ((unshaped, OF_UNSHAPED, "Unshaped"), (shaped, OF_SHAPED, "Shaped")):
-        motion = motions(recording)[0]
-        time = 1e3 * (recording.time - recording.time[motion.reference_stop])
-        panel.plot(time, amplitude(best_tool_acceleration(recording)), **style.line(1.2, label=label))
-        dotted(panel, time[motion.shaped_stop], color=style.color)
-    panel.plot([], [], color=FAINT, linewidth=0.9, linestyle=":", label="Stop of the reference")
-    panel.set(
-        xlim=(-150, 450),
-        xlabel="Time after the unshaped reference's stop (ms)",
-        ylabel=ALPHA,
-    )
-    title(panel, f"Move {number}")
-    legend(figure, panel, OF_ALPHA)
-    return figure
+    """|α| of one move around its stop, unshaped and shaped."""
+    curves = {name: (one, motions(one)[0]) for name, one in (("Unshaped", unshaped), ("Shaped", shaped))}
+    return compared_figure([Shown(f"Move {number}", curves)], ["Unshaped"])

@@ -14,9 +14,11 @@ from tvist_lab.figures.style import (
     INK,
     OF_SHAPED,
     OF_UNSHAPED,
+    UNSHAPED,
     color_bar,
     explain,
     legend,
+    note,
     panels,
     remark,
     title,
@@ -31,6 +33,8 @@ LABELS = {
     "delay_ms": (r"$\Delta$", "delay of the shaper", "ms"),
 }
 """Key of a map to its symbol, its meaning and its unit."""
+SMALL = 7.0
+"""Size of labels within a map [pt]."""
 LEVELS = 9
 """Largest number of levels of a map."""
 
@@ -93,11 +97,11 @@ def workspace_map_figure(found: WorkspaceMap, key: str, words: str, columns: int
     levels = _levels(float(np.nanmin(both)), float(np.nanmax(both)))
     error = np.abs(found.error(key))
     for panel, values, heading in zip(axes, both, ("Identified", "True"), strict=False):
-        drawn = _map(panel, found, values, levels)
+        drawn = _map(panel, found, values, levels, labelled=True)
         title(panel, heading)
     bar: dict[str, Any] = {"pad": 0.02, "aspect": 25.0, "format": lambda value, _: _short(value)}
     color_bar(figure, drawn, axes[:2], f"{symbol} ({unit})", **bar)
-    drawn = _map(axes[2], found, error, _levels(0.0, float(np.nanmax(error))))
+    drawn = _map(axes[2], found, error, _levels(0.0, float(np.nanmax(error))), labelled=False)
     title(axes[2], "Size of the error")
     color_bar(figure, drawn, axes[2:], "Error (%)", **bar)
     rows, across = (name.replace("_", " ").capitalize() for name in found.names)
@@ -109,8 +113,10 @@ def workspace_map_figure(found: WorkspaceMap, key: str, words: str, columns: int
     return figure
 
 
-def _map(panel: Axes, found: WorkspaceMap, values: Floats, levels: Floats) -> QuadContourSet:
-    """Filled contours, with lines between them that are labelled."""
+def _map(
+    panel: Axes, found: WorkspaceMap, values: Floats, levels: Floats, *, labelled: bool
+) -> QuadContourSet:
+    """Filled contours, with lines between them, and the robot's poses."""
     rows, across = (np.degrees(angles) for angles in found.angles)
     panel.grid(visible=False)
     drawn = panel.contourf(across, rows, values, levels=levels, cmap="cividis", extend="neither")
@@ -118,7 +124,16 @@ def _map(panel: Axes, found: WorkspaceMap, values: Floats, levels: Floats) -> Qu
     # White on the dark half of the colours, ink on the light one.
     colors = ["white" if place < 0.6 * len(inner) else INK for place in range(len(inner))]
     lines = panel.contour(across, rows, values, levels=inner, colors=colors, linewidths=0.7)
-    panel.clabel(lines, list(inner[::2]), fmt=_short, fontsize=7)
+    for label in panel.clabel(lines, list(inner[::2]) if labelled else [], fmt=_short, fontsize=SMALL):
+        label.set_rotation(0.0)
+    at: dict[tuple[float, float], list[str]] = {}
+    for name, (row, column) in found.poses.items():
+        at.setdefault((float(np.degrees(column)), float(np.degrees(row))), []).append(name)
+    for (x, y), names in at.items():
+        panel.plot(
+            [x], [y], "o", color=UNSHAPED, markeredgecolor="white", markersize=5.0, clip_on=False, zorder=5
+        )
+        note(panel, ", ".join(names), (x, y), (5, 4), fontsize=SMALL)
     for axis in (panel.xaxis, panel.yaxis):
         axis.set_major_locator(MultipleLocator(60.0))
     if np.isnan(values).all():

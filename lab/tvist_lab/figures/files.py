@@ -14,18 +14,24 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
+from tvist_lab.figures.own_style import own
+from tvist_lab.figures.print_style import for_print, is_below
 from tvist_lab.figures.style import COLUMN_MM, DPI
 
 FORMATS = ("png", "pdf", "svg")
 """Formats of figures: one bitmap, two of lines."""
 SMALLER = {1: 0.8, 2: 1.0}
 """Size of text and lines over one and over two columns, as a share of that over two [-]."""
+LARGER = 1.4
+"""Size of text and lines on slides, as a share of the usual one [-]."""
 LOWER = {1: 0.84, 2: 1.0}
 """Height over one and over two columns, as a share of that over two [-]."""
 STABLE = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 """Metadata without the date and the program's version, so that equal figures give equal files."""
 FONTS: Any = {"pdf.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "tvist"}
 """TrueType in PDF, which journals ask for; outlines in SVG, which look the same without the font."""
+STYLES = ("paper", "slides")
+"""Styles besides the usual one: headings and explanations in a text beside the figure, and larger type."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +45,8 @@ class FigureFiles:
     """Resolution of PNG, and of bitmaps within PDF and SVG [dots per inch]."""
     columns: int = 2
     """Width in columns of a journal: 1 for 89 mm, 2 for 183 mm."""
+    style: str = ""
+    """One of `STYLES`, or empty for the usual one."""
 
     def write(self, figure: Figure, name: str) -> Path:
         """Write a figure; see `save`.
@@ -47,23 +55,35 @@ class FigureFiles:
             figure: The figure.
             name: Name of the file without its suffix.
         """
-        return save(figure, self.folder / f"{name}.{self.format}", dpi=self.dpi, columns=self.columns)
+        path = self.folder / f"{name}.{self.format}"
+        return save(figure, path, dpi=self.dpi, columns=self.columns, style=self.style)
 
 
-def save(figure: Figure, path: str | Path, *, dpi: int = DPI, columns: int = 2) -> Path:
+def save(figure: Figure, path: str | Path, *, dpi: int = DPI, columns: int = 2, style: str = "") -> Path:
     """Write a figure; the suffix determines the format, and missing folders are created.
+
+    In the style `paper`, what its headings and explanations said is written beside it, as NAME.txt.
 
     Args:
         figure: The figure. It is resized to the columns, and its text with it.
         path: File to write.
         dpi: Resolution of PNG, and of bitmaps within PDF and SVG [dots per inch].
         columns: Width in columns of a journal: 1 for 89 mm, 2 for 183 mm.
+        style: One of `STYLES`, or empty for the usual one.
 
     Returns:
         Path of the file.
     """
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)
+    # The label remembers that a figure has its style already, so that it can be written twice.
+    if style == "paper":
+        figure.set_label(str(figure.get_label()) or for_print(figure))
+        file.with_suffix(".txt").write_text(f"{figure.get_label()}\n", encoding="utf-8")
+    elif style == "slides" and not figure.get_label():
+        figure.set_label(style)
+        _scale(figure, LARGER)
+        figure.set_size_inches(figure.get_figwidth(), LARGER**0.5 * figure.get_figheight())
     fit(figure, columns)
     with mpl.rc_context(FONTS):
         figure.savefig(file, dpi=dpi, metadata=STABLE.get(file.suffix))
@@ -79,7 +99,8 @@ def fit(figure: Figure, columns: int) -> None:
     now = min(COLUMN_MM, key=lambda count: abs(COLUMN_MM[count] / 25.4 - width))
     if now != columns:
         figure.set_size_inches(COLUMN_MM[columns] / 25.4, height * LOWER[columns] / LOWER[now])
-        _scale(figure, SMALLER[columns] / SMALLER[now])
+        if "font.size" not in own():  # else the reader's file says how large text is, whatever the width
+            _scale(figure, SMALLER[columns] / SMALLER[now])
     for box in list(figure.legends):
         _narrow(figure, box)
     # Words that are still too long must not push the panels aside.
@@ -132,7 +153,7 @@ def _narrow(figure: Figure, box: Legend) -> None:
         size = texts[0].get_fontsize()
         handles = [handle for handle in box.legend_handles if handle is not None]
         labels = [text.get_text() for text in texts]
-        above = "upper" in str(box._outside_loc)  # type: ignore[attr-defined]  # noqa: SLF001  not public
+        above = not is_below(box)
         how: dict[str, Any] = {"fontsize": size, "labelcolor": texts[0].get_color()}
         how |= {
             name: getattr(box, name)

@@ -70,7 +70,7 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     panel.plot([], [], "^", color=OF_UNSHAPED.color, markerfacecolor="white", label="Exceeds one (times)")
     decades(panel, "y")
     panel.set(xlabel="Still after the unshaped reference's stop (ms)", ylabel="Residual, 3 to 60 Hz (m/s²)")
-    panel.margins(x=0.6)
+    panel.margins(x=0.35)
     title(panel, "Settling against residual vibration")
     legend(figure, panel)
     return figure

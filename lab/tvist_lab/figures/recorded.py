@@ -35,10 +35,15 @@ SYMBOLS = {
     r"$\ddot q^*$": "acceleration of the shaped reference",
     "$E$": "distance of the tool from where it comes to rest",
     r"$|\alpha|$": "acceleration of the tool, without gravity",
-    "$f_d$": "damped frequency",
-    r"$\zeta$": "damping ratio",
 }
 """What the symbols on the axes mean."""
+
+
+MODE = {
+    "estimated_f_d": ("$f_d$", "damped frequency", "Hz", (5.0, 16.0), 5.0),
+    "estimated_zeta": (r"$\zeta$", "damping ratio", "–", (0.1, 0.4), 0.1),
+}
+"""Columns of the shaper's mode: symbol, meaning, unit, what the axis shows at least, and the distance of its ticks."""
 
 Recorded = tuple[Recording, MotionRows]
 """A recording and one of its motions."""
@@ -74,11 +79,13 @@ def observed_figure(name: str, recorded: Recorded) -> Figure:
 
 
 def _figure(name: str, drawn: Sequence[tuple[Recorded, Series, str]]) -> Figure:
-    """Draw the five panels from recordings with their styles and names."""
-    figure, axes = panels(5, 8.6, ratios=(1.25, 1, 1.25, 0.85, 0.85))
+    """Draw the panels from recordings with their styles and names; a mode that is constant has none."""
+    shown = [column for column in MODE if _varies([recorded for recorded, _, _ in drawn], column)]
+    heights = (1.25, 1.0, 1.25, *(0.85 for _ in shown))
+    figure, axes = panels(len(heights), 8.6 * sum(heights) / 5.2, ratios=heights)
     for recorded, style, label in drawn:
-        _draw(axes, recorded, style, label)
-    accelerations, errors, alphas, frequencies, dampings = axes
+        _draw(axes, recorded, style, label, shown)
+    accelerations, errors, alphas, *modes = axes
     _name_joints(accelerations, drawn[0][0])
     title(accelerations, name)
     dashed(errors, 1e3 * REPEATABILITY, color=FAINT, width=0.9)
@@ -94,20 +101,30 @@ def _figure(name: str, drawn: Sequence[tuple[Recorded, Series, str]]) -> Figure:
     errors.set(ylabel=r"$E$ (mm)", ylim=(0.0, NEAR), yticks=np.linspace(0.0, NEAR, 4))
     alphas.set_ylabel(ALPHA)
     alphas.set_ylim(bottom=0.0)
-    frequencies.set_ylabel(r"Estimated $f_d$ (Hz)")
-    _grow(frequencies, 5.0, 16.0)
-    frequencies.yaxis.set_major_locator(MultipleLocator(5.0))
-    dampings.set_ylabel(r"Estimated $\zeta$ (–)")
-    _grow(dampings, 0.1, 0.4)
-    dampings.set_xlabel("Time (s)")
+    symbols = dict(SYMBOLS)
+    for panel, column in zip(modes, shown, strict=True):
+        symbol, meaning, unit, (low, high), step = MODE[column]
+        symbols[symbol] = meaning
+        bottom, top = panel.get_ylim()
+        panel.set(ylabel=f"Estimated {symbol} ({unit})", ylim=(min(bottom, low), max(top, high)))
+        panel.yaxis.set_major_locator(MultipleLocator(step))
     ends = [recording.time[m.shaped_stop] - recording.time[m.start] for (recording, m), _, _ in drawn]
-    dampings.set_xlim(-LEAD, max(ends) + REST)
-    legend(figure, accelerations, SYMBOLS)
+    axes[-1].set(xlabel="Time (s)", xlim=(-LEAD, max(ends) + REST))
+    legend(figure, accelerations, symbols)
     return figure
 
 
-def _draw(axes: list[Axes], recorded: Recorded, style: Series, label: str) -> None:
-    """Draw one recording into the five panels."""
+def _varies(drawn: Sequence[Recorded], column: str) -> bool:
+    """Whether a mode changes during a motion, by more than a part in a thousand."""
+    return any(
+        np.any(np.ptp(values, axis=0) > 1e-3 * np.abs(values[0]))
+        for recording, motion in drawn
+        if len(values := recording[column][motion.start : motion.shaped_stop + 1])
+    )
+
+
+def _draw(axes: Sequence[Axes], recorded: Recorded, style: Series, label: str, shown: Sequence[str]) -> None:
+    """Draw one recording into the panels."""
     recording, motion = recorded
     start = recording.time[motion.start]
     first = int(np.searchsorted(recording.time, start - LEAD))
@@ -116,7 +133,7 @@ def _draw(axes: list[Axes], recorded: Recorded, style: Series, label: str) -> No
     )
     rows = slice(first, past)
     time = recording.time[rows] - start
-    accelerations, errors, alphas, frequencies, dampings = axes
+    accelerations, errors, alphas, *modes = axes
     how = style.line(1.1)
     # Dashes of equal curves would fill each other's gaps.
     for number, (qdd, _) in enumerate(_alike(recording["target_qdd"][rows])):
@@ -124,7 +141,7 @@ def _draw(axes: list[Axes], recorded: Recorded, style: Series, label: str) -> No
     E = distance(recording, motion)
     errors.plot(recording.time[motion.start : motion.end] - start, 1e3 * E, **how)
     alphas.plot(time, amplitude(tool_acceleration(recording))[rows], **{**how, "linewidth": 0.8})
-    for panel, column in ((frequencies, "estimated_f_d"), (dampings, "estimated_zeta")):
+    for panel, column in zip(modes, shown, strict=True):
         for values in recording[column][rows].T:
             panel.plot(time, values, **{**how, "linewidth": 1.5})
 
@@ -156,9 +173,3 @@ def _alike(qdd: Floats) -> list[tuple[Floats, list[int]]]:
         else:
             groups.append((values, [joint]))
     return groups
-
-
-def _grow(panel: Axes, low: float, high: float) -> None:
-    """Extend an axis to include a range and everything drawn."""
-    bottom, top = panel.get_ylim()
-    panel.set_ylim(min(bottom, low), max(top, high))

@@ -13,23 +13,28 @@ from tvist_lab.figures.style import (
     SHAPED,
     decades,
     legend,
-    legend_beside,
     note,
     panels,
+    tint,
     title,
 )
 from tvist_lab.studies.robustness import ERRORS
 from tvist_lab.study.measures import WORTH
 from tvist_lab.study.work import Row
+from tvist_lab.words import MANY
 
 EACH = 0.22
 """Height of a setting of a sweep [inch]."""
+LONG = 16
+"""Number of letters from which on a name takes two lines."""
 FLOOR = 1e-4
 """Smaller peaks are drawn at this value [m/s²]."""
 
 
 def study_figure(summary: Sequence[dict[str, Any]], by: Sequence[str], show: Sequence[str]) -> Figure:
-    """Draw medians, with a band from the 5th to the 95th percentile.
+    """Draw medians, with a band from the 5th to the 95th percentile; of few rows, from the least to the most.
+
+    Where the first axis is of numbers they are lines with bands, otherwise dots with bars.
 
     Args:
         summary: Entries of `tvist_lab.study.study.Study.summary`.
@@ -38,22 +43,32 @@ def study_figure(summary: Sequence[dict[str, Any]], by: Sequence[str], show: Seq
     """
     figure, axes = panels(len(show), 2.6 * len(show))
     places = list(dict.fromkeys(_place(entry, by) for entry in summary))
-    numbers = all(isinstance(place, int | float) for place in places)
+    numbers = bool(by) and all(isinstance(place, int | float) for place in places)
     lines = list(dict.fromkeys(_line(entry, by) for entry in summary))
     for panel, name in zip(axes, show, strict=True):
         for number, line in enumerate(lines):
             style = SERIES[number % len(SERIES)]
             mine = [entry for entry in summary if _line(entry, by) == line]
-            x = [_place(entry, by) if numbers else places.index(_place(entry, by)) for entry in mine]
-            median, low, high = (
-                np.array([entry[name][share] for entry in mine], dtype=float)
-                for share in ("median", "p5", "p95")
+            aside = 0.6 * ((number + 0.5) / len(lines) - 0.5)
+            x = [_place(entry, by) if numbers else places.index(_place(entry, by)) + aside for entry in mine]
+            few = "least" in mine[0][name]
+            shares = ("least", "most", "least") if few else ("p5", "p95", "median")
+            low, high, middle = (
+                np.array([entry[name][share] for entry in mine], dtype=float) for share in shares
             )
-            panel.plot(x, median, **style.line(1.4, marker=style.marker, markersize=3.0), label=line)
-            panel.fill_between(x, low, high, color=style.color, alpha=0.15, linewidth=0)
+            if numbers:
+                panel.fill_between(x, low, high, color=tint(style.color), linewidth=0, zorder=1.0)
+                panel.plot(x, middle, **style.line(1.4, marker=style.marker, markersize=3.0, label=line))
+                if few:
+                    panel.plot(x, high, **style.line(1.4, marker=style.marker, markersize=3.0))
+            else:
+                panel.vlines(x, low, high, color=style.color, linewidth=1.2)
+                panel.plot(x, middle, **style.points(label=line))
+                if few:
+                    panel.plot(x, high, **style.points())
         title(panel, name)
     if not numbers:
-        axes[-1].set_xticks(range(len(places)), [str(place) for place in places])
+        axes[-1].set_xticks(range(len(places)), [str(place) for place in places] if by else [""])
     axes[-1].set(xlabel=by[0] if by else "")
     legend(figure, axes[0])
     return figure
@@ -112,35 +127,39 @@ def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> 
 
 
 def robustness_figure(rows: Sequence[dict[str, Any]]) -> Figure:
-    """Draw the median (thick) and the 5th percentile (thin) of the reduction, each the worse of ± an error.
+    """Draw the median of the reduction with a bar to its 5th percentile, each the worse of ± an error, by shaper.
 
     Args:
         rows: Rows of `robustness_report`, ordered by delay.
     """
-    figure, axes = panels(2, 7.2)
-    places = range(len(rows))
+    sizes = {kind: sorted({abs(error) for error in errors}) for kind, errors in ERRORS.items()}
+    most = max(map(len, sizes.values()))
+    figure, axes = panels(1, 1.6 + (0.1 + 0.1 * most) * len(rows), columns=2, share_y=True)
     for panel, (kind, errors) in zip(axes, ERRORS.items(), strict=True):
-        for size, style in zip(sorted({abs(error) for error in errors}), SERIES, strict=False):
+        for place, (size, style) in enumerate(zip(sizes[kind], SERIES, strict=False)):
             names = [f"{100.0 * error:+.0f} %" for error in errors if abs(error) == size]
-            for name, width, label in (("median", 1.4, f"±{100.0 * size:.0f} %"), ("p5", 0.6, None)):
-                worse = [
-                    min(_known(row[kind][error]["reduction_percent"][name]) for error in names)
-                    for row in rows
-                ]
-                panel.plot(
-                    places,
-                    worse,
-                    **style.line(width, marker=style.marker, markersize=2.0 + width),
-                    label=label,
-                )
-        panel.set(ylabel="Reduction (%)")
-        legend_beside(panel)
-        title(panel, f"Wrong {kind}: median (thick) and 5th percentile (thin), the worse of ±")
-    axes[-1].set_xticks(
-        places, [f"{row['name']}, {row['delay_ms']:.0f} ms" for row in rows], rotation=90, fontsize=8
-    )
-    axes[-1].set(xlabel="Shapers in the order of their delay")
+            y = np.arange(len(rows)) + 0.7 * ((place + 0.5) / most - 0.5)
+            median, p5 = (
+                [min(_known(row[kind][error]["reduction_percent"][share]) for error in names) for row in rows]
+                for share in ("median", "p5")
+            )
+            panel.hlines(y, p5, median, color=style.color, linewidth=1.0)
+            panel.plot(median, y, **style.points(3.5, label=f"±{100.0 * size:.0f} %"))
+        panel.set(xlabel="Reduction (%)", ylim=(len(rows) - 0.5, -0.5))
+        panel.set_yticks(
+            range(len(rows)), [f"{_label(row['name'])}, {row['delay_ms']:.0f} ms" for row in rows]
+        )
+        title(panel, f"Wrong {kind}")
+    legend(figure, max(axes, key=lambda panel: len(panel.get_legend_handles_labels()[1])),
+           {"dot": "median, the worse of ±", "bar": "to the 5th percentile"})  # fmt: skip
     return figure
+
+
+def _label(name: str) -> str:
+    """A shaper's name in two lines if it is long."""
+    words = name.split("_")
+    half = (len(words) + 1) // 2
+    return name if len(name) < LONG else "_".join(words[:half]) + "_\n" + "_".join(words[half:])
 
 
 def _known(value: float | None) -> float:
@@ -150,7 +169,7 @@ def _known(value: float | None) -> float:
 def residual_by_move_figure(rows: Sequence[Row]) -> Figure:
     """Peak |α| after the stop, shaped against unshaped, one point per row; and the distribution of the reductions."""
     reductions = np.sort([row["reduction_percent"] for row in rows if row["reduction_percent"] is not None])
-    several = reductions.size > 1
+    several = reductions.size >= MANY
     figure, (above, *rest) = panels(
         2 if several else 1,
         6.0 if several else 3.6,

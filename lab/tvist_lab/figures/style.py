@@ -1,12 +1,13 @@
-"""Style of the figures: series that differ in grey and to the colour-blind, few lines, units on every axis.
+"""Style of the figures: series that differ to the colour-blind, few lines, units on every axis.
 
-Colours differ in lightness, not only in hue, and each has dashes and a marker of its own. Dashed lines are drawn over
-full ones, so that both are seen where they coincide, and nothing that stands for data is transparent.
+Each colour has dashes and a marker of its own; for print they are exchanged for ones that differ in grey. Dashed lines
+are drawn over full ones, so that both are seen where they coincide, and nothing that stands for data is transparent.
 """
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -16,17 +17,21 @@ from matplotlib.text import Text
 from matplotlib.ticker import Formatter
 from numpy.typing import NDArray
 
+from tvist_lab.figures.own_style import own
+
 UNSHAPED = "#D55E00"
 """Vermilion (Okabe and Ito), of medium lightness."""
-SHAPED = "#0B4A85"
-"""Dark blue."""
-THIRD = "#5FBF9A"
-"""Light bluish green."""
-INK = "#333333"
+SHAPED = "#0072B2"
+"""Blue (Okabe and Ito)."""
+THIRD = "#009E73"
+"""Bluish green (Okabe and Ito)."""
+IN_PRINT = {SHAPED: "#0B4A85", THIRD: "#5FBF9A"}
+"""Colours that a journal prints instead: a darker blue and a lighter green, which also differ in grey."""
+INK = "#1F2933"
 """Colour of text and axes."""
 FAINT = "#8A8A8A"
 """Colour of limits and other auxiliary lines."""
-MUTED = "#5A5A5A"
+MUTED = "#5B6670"
 """Colour of less important text."""
 COLUMN_MM = {1: 89.0, 2: 183.0}
 """Width of a figure over one or two columns of a journal [mm]."""
@@ -40,8 +45,19 @@ ALPHA = r"$|\alpha|$ (m/s²)"
 """Label of the axis of the tool's acceleration."""
 OF_ALPHA = {r"$|\alpha|$": "acceleration of the tool, without gravity"}
 """What its symbol means."""
+WIDTH_OF_LINES = 1.4
+"""Width of curves [pt]."""
 NEAR = 0.035
 """Points that are closer than this share of the axis share a name [-]."""
+
+
+HOUSE = {
+    "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": INK, "axes.labelcolor": INK,
+    "axes.axisbelow": True, "axes.titleweight": "bold", "axes.grid": True, "grid.color": "#E4E4E4",
+    "grid.linewidth": 0.6,
+    "xtick.color": INK, "ytick.color": INK, "xtick.major.size": 3.0, "ytick.major.size": 3.0,
+}  # fmt: skip
+"""Matplotlib's settings of these figures, without the sizes of text."""
 
 
 class Series(NamedTuple):
@@ -52,7 +68,7 @@ class Series(NamedTuple):
     """Line style of matplotlib."""
     marker: str
 
-    def line(self, width: float = 1.4, **more: Any) -> dict[str, Any]:
+    def line(self, width: float = WIDTH_OF_LINES, **more: Any) -> dict[str, Any]:
         """Return the arguments of `plot` for a curve; dashed ones lie over full ones.
 
         Args:
@@ -60,6 +76,7 @@ class Series(NamedTuple):
             more: Further arguments of `plot`.
         """
         above = 2.0 if self.dashes == "-" else 2.5
+        width *= float(own().get("lines.linewidth", WIDTH_OF_LINES)) / WIDTH_OF_LINES
         return {"color": self.color, "linestyle": self.dashes, "linewidth": width, "zorder": above, **more}
 
     def points(self, size: float = 4.0, **more: Any) -> dict[str, Any]:
@@ -85,6 +102,14 @@ SERIES = (
 """Styles of curves, in the order in which they are used."""
 OF_SHAPED, OF_UNSHAPED, OF_THIRD = SERIES[:3]
 """Styles of what is shaped, of what is not, and of a third one."""
+
+
+def rules() -> dict[str, Any]:
+    """Return matplotlib's settings of these figures: the house's, unless a file of one's own has others."""
+    base = float(own().get("font.size", 8.0))
+    sizes = {"font.size": 1.0, "xtick.labelsize": 1.0, "ytick.labelsize": 1.0, "axes.labelsize": 9.0 / 8.0,
+             "axes.titlesize": 9.5 / 8.0, "legend.fontsize": 8.5 / 8.0}  # fmt: skip
+    return {**HOUSE, **{name: share * base for name, share in sizes.items()}, **own()}
 
 
 def tint(color: str, share: float = 0.2) -> str:
@@ -120,35 +145,33 @@ def panels(
     Returns:
         The figure, and its panels row by row.
     """
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    grid: np.ndarray[Any, Any] = figure.subplots(
-        rows,
-        columns,
-        sharex="col" if share_x else False,
-        sharey="row" if share_y else False,
-        squeeze=False,
-        height_ratios=ratios,
-    )
+    look: Any = rules()
+    with mpl.rc_context(look):
+        figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+        FigureCanvasAgg(figure)
+        grid: np.ndarray[Any, Any] = figure.subplots(
+            rows,
+            columns,
+            sharex="col" if share_x else False,
+            sharey="row" if share_y else False,
+            squeeze=False,
+            height_ratios=ratios,
+        )
     axes = list(grid.ravel())
     for panel in axes:
-        _plain(panel)
+        _plain(panel, look)
     if share_x:
         figure.align_ylabels(axes)
     return figure, axes
 
 
-def _plain(panel: Axes) -> None:
-    """Style a panel: open frame, faint grid, tick labels of one size on every scale."""
-    for side in ("top", "right"):
-        panel.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        panel.spines[side].set_color(INK)
-    panel.grid(visible=True, color="#E4E4E4", linewidth=0.6)
-    panel.set_axisbelow(True)
-    panel.tick_params(which="both", colors=INK, labelsize=8, length=3)
-    panel.xaxis.label.set(color=INK, fontsize=9)
-    panel.yaxis.label.set(color=INK, fontsize=9)
+def _plain(panel: Axes, look: Mapping[str, Any]) -> None:
+    """Style grid and ticks of a panel, which matplotlib makes later: tick labels of one size on every scale."""
+    panel.grid(visible=look["axes.grid"], **({"color": look["grid.color"], "linewidth": look["grid.linewidth"]}
+                                             if look["axes.grid"] else {}))  # fmt: skip
+    for axis in ("x", "y"):
+        color, size, length = (look[f"{axis}tick.{name}"] for name in ("color", "labelsize", "major.size"))
+        panel.tick_params(axis, which="both", colors=color, labelsize=size, length=length)
 
 
 def decades(panel: Axes, *axes: str) -> None:
@@ -177,7 +200,9 @@ class _Digits(Formatter):
 
 def title(panel: Axes, words: str) -> None:
     """Write a heading at a panel's upper left."""
-    panel.set_title(words, loc="left", fontsize=9.5, color=INK, fontweight="bold")
+    look = rules()
+    size, weight = look["axes.titlesize"], look["axes.titleweight"]
+    panel.set_title(words, loc="left", fontsize=size, color=INK, fontweight=weight)
 
 
 def legend(figure: Figure, panel: Axes, symbols: Mapping[str, str] | None = None) -> None:
@@ -194,7 +219,7 @@ def legend(figure: Figure, panel: Axes, symbols: Mapping[str, str] | None = None
         labels,
         loc="outside upper right",
         ncols=len(labels),
-        fontsize=8.5,
+        fontsize=rules()["legend.fontsize"],
         frameon=False,
         labelcolor=INK,
         handlelength=2.4,
@@ -206,15 +231,17 @@ def legend(figure: Figure, panel: Axes, symbols: Mapping[str, str] | None = None
 def legend_beside(panel: Axes, color: str | None = None) -> None:
     """Draw a panel's legend on its right."""
     panel.legend(
-        loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False, labelcolor=color, handlelength=3.0
+        loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=rules()["font.size"], frameon=False, labelcolor=color,
+        handlelength=3.0,
     )  # fmt: skip
 
 
 def color_bar(figure: Figure, drawn: Any, axes: Axes | Sequence[Axes], words: str, **how: Any) -> None:
     """Draw the scale of a coloured area beside its panels."""
     bar = figure.colorbar(drawn, ax=axes, **how)
-    bar.set_label(words, fontsize=9, color=INK)
-    bar.ax.tick_params(labelsize=8, colors=INK)
+    look = rules()
+    bar.set_label(words, fontsize=look["axes.labelsize"], color=INK)
+    bar.ax.tick_params(labelsize=look["ytick.labelsize"], colors=INK)
 
 
 def explain(figure: Figure, symbols: Mapping[str, str]) -> None:
@@ -229,7 +256,7 @@ def explain(figure: Figure, symbols: Mapping[str, str]) -> None:
         [f"{symbol}: {meaning}" for symbol, meaning in symbols.items()],
         loc="outside lower left",
         ncols=len(symbols),
-        fontsize=8,
+        fontsize=rules()["font.size"],
         frameon=False,
         labelcolor=MUTED,
         handlelength=0.0,
@@ -276,7 +303,9 @@ def note(
     backing = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
     if offset is not None:
         how |= {"xytext": offset, "textcoords": "offset points"}
-    return panel.annotate(words, at, **{"color": color, "fontsize": 8, "bbox": backing, "zorder": 6.0, **how})
+    return panel.annotate(
+        words, at, **{"color": color, "fontsize": rules()["font.size"], "bbox": backing, "zorder": 6.0, **how}
+    )
 
 
 def remark(panel: Axes, words: str, at: tuple[float, float], **how: Any) -> Text:

@@ -1,5 +1,6 @@
 """Metrics of a recording: those of the paper, and those on a common clock."""
 
+from tvist_lab.metrics.columns import COLUMNS, grouped_notes, motion_cells
 from tvist_lab.metrics.common_clock import (
     envelope,
     in_motion_rms,
@@ -13,6 +14,7 @@ from tvist_lab.metrics.common_clock import (
 from tvist_lab.metrics.comparison import ComparedMotion, Comparison, compare
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.motion import MotionRows, motions
+from tvist_lab.metrics.pairing import Pair, pairs
 from tvist_lab.metrics.residual import Residual, residual
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
 from tvist_lab.metrics.settling import Settling, attained_position, distance, settling
@@ -22,7 +24,6 @@ from tvist_lab.metrics.table import (
     Runs,
     Table,
     analyze,
-    grouped_notes,
     measure,
     table_2,
     table_notes,
@@ -30,6 +31,7 @@ from tvist_lab.metrics.table import (
 from tvist_lab.metrics.vibration import amplitude, best_tool_acceleration, tool_acceleration
 
 __all__ = [
+    "COLUMNS",
     "SLOW_POLE",
     "ComparedMotion",
     "Comparison",
@@ -37,6 +39,7 @@ __all__ = [
     "MotionResult",
     "MotionRows",
     "NotMeasurableError",
+    "Pair",
     "Residual",
     "RingDown",
     "Runs",
@@ -53,7 +56,9 @@ __all__ = [
     "grouped_notes",
     "in_motion_rms",
     "measure",
+    "motion_cells",
     "motions",
+    "pairs",
     "peak_acceleration",
     "peak_after_stop",
     "peak_velocity",

@@ -64,7 +64,7 @@ def compare(first: Measured, second: Measured) -> Comparison:
     Motions correspond if they start and end at the same joint angles within 0.02 rad; they are paired in order, as
     many as possible.
     """
-    ways = [[_Way.of(one.recording, motion) for motion in one.motions] for one in (first, second)]
+    ways = [[Way.of(one.recording, motion) for motion in one.motions] for one in (first, second)]
     pairs = _pairs(*ways)
     compared = tuple(ComparedMotion(a + 1, b + 1, first.results[a], second.results[b]) for a, b in pairs)
     taken = [{pair[side] for pair in pairs} for side in (0, 1)]
@@ -73,25 +73,27 @@ def compare(first: Measured, second: Measured) -> Comparison:
 
 
 @dataclass(frozen=True)
-class _Way:
+class Way:
     """The two ends of a motion."""
 
     start: Floats
     end: Floats
 
     @classmethod
-    def of(cls, recording: Recording, motion: MotionRows) -> "_Way":
-        q = recording["target_q" if "target_q" in recording else "actual_q"]
+    def of(cls, recording: Recording, motion: MotionRows, column: str = "") -> "Way":
+        """Return the ends of a motion by a column of joint angles; by default, those of the target."""
+        q = recording[column or ("target_q" if "target_q" in recording else "actual_q")]
         return cls(q[motion.start], q[motion.arm_stop(recording)])
 
-    def corresponds(self, other: "_Way") -> bool:
+    def corresponds(self, other: "Way") -> bool:
+        """Whether both ends are the same, within 0.02 rad."""
         if self.start.shape != other.start.shape:
             return False
         away = np.abs(np.concatenate([self.start - other.start, self.end - other.end]))
         return bool(np.max(away) <= SAME)
 
 
-def _pairs(first: Sequence[_Way], second: Sequence[_Way]) -> list[tuple[int, int]]:
+def _pairs(first: Sequence[Way], second: Sequence[Way]) -> list[tuple[int, int]]:
     """Longest sequence of corresponding motions in the order of both recordings."""
     same = np.array([[a.corresponds(b) for b in second] for a in first], dtype=bool).reshape(
         len(first), len(second)

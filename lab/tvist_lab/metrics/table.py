@@ -1,6 +1,5 @@
 """Table 2 of the paper: metrics of each motion, their means over runs, and the impact of shaping."""
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias, TypeVar
@@ -36,8 +35,6 @@ Row: TypeAlias = dict[str, float | None]
 Table: TypeAlias = dict[str, dict[str, Row]]
 """Motion to `unshaped`, `shaped` and `impact_percent`, in the structure of `table_2` in the paper's data."""
 T = TypeVar("T")
-NAMED = 3
-"""Largest number of motions that a line names; of more it says how many they are."""
 
 
 @dataclass(frozen=True)
@@ -277,28 +274,3 @@ class Measured:
         """
         found = motions(recording)
         return cls(recording, found, [measure(recording, motion) for motion in found])
-
-
-def grouped_notes(results: Sequence[MotionResult]) -> list[str]:
-    """Return one line for each kind of note, with the motions and figures it concerns.
-
-    Notes that differ in their numbers alone are of one kind; the first one stands for all.
-    """
-    kinds: dict[str, dict[str, set[int]]] = {}
-    first: dict[str, str] = {}
-    for index, result in enumerate(results, 1):
-        for name, note in result.notes.items():
-            kind = re.sub(r"\d[\d.]*", "0", note)
-            first.setdefault(kind, note)
-            kinds.setdefault(kind, {}).setdefault(name, set()).add(index)
-    lines = []
-    for kind, names in kinds.items():
-        numbers = sorted(set().union(*names.values()))
-        which = f"motion {', '.join(map(str, numbers))}"
-        if len(numbers) == len(results) > 1:
-            which = "all motions"
-        elif len(numbers) > NAMED:
-            which = f"{len(numbers)} of {len(results)} motions"
-        same = all(result.notes.get(name) in (None, first[kind]) for result in results for name in names)
-        lines.append(f"{which}, {', '.join(names)}: {'' if same else 'as '}{first[kind]}")
-    return lines

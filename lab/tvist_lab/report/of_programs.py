@@ -8,19 +8,21 @@ from tvist_lab.study.tables import Shown, cells, titles
 from tvist_lab.words import counted
 
 PROGRAMS = (
-    Shown("program", "file"), Shown("result", "result"), Shown("s", "seconds", 3), Shown("moves", "moves", 0),
-    Shown("shake m/s²", "shake", 3), Shown("joint rad/s", "joint", 3), Shown("tool m/s", "tool", 3),
+    Shown("program", "file"), Shown("result", "result"), Shown("time\ns", "seconds", 3), Shown("moves", "moves", 0),
+    Shown("shake\nm/s²", "shake", 3), Shown("joint\nrad/s", "joint", 3), Shown("tool\nm/s", "tool", 3),
     Shown("warnings", "warnings", 0),
 )  # fmt: skip
 STOPS = (
-    Shown("move", "number", 0), Shown("line", "line", 0), Shown("start s", "timestamp", 3), Shown("s", "seconds", 3),
-    Shown("next after s", "rested_s", 3), Shown("shake m/s²", "peak_after_stop_m_s2", 3),
+    Shown("move", "number", 0), Shown("line", "line", 0), Shown("start\ns", "timestamp", 3),
+    Shown("time\ns", "seconds", 3),
+    Shown("next after\ns", "rested_s", 3), Shown("shake\nm/s²", "peak_after_stop_m_s2", 3),
 )  # fmt: skip
 WORDS = {
-    "s": "Robot time of a program, or of a move until its shaped reference is at rest.",
+    "time": "Robot time of a program, or of a move until its shaped reference is at rest.",
     "shake": "Largest acceleration of the tool from 10 ms until 0.3 s after a stop, without gravity. Where the next "
     "move began within 0.1 s, it is what the tool would have done at rest.",
-    "joint, tool": "Largest speed of a joint and of the tool centre point, as measured.",
+    "joint": "Largest speed of a joint, as measured.",
+    "tool": "Largest speed of the tool centre point, as measured.",
     "next after": "How long the arm rested before the next move.",
 }
 LISTED = 500
@@ -48,7 +50,10 @@ def programs_page(results: Sequence[Mapping[str, Any]], limits: Mapping[str, flo
     if said := [_placed(result, one) for result in results for one in result.get("warnings", ())]:
         sections.append(Section("Warnings", points=said))
     facts = {"Command": command, **{_words(name): f"{value:g}" for name, value in limits.items()}}
-    sections += [Section("What the words mean", facts=WORDS), Section("This report", facts=facts)]
+    sections += [
+        Section("What the words mean", facts=WORDS, explains=True),
+        Section("This report", facts=facts),
+    ]
     title = results[0]["file"] if len(results) == 1 else count
     return Page(f"Run of {title}", [verdict], sections)
 

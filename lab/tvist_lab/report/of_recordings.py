@@ -2,39 +2,49 @@
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from tvist_lab.figures.after_stop import compared_figure
+from tvist_lab.figures.after_stop import Shown, compared_figure
 from tvist_lab.figures.ring_down import ring_down_figure
-from tvist_lab.figures.style import literal
+from tvist_lab.figures.style import SERIES, literal
 from tvist_lab.metrics import (
+    COLUMNS,
     Comparison,
     Measured,
     NotMeasurableError,
+    Pair,
     compare,
     grouped_notes,
+    motion_cells,
+    pairs,
 )
+from tvist_lab.metrics.columns import number
 from tvist_lab.recordings import read
 from tvist_lab.report.page import Page, PageTable, Picture, Section, picture
-from tvist_lab.report.verdict import verdict_on_one, verdict_on_two
+from tvist_lab.report.verdict import shaping_of, verdict_on_one, verdict_on_pairs, verdict_on_two
 from tvist_lab.words import counted
 
-COLUMNS = {
-    "motion": "Number of the motion.",
-    "start s": "Time of the log at which the motion starts; since the first row if the log has the time of day.",
-    "stop s": "Time of the log at which its target, the shaped reference, stops.",
-    "Δ ms": "Time by which shaping lengthens the reference.",
-    "t_stb ms": "Time from first entering a band of 0.03 mm around the attained position until staying inside.",
-    "t_cycle ms": "Time from the start until the tool stays inside that band.",
-    "e_os mm": "Overshoot: largest distance from the attained position after first entering the band.",
-    "RV m/s²": "Residual vibration: an exponential fitted to the peaks of 0.3 s after the stop, at the stop.",
-    "still after ms": "Last time the tool's acceleration exceeds 0.1 m/s², from the start of the motion.",
-    "peak m/s²": "Largest acceleration of the tool after the stop and the declared delay.",
-    "f_d Hz": "Damped frequency of the strongest mode after the stop, with its 95 % interval.",
-    "ζ": "Damping ratio of that mode, with its 95 % interval.",
+PAIRED = ("motion", "shaper", "without\nm/s²", "with\nm/s²", "less\n%", "at rest\nms earlier", "longer\nΔ ms")
+"""Columns of the table of motions that were made without and with a shaper."""
+CHANGES = (
+    "motions",
+    "vibration\nRV",
+    "peak",
+    "at rest",
+    "settling\nt_stb",
+    "cycle\nt_cycle",
+    "overshoot\ne_os",
+)
+"""Columns of the table of what differs between two files."""
+OF_PAIRS = {
+    "without": "Largest acceleration of the tool after the unshaped motion, later than 10 ms after its stop.",
+    "with": "The same after the shaped motion.",
+    "less": "By how much it is less.",
 }
-"""Columns of the table of motions, and what they mean."""
+"""What these columns mean, as far as the table of motions does not say it."""
+WITHOUT = "without a shaper"
 PICTURES = 6
 """Largest number of motions that are drawn."""
 
@@ -44,6 +54,7 @@ class _File:
     path: Path
     name: str
     measured: Measured
+    pairs: Sequence[Pair]
 
 
 def recordings_page(paths: Sequence[Path], command: str, columns: str | None = None) -> Page:
@@ -60,15 +71,17 @@ def recordings_page(paths: Sequence[Path], command: str, columns: str | None = N
     files = _files(paths, columns)
     base, *others = files
     compared = [(other, compare(base.measured, other.measured)) for other in others]
-    sections = [Section("Motions", tables=[_table(file) for file in files])]
+    paired = [_pairs(file) for file in files if file.pairs]
+    sections = [Section("Without and with a shaper", tables=paired)] if paired else []
     if compared:
         sections.append(Section("Comparison", tables=[_changes(base, *pair) for pair in compared]))
-    sections.append(
-        Section("Vibration after the stop", pictures=list(_pictures(files, [c for _, c in compared])))
-    )
-    if missing := _missing(files):
+    panels = _panels(files, [comparison for _, comparison in compared])
+    sections.append(Section("Vibration after the stop", pictures=list(_pictures(files, panels))))
+    sections.append(Section("Motions", tables=[_table(file) for file in files]))
+    if missing := _missing(files, panels):
         sections.append(Section("What could not be measured, and why", points=missing))
-    sections.append(Section("What the columns mean", facts=COLUMNS))
+    meanings = COLUMNS | (OF_PAIRS if paired else {})
+    sections.append(Section("What the columns mean", facts=meanings, explains=True))
     sections += [Section(f"Provenance of {file.name}", facts=_provenance(file)) for file in files]
     sections.append(Section("This report", facts={"Command": command}))
     title = f"Vibration of {' and '.join(file.name for file in files)}"
@@ -87,7 +100,10 @@ def recordings_verdict(paths: Sequence[Path]) -> list[str]:
 
 def _verdict(base: _File, compared: Sequence[tuple[_File, Comparison]]) -> list[str]:
     if not compared:
-        return verdict_on_one(base.measured.results, base.name)
+        results = base.measured.results
+        if base.pairs:
+            return verdict_on_pairs(base.pairs, results, base.name)
+        return verdict_on_one(results, base.name)
     sentences: list[str] = []
     for other, comparison in compared:
         names = (base.name, other.name)
@@ -96,10 +112,11 @@ def _verdict(base: _File, compared: Sequence[tuple[_File, Comparison]]) -> list[
 
 
 def _files(paths: Sequence[Path], columns: str | None = None) -> list[_File]:
-    return [
-        _File(path, name, Measured.of(read(path, columns)))
-        for path, name in zip(paths, _names(paths), strict=True)
-    ]
+    found = []
+    for path, name in zip(paths, _names(paths), strict=True):
+        measured = Measured.of(read(path, columns))
+        found.append(_File(path, name, measured, pairs(measured)))
+    return found
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
@@ -109,31 +126,25 @@ def _names(paths: Sequence[Path]) -> list[str]:
 
 
 def _table(file: _File) -> PageTable:
-    rows = [
-        (
-            str(index),
-            f"{result.start_s - file.measured.recording.origin:.3f}",
-            f"{result.stop_s - file.measured.recording.origin:.3f}",
-            _text(result.delay_ms, 0),
-            _text(result.stabilisation_ms, 0),
-            _text(result.cycle_ms, 0),
-            _text(None if result.overshoot_m is None else 1e3 * result.overshoot_m, 3),
-            _text(result.residual_vibration_m_s2, 2),
-            _text(result.still_after_ms, 0),
-            _text(result.peak_m_s2, 2),
-            _text(result.f_d_hz, 2, result.f_d_interval_hz),
-            _text(result.zeta, 3, result.zeta_interval),
-        )
-        for index, result in enumerate(file.measured.results, 1)
-    ]
+    rows = motion_cells(file.measured.results, file.measured.recording.origin)
     return PageTable(tuple(COLUMNS), rows, file.name)
 
 
-def _text(value: float | None, digits: int, interval: tuple[float, float] | None = None) -> str:
-    if value is None:
-        return "–"
-    text = f"{value:.{digits}f}"
-    return text if interval is None else f"{text} ({interval[0]:.{digits}f}–{interval[1]:.{digits}f})"
+def _pairs(file: _File) -> PageTable:
+    """The table of what shaping changed about each motion."""
+    rows = [
+        (
+            f"{one.name}\n{one.unshaped + 1} and {one.shaped + 1}",
+            one.shaper or "–",
+            number(one.change.before, 3),
+            number(one.change.after, 3),
+            number(one.change.less_percent, 0),
+            number(one.change.gain_ms, 0),
+            number(file.measured.results[one.shaped].delay_ms, 0),
+        )
+        for one in file.pairs
+    ]
+    return PageTable(PAIRED, rows, file.name)
 
 
 def _changes(base: _File, other: _File, comparison: Comparison) -> PageTable:
@@ -159,26 +170,41 @@ def _changes(base: _File, other: _File, comparison: Comparison) -> PageTable:
     ]
     for numbers, name in ((comparison.only_in_a, base.name), (comparison.only_in_b, other.name)):
         rows += [(f"{number}, only in {name}", *["–"] * 6) for number in numbers]
-    columns = ("motions", "RV", "peak", "still after", "t_stb", "t_cycle", "e_os")
-    return PageTable(columns, rows, f"From {base.name} to {other.name}")
+    return PageTable(CHANGES, rows, f"From {base.name} to {other.name}")
 
 
-def _pictures(files: Sequence[_File], comparisons: Sequence[Comparison]) -> Iterator[Picture]:
-    """One picture for each of the first motions, and one for each file of how its loudest motion rings."""
-    base = files[0]
-    for index, motion in list(enumerate(base.measured.motions, 1))[:PICTURES]:
-        curves = [(literal(base.name), (base.measured.recording, motion))]
-        for file, comparison in zip(files[1:], comparisons, strict=True):
-            partner = next((one.b for one in comparison.motions if one.a == index), None)
-            if partner is not None:
-                curves.append(
-                    (literal(file.name), (file.measured.recording, file.measured.motions[partner - 1]))
-                )
-        try:
-            figure = compared_figure(f"Motion {index}", curves[:8])
-        except NotMeasurableError:
+def _panels(files: Sequence[_File], comparisons: Sequence[Comparison]) -> list[Shown]:
+    """What is drawn together: of one file, what was made without and with shapers; of several, what corresponds."""
+    base, *others = files
+    recording, found = base.measured.recording, base.measured.motions
+    shown = []
+    partners = {one.shaped for one in base.pairs}
+    for place, motion in enumerate(found):
+        mine = [one for one in base.pairs if one.unshaped == place]
+        curves = {literal(base.name): (recording, motion)}
+        name, said = f"Motion {place + 1}", ""
+        if others:
+            for file, comparison in zip(others, comparisons, strict=True):
+                for partner in (one.b for one in comparison.motions if one.a == place + 1):
+                    curves[literal(file.name)] = (file.measured.recording, file.measured.motions[partner - 1])
+        elif mine:
+            name = mine[0].name
+            curves = {WITHOUT: (recording, motion)}
+            curves |= {f"with {one.shaper or 'the shaper'}": (recording, found[one.shaped]) for one in mine}
+            said = mine[0].change.less() if len(mine) == 1 else ""
+        elif place in partners:
             continue
-        yield picture(figure, f"Acceleration of the tool around the stop of motion {index}, without gravity.")
+        shown.append(Shown(name[0].upper() + name[1:], curves, said))
+    return shown
+
+
+def _pictures(files: Sequence[_File], panels: Sequence[Shown]) -> Iterator[Picture]:
+    """One picture of the first motions, all to one scale, and one for each file of how its loudest motion rings."""
+    plain = [file.name for file in files if shaping_of(file.measured.results, file.name).shaped is False]
+    unshaped = [WITHOUT, *map(literal, plain)]
+    with suppress(NotMeasurableError):
+        caption = "Acceleration of the tool around the stop, without gravity; all panels have one scale."
+        yield picture(compared_figure(panels[:PICTURES], unshaped), caption)
     for file in files:
         loudest = max(enumerate(file.measured.results), key=lambda one: one[1].peak_m_s2 or 0.0, default=None)
         if loudest is None or loudest[1].peak_m_s2 is None:
@@ -197,15 +223,13 @@ def _pictures(files: Sequence[_File], comparisons: Sequence[Comparison]) -> Iter
         yield picture(figure, caption)
 
 
-def _missing(files: Sequence[_File]) -> list[str]:
+def _missing(files: Sequence[_File], panels: Sequence[Shown]) -> list[str]:
     """What could not be measured or is not drawn, each with its reason."""
-    items = []
-    for file in files:
-        items += [f"{file.name}, {note}" for note in grouped_notes(file.measured.results)]
-        if len(file.measured.motions) > PICTURES:
-            items.append(
-                f"{file.name}: only the first {PICTURES} of {len(file.measured.motions)} motions are drawn"
-            )
+    items = [f"{file.name}, {note}" for file in files for note in grouped_notes(file.measured.results)]
+    if len(panels) > PICTURES:
+        items.append(f"{files[0].name}: only the first {PICTURES} of {len(panels)} motions are drawn")
+    if (curves := len({name for one in panels for name in one.curves})) > len(SERIES):
+        items.append(f"only the first {len(SERIES)} of {curves} curves are drawn")
     return items
 
 

@@ -2,22 +2,27 @@
 
 import base64
 import io
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from tvist_lab.figures.files import fit
 
-DPI = 110
-"""Resolution of pictures [dpi]; a figure's 183 mm are 793 pixels."""
+DPI = 138
+"""Resolution of pictures [dpi]; a figure's 183 mm are the 994 pixels to which the page grows."""
 
 
 @dataclass(frozen=True)
 class PageTable:
-    """A table; the first column is text, the others are numbers as text."""
+    """A table; the first column is text, the others are numbers as text.
+
+    The second line of a head or of a cell is small: a symbol, a unit, an interval.
+    """
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -47,6 +52,8 @@ class Section:
     """Items of a list."""
     facts: Mapping[str, str] = field(default_factory=dict)
     """Words and what they mean or are."""
+    explains: bool = False
+    """Whether the facts are what words in the heads of tables mean, which then lead to them."""
 
 
 @dataclass(frozen=True)
@@ -73,4 +80,20 @@ def render(page: Page) -> str:
         loader=PackageLoader("tvist_lab.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    return environment.get_template("page.html.j2").render(page=page, version=version("tvist"))
+    environment.filters["symbols"] = _symbols
+    words = [word for section in page.sections if section.explains for word in section.facts]
+    places = {word: f"word-{number}" for number, word in enumerate(words, 1)}
+    heads = {head for section in page.sections for table in section.tables for head in table.columns}
+    explained = {head: places[word] for head in heads if (word := _word(head, words))}
+    template = environment.get_template("page.html.j2")
+    return template.render(page=page, version=version("tvist"), places=places, explained=explained)
+
+
+def _symbols(words: str) -> Markup:
+    """Words of which the index of a symbol is below the line: f_d, t_stb."""
+    return Markup(re.sub(r"\b([a-zA-Z])_([a-z]+)\b", r"\1<sub>\2</sub>", str(escape(words))))  # noqa: S704  escaped
+
+
+def _word(head: str, words: Sequence[str]) -> str:
+    """The longest word with which a head begins; empty if there is none."""
+    return max((word for word in words if head.startswith(word)), key=len, default="")

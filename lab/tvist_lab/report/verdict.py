@@ -1,18 +1,22 @@
 """What recordings show about shaping, in sentences; what a file is called does not count."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from statistics import median
 
-from tvist_lab.metrics import Comparison, MotionResult
-from tvist_lab.words import counted
+from tvist_lab.metrics import Comparison, MotionResult, Pair
+from tvist_lab.metrics.pairing import TICK_MS
+from tvist_lab.words import counted, either, sample, spread
 
-TICK_MS = 2.0
-"""Shortest delay of a shaped reference [ms]: one tick."""
 NOTICEABLE = 0.15
 """Vibration that stands out of the sensor's noise [m/s²]."""
 CLEAR = 15.0
 """Smallest change that counts as a difference [%]; equal runs differ by noise."""
+LISTED = 6
+"""Largest number of pairs that are named one by one."""
+LESS, EARLIER = ("less", "more"), ("earlier", "later")
+"""Words for positive and negative changes."""
 
 
 @dataclass(frozen=True)
@@ -32,14 +36,14 @@ def shaping_of(results: Sequence[MotionResult], name: str) -> Shaping:
     shaped = [delay for delay in delays if delay >= TICK_MS]
     if not shaped:
         return Shaping(False, f"{name} was not shaped: its target ends together with its reference.")
-    late = median(shaped)
+    late = spread(shaped, "ms")
     if len(shaped) < len(delays):
         return Shaping(
             True,
             f"{len(shaped)} of {counted(len(delays), 'motion')} of {name} were shaped: their targets end "
-            f"{late:.0f} ms after their references (median).",
+            f"{late} after their references.",
         )
-    return Shaping(True, f"{name} was shaped: its target ends {late:.0f} ms after its reference.")
+    return Shaping(True, f"{name} was shaped: its target ends {late} after its reference.")
 
 
 def verdict_on_one(results: Sequence[MotionResult], name: str) -> list[str]:
@@ -63,8 +67,44 @@ def verdict_on_one(results: Sequence[MotionResult], name: str) -> list[str]:
     )
     first = f"{name}: {what}"
     if still:
-        first += f"; it is still {median(still):.0f} ms after the start of a motion (median)"
+        first += f"; it is still {spread(still, 'ms')} after the start of a motion"
     return [f"{first}.", shaping_of(results, name).sentence]
+
+
+def verdict_on_pairs(pairs: Sequence[Pair], results: Sequence[MotionResult], name: str) -> list[str]:
+    """What each shaper of one recording changed, the one that leaves least first, in the words of `tvist demo`."""
+    of_shaper = [list(group) for _, group in groupby(sorted(pairs, key=_shaper), _shaper)]
+    of_shaper.sort(key=lambda group: -median(one.change.less_percent or 0.0 for one in group))
+    said = [sentence for group in of_shaper for sentence in _on_shaper(group, results, name)]
+    if alone := len(results) - len({place for one in pairs for place in (one.unshaped, one.shaped)}):
+        said.append(f"Made only with or only without a shaper: {counted(alone, 'motion')} of {name}.")
+    return said
+
+
+def _shaper(pair: Pair) -> str:
+    return pair.shaper
+
+
+def _on_shaper(pairs: Sequence[Pair], results: Sequence[MotionResult], name: str) -> Iterator[str]:
+    changes = [one.change for one in pairs]
+    shaper = pairs[0].shaper or "the shaper"
+    less = [change.less_percent for change in changes if change.less_percent is not None]
+    if not less:
+        yield f"{name}: what {shaper} changed about the vibration after the stop could not be measured."
+        return
+    lead = f"{name}: {either(less, '%', LESS)} vibration after the stop with {shaper} than without a shaper"
+    peaks = [peak for change in changes for peak in (change.before, change.after) if peak is not None]
+    if max(peaks) < NOTICEABLE:
+        lead += ", though neither is noticeable"
+    gained = [change.gain_ms for change in changes if change.gain_ms is not None]
+    if gained:
+        lead += f", at rest {either(gained, 'ms', EARLIER)}"
+    longer = [delay for one in pairs if (delay := results[one.shaped].delay_ms) is not None]
+    if longer:
+        lead += f", for {'a motion that is' if len(pairs) == 1 else 'motions that are'} {spread(longer, 'ms')} longer"
+    yield f"{lead} ({sample(len(pairs), 'motion')})."
+    if 1 < len(pairs) <= LISTED:
+        yield f"{'; '.join(f'{one.name}: {one.change.in_short()}' for one in pairs)}."
 
 
 def verdict_on_two(
@@ -87,15 +127,15 @@ def verdict_on_two(
     many = counted(len(peaks), "motion")
     if not peaks:
         return [f"The vibration of {a} and {b} could not be measured, so nothing is compared.", *said]
-    before, after = median(peak for peak, _ in peaks), median(peak for _, peak in peaks)
-    change = median(100.0 * (second_peak / first_peak - 1.0) for first_peak, second_peak in peaks)
-    numbers = f"median of {many}: {before:.2f} and {after:.2f} m/s²"
-    if max(before, after) < NOTICEABLE:
+    before, after = [peak for peak, _ in peaks], [peak for _, peak in peaks]
+    less = [100.0 * (1.0 - second_peak / first_peak) for first_peak, second_peak in peaks]
+    change = -median(less)
+    numbers = f"{sample(len(peaks), 'motion')}: {spread(before, 'm/s²', 2)} and {spread(after, 'm/s²', 2)}"
+    if max(median(before), median(after)) < NOTICEABLE:
         lead = f"Neither {a} nor {b} vibrates noticeably after its stops ({numbers})."
-    elif change <= -CLEAR:
-        lead = f"{b} vibrates {-change:.0f} % less after its stops than {a} ({numbers}){_sooner(comparison)}."
-    elif change >= CLEAR:
-        lead = f"{b} vibrates {change:.0f} % more after its stops than {a} ({numbers}){_sooner(comparison)}."
+    elif abs(change) >= CLEAR:
+        changed = either(less, "%", LESS)
+        lead = f"{b} vibrates {changed} after its stops than {a} ({numbers}){_sooner(comparison)}."
     else:
         lead = f"{b} vibrates as much as {a} after its stops ({numbers}): nothing in it reduces vibration."
     if change <= -CLEAR and evidence[1].shaped is False:
@@ -113,7 +153,4 @@ def _sooner(comparison: Comparison) -> str:
         for one in comparison.motions
         if one.first.still_after_ms is not None and one.second.still_after_ms is not None
     ]
-    if not gained:
-        return ""
-    by = median(gained)
-    return f" and is still {abs(by):.0f} ms {'earlier' if by >= 0.0 else 'later'}"
+    return f" and is still {either(gained, 'ms', EARLIER)}" if gained else ""

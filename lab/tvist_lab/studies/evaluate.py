@@ -200,9 +200,8 @@ def notes(
     """
     found = []
     if share is not None:
-        found.append(
-            f"{100.0 * share:.0f} % of the drawn moves were free of collisions; the others were replaced"
-        )
+        free = f"{100.0 * share:.0f} % of the drawn moves were free of collisions; the others were replaced"
+        found.append("all drawn moves were free of collisions" if share == 1.0 else free)
     if result["left_out"]:
         found.append(
             f"{len(result['left_out'])} of {len(chosen)} moves have an unshaped peak below {WORTH:g} m/s²: the "

@@ -191,9 +191,11 @@ ON_PAGE = (
     Shown("in motion", "in_motion_ratio", 2), *_PEAKS,
 )  # fmt: skip
 IN_REPORT = (
-    _starred("", " *"), *_STILL, Shown("vibration m/s²", "residual_m_s2.median", 3),
-    Shown("less than waiting", "reduction_percent.median", 1, " %"), Shown("p5", "reduction_percent.p5", 1, " %"),
-    _DELAY, Shown("largest q̈ / limit", "peak_acceleration_ratio.max", 3),
+    _starred("", " *"), Shown("still\nmedian ms", "time_until_still_ms.median", 0),
+    Shown("still\np90 ms", "time_until_still_ms.p90", 0), Shown("vibration\nmedian m/s²", "residual_m_s2.median", 3),
+    Shown("less than waiting\nmedian %", "reduction_percent.median", 1),
+    Shown("less than waiting\np5 %", "reduction_percent.p5", 1), Shown("delay\nmedian ms", "delay_ms.median", 0),
+    Shown("largest q̈\nof its limit", "peak_acceleration_ratio.max", 3),
 )  # fmt: skip
 
 

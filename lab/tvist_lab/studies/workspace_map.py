@@ -1,6 +1,7 @@
 """The first mode over the workspace: as a calibration tells it, and as the simulated arm has it."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,8 @@ class WorkspaceMap:
     """Key of `QUANTITIES` to what the calibration tells, shape (R, C)."""
     true: dict[str, Floats]
     """The same of the simulated arm."""
+    poses: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Named poses of the robot, by their angles along rows and columns [rad]; those on the map."""
 
     def error(self, key: str) -> Floats:
         """Deviation of what is identified from what is true [%], shape (R, C)."""
@@ -117,6 +120,7 @@ def workspace_map(
             for key, value in zip(QUANTITIES, values, strict=True):
                 maps[key][row, column] = value
     joints = description.robot.joints
+    poses = {name: (q[first], q[second]) for name, q in description.poses.items()}
     return WorkspaceMap(
         joints=(first, second),
         names=(joints[first], joints[second]),
@@ -124,6 +128,11 @@ def workspace_map(
         rest=tuple(middle.tolist()),
         identified=told,
         true=true,
+        poses={
+            name: at
+            for name, at in poses.items()
+            if all(grid[0] - 1e-6 <= angle <= grid[-1] + 1e-6 for grid, angle in zip(angles, at, strict=True))
+        },
     )
 
 

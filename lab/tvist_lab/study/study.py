@@ -10,7 +10,7 @@ from typing import Any
 import polars as pl
 
 from tvist_lab.study.case import Case
-from tvist_lab.study.columns import OF_STATUS, Column, column_of, columns_of, schema_of, summarized
+from tvist_lab.study.columns import OF_STATUS, Column, Shares, column_of, columns_of, schema_of, summarized
 from tvist_lab.study.engine import Plan
 from tvist_lab.study.foreign import run_file
 from tvist_lab.study.measures import MEASURES, OF_PEAKS
@@ -20,6 +20,7 @@ from tvist_lab.study.work import FAILED, MEASURED, Job
 from tvist_lab.words import counted
 
 SHARES = {"median": 0.5, "p5": 0.05, "p95": 0.95}
+ENDS = {"least": 0.0, "most": 1.0}
 """Percentiles of each measure that are summarized."""
 DIGITS = 3
 """Decimals of the figures in tables."""
@@ -112,11 +113,11 @@ class Study:
         }
         return Plan(jobs, schema_of(self.columns), identity)
 
-    def summary(self, rows: pl.DataFrame) -> list[dict[str, Any]]:
-        """Return an entry for each setting, arm and method, over all other axes."""
+    def summary(self, rows: pl.DataFrame, shares: Shares = SHARES) -> list[dict[str, Any]]:
+        """Return an entry for each setting, arm and method, over all other axes; `ENDS` is for few rows."""
         keys = [*self.by, *(["arm"] if len(self.cases[0].arms) > 1 else []), "shaper"]
         numbers = {"rows": pl.len(), **{name: OF_STATUS[name].sum() for name in (MEASURED, FAILED)}}
-        return summarized(rows, keys, numbers, dict.fromkeys(self.measured, SHARES))
+        return summarized(rows, keys, numbers, dict.fromkeys(self.measured, shares))
 
     def shown(self, entries: Sequence[dict[str, Any]]) -> list[Shown]:
         """Return the columns of its table."""
@@ -124,7 +125,8 @@ class Study:
         figures = [
             Shown(f"{name}{'' if share == 'median' else f' {share}'}", f"{name}.{share}", DIGITS)
             for name in self.show
-            for share in ("median", "p95")
+            for share in ("median", "p95", *ENDS)
+            if share in entries[0][name]
         ]
         return [*(Shown(name, name) for name in keys), *figures]
 

@@ -5,17 +5,12 @@ from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import number, out, print_json, progress, say, table
+from tvist_cli.output import out, print_json, progress, say, table
 
 if TYPE_CHECKING:
     from tvist_lab.figures import FigureFiles
-    from tvist_lab.metrics import MotionResult, MotionRows
+    from tvist_lab.metrics import MotionRows
     from tvist_lab.recordings import Recording
-
-COLUMNS = (
-    "motion", "start s", "stop s", "delay ms", "stabil. ms", "cycle ms", "overshoot m", "RV m/s²", "still after ms",
-    "peak m/s²", "f_d Hz", "ζ",
-)  # fmt: skip
 
 
 def analyze(
@@ -40,8 +35,9 @@ def analyze(
         json: Print one JSON object.
     """
     look.check(figures)
-    from tvist_lab.metrics import grouped_notes, measure, motions
+    from tvist_lab.metrics import COLUMNS, grouped_notes, measure, motion_cells, motions
     from tvist_lab.recordings import RecordingError, read
+    from tvist_lab.words import counted
 
     with told(RecordingError):
         recording = read(file, columns)
@@ -69,8 +65,8 @@ def analyze(
         return
     origin = recording.origin
     since = f", times from {origin:.3f} s on" if origin else ""
-    rows = [_row(index, r, origin) for index, r in enumerate(results, 1)]
-    table(f"{file}: {len(results)} motions{since}", COLUMNS, rows)
+    rows = [[cell.replace("\n", " ") for cell in row] for row in motion_cells(results, origin)]
+    table(f"{file}: {counted(len(results), 'motion')}{since}", tuple(COLUMNS), rows)
     for note in grouped_notes(results):
         out.print(note, markup=False)
 
@@ -89,27 +85,3 @@ def _draw(recording: "Recording", found: "list[MotionRows]", files: "FigureFiles
                 write(files, {f"{kind}_{index}": figure_of(f"motion {index}", (recording, motion))})
             except NotMeasurableError as error:
                 say(f"motion {index}: no figure {kind}: {error}")
-
-
-def _row(index: int, result: "MotionResult", origin: float) -> tuple[str, ...]:
-    overshoot = result.overshoot_m
-    return (
-        str(index),
-        number(result.start_s - origin),
-        number(result.stop_s - origin),
-        number(result.delay_ms, 1),
-        number(result.stabilisation_ms, 1),
-        number(result.cycle_ms, 1),
-        "–" if overshoot is None else f"{overshoot:.1e}",
-        number(result.residual_vibration_m_s2),
-        number(result.still_after_ms, 0),
-        number(result.peak_m_s2),
-        _with_interval(result.f_d_hz, result.f_d_interval_hz, 2),
-        _with_interval(result.zeta, result.zeta_interval, 3),
-    )
-
-
-def _with_interval(value: float | None, interval: tuple[float, float] | None, digits: int) -> str:
-    if value is None or interval is None:
-        return "–"
-    return f"{value:.{digits}f} ± {max(interval[1] - value, 0.0):.{digits}f}"

@@ -52,7 +52,8 @@ def file(
         return
     from tvist_lab.figures import study_figure
     from tvist_lab.report import study_page
-    from tvist_lab.study.study import StudyError, read_study
+    from tvist_lab.study.study import ENDS, StudyError, read_study
+    from tvist_lab.words import MANY
 
     places = Places(markdown=markdown, report=report)
     folder = kept.folder_of(file, output, processes, scheduler, look)
@@ -67,14 +68,16 @@ def file(
         **about,
         "summary": study.summary(rows),
     }
-    figure = study_figure(result["summary"], study.by, study.show)
+    few = min(entry["rows"] for entry in result["summary"]) < MANY
+    on_pages = {**result, "summary": study.summary(rows, ENDS)} if few else result
+    figure = study_figure(on_pages["summary"], study.by, study.show)
     with told(OSError):
         result["figure"] = str(look.into(folder).write(figure, "study"))
     places.write(
         result,
-        page=lambda: _page(study, result),
+        page=lambda: _page(study, on_pages),
         draw=lambda: {"study": figure},
-        web_page=lambda drawn: study_page(study, result, drawn, typed()),
+        web_page=lambda drawn: study_page(study, on_pages, drawn, typed()),
     )
     entries = result["summary"]
     kept.tell(result, entries, study.shown(entries), json=json, title=f"{study.title}: ")

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from tvist_lab.change import Change
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL
 
 POSES = {"Q1": "stretched out", "Q2": "stretched out to the side", "Q3": "folded"}
@@ -16,16 +17,14 @@ def answer(report: dict[str, Any], motion: str) -> list[str]:
         motion: Name of the motion to speak of.
     """
     start, end = motion.split("-")
-    unshaped, shaped = _pair(report, motion)
-    before, after = unshaped["peak_m_s2"], shaped["peak_m_s2"]
-    others = [f"{name}: {_in_short(*_pair(report, name))}" for name in report["baselines"] if name != motion]
-    shook = f"Unshaped, its tool shook with {_number(before)} m/s² after the motion; shaped, with "
-    took = f"The shaped motion took {shaped['delay_ms']:.0f} ms longer, "
-    gain = _gain(unshaped, shaped)
+    change, longer = _change(report, motion), report["baselines"][motion]["shaped"]["delay_ms"]
+    before, after = map(_number, (change.before, change.after))
+    others = [f"{name}: {_change(report, name).in_short()}" for name in report["baselines"] if name != motion]
+    yet = "yet " if change.gain_ms is not None and change.gain_ms > 0 else ""
     return [
         f"A simulated UR5e made the same motion twice, from {POSES[start]} ({start}) to {POSES[end]} ({end}).",
-        f"{shook}{_number(after)}: {_changed(before, after)}.",
-        f"{took}and {'yet ' if gain is not None and gain > 0 else ''}its tool {_rest(unshaped, shaped)}.",
+        f"Unshaped, its tool shook with {before} m/s² after the motion; shaped, with {after}: {change.less()}.",
+        f"The shaped motion took {longer:.0f} ms longer, and {yet}its tool {change.rest()}.",
         f"The other motions: {'; '.join(others)}.",
     ]
 
@@ -74,37 +73,10 @@ def checks(report: dict[str, Any], difference: str | None) -> dict[str, str]:
     return said
 
 
-def _pair(report: dict[str, Any], motion: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    methods = report["baselines"][motion]
-    return methods["unshaped"], methods["shaped"]
+def _change(report: dict[str, Any], motion: str) -> Change:
+    methods = [report["baselines"][motion][name] for name in ("unshaped", "shaped")]
+    return Change(*(method[figure] for figure in ("peak_m_s2", "still_after_ms") for method in methods))
 
 
 def _number(value: float | None) -> str:
     return "–" if value is None else f"{value:.2f}" if value >= 0.1 else f"{value:.3f}"
-
-
-def _changed(before: float | None, after: float | None) -> str:
-    """How much less or more it is."""
-    if before is None or after is None or before == 0.0:
-        return "not to be compared"
-    percent = 100.0 * (after / before - 1.0)
-    return f"{abs(percent):.0f} % {'less' if percent <= 0.0 else 'more'}"
-
-
-def _gain(unshaped: dict[str, Any], shaped: dict[str, Any]) -> int | None:
-    """By how much earlier the shaped tool comes to rest [ms]; None where one of the two does not."""
-    before, after = unshaped["still_after_ms"], shaped["still_after_ms"]
-    return None if before is None or after is None else round(before - after)
-
-
-def _rest(unshaped: dict[str, Any], shaped: dict[str, Any]) -> str:
-    gain = _gain(unshaped, shaped)
-    if gain is not None:
-        return f"came to rest {abs(gain)} ms {'earlier' if gain >= 0 else 'later'}"
-    if shaped["still_after_ms"] is not None:
-        return "came to rest, which the unshaped one did not"
-    return "was not at rest when the recording ended"
-
-
-def _in_short(unshaped: dict[str, Any], shaped: dict[str, Any]) -> str:
-    return f"{_changed(unshaped['peak_m_s2'], shaped['peak_m_s2'])}, {_rest(unshaped, shaped)}"
