@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from tvist_lab.recordings import Recording
     from tvist_view.beside import Run, Verdict
 
 
@@ -10,12 +11,9 @@ def judge(without: "Run", shaped: "Run") -> "Verdict":
     """Measure one motion without and with a shaper, each with the rest after it; what it lacks is None."""
     from tvist_lab.metrics.comparison import compare
     from tvist_lab.metrics.table import Measured
-    from tvist_lab.recordings.recorded_columns import recording_of_messages
     from tvist_view.beside import Verdict
 
-    first, second = (
-        Measured.of(recording_of_messages(run.states, run.events, run.truths)) for run in (without, shaped)
-    )
+    first, second = (Measured.of(_recording(run)) for run in (without, shaped))
     motions = compare(first, second).motions
     if not motions:
         return Verdict(None, None, None, None)
@@ -29,3 +27,16 @@ def judge(without: "Run", shaped: "Run") -> "Verdict":
         before=before,
         after=after,
     )
+
+
+def _recording(run: "Run") -> "Recording":
+    """One motion as columns: where a truth was lost on the way, by the sensor."""
+    from tvist_lab.recordings.recorded_columns import recording_of_messages
+
+    states, truths = run.states, run.truths
+    if truths:  # at both ends a state may have come without its truth
+        states = [state for state in states if truths[0].tick <= state.tick <= truths[-1].tick]
+    known = {truth.tick for truth in truths}
+    if not all(state.tick in known for state in states):
+        states, truths = run.states, []
+    return recording_of_messages(states, run.events, truths)

@@ -139,7 +139,10 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
 def _parts(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[list[int]]:
     """Return which columns stand in each part of a table so that none is wider than the screen."""
-    wide = [max(map(cell_len, cells)) + len(GAP) for cells in zip(columns, *rows, strict=True)]
+    wide = [
+        max(cell_len(line) for cell in cells for line in cell.split("\n")) + len(GAP)
+        for cells in zip(columns, *rows, strict=True)
+    ]
     parts = [[0]]
     for number in range(1, len(columns)):
         if len(parts[-1]) > 1 and sum(wide[one] for one in (*parts[-1], number)) - len(GAP) > out.width:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from tvist_view.look import Look
     from tvist_view.track import Track
 
+LEAD = 150
+"""Ticks at rest that are shown before a motion."""
+
 
 @dataclass(frozen=True)
 class Shows:
@@ -59,6 +62,41 @@ def recorded(file: Path) -> Shows:
     with told(RecordingError, TrackError, GeometryError, ValueError):
         content = read(file)
         return Shows(file.stem, [Track(Shown(file.stem, _look_of(content)), content.states, content.truths)])
+
+
+def repeated(file: Path) -> Shows:
+    """Of a recording, the motion without and with a shaper of which most vibration was taken away."""
+    from tvist_lab.metrics import Measured, pairs
+    from tvist_lab.recordings import RecordingError
+    from tvist_lab.recordings.mcap_file import read
+    from tvist_plant.plant import PERIOD
+    from tvist_view.beside import Verdict
+    from tvist_view.look import GeometryError
+    from tvist_view.playback import said
+    from tvist_view.track import Shown, Track, TrackError
+
+    with told(RecordingError, TrackError, GeometryError, ValueError):
+        content = read(file)
+        measured = Measured.of(content.recording)
+        found = [one for one in pairs(measured) if one.change.less_percent is not None]
+        if not found:
+            raise Failure(
+                f"{file} holds no motion both without and with a shaper: make it twice, with none first"
+            )
+        best = max(found, key=lambda one: one.change.less_percent or 0.0)
+        look, shaper = _look_of(content), best.shaper or "the shaper"
+        ticks = content.recording["tick"]
+        tracks = []
+        for place, label in ((best.unshaped, "without"), (best.shaped, f"with {shaper}")):
+            motion = measured.motions[place]
+            first, last = int(ticks[motion.start]) - LEAD, int(ticks[motion.end - 1])
+            states = [state for state in content.states if first <= state.tick <= last]
+            truths = [truth for truth in content.truths if first <= truth.tick <= last]
+            begun = content.recording.time[motion.start] - LEAD * PERIOD
+            tracks.append(Track(Shown(label, look), states, truths, begun))
+    change = best.change
+    verdict = Verdict(change.less_percent, change.gain_ms, change.before, change.after)
+    return Shows(f"{file.stem}: {best.name}", tracks, said(verdict, shaper, best.name))
 
 
 def compared(shapers: Sequence[str], robot: str) -> Shows:

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import err, progress
 from tvist_cli.pages import Door, serve_page
-from tvist_cli.tracks import Shows, compared, recorded
+from tvist_cli.tracks import Shows, compared, recorded, repeated
 
 LONGEST_S = 120.0
 """Longest recording that is written as film or HTML [s]."""
@@ -23,6 +23,7 @@ def view(
     name: str = "ur5e",
     security: Path | None = None,
     namespace: str = "",
+    beside: bool = False,
     compare: Annotated[tuple[str, ...] | None, Parameter(consume_multiple=True)] = None,
     robot: str = "ur5e",
     magnify: float = MAGNIFY,
@@ -43,6 +44,7 @@ def view(
         name: Name of the served robot that is shown at first.
         namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
+        beside: Of a recording, show the motion that it holds without and with a shaper, both at once.
         compare: Two or three shapers to simulate and to show beside each other: --compare none auto.
         robot: Name of the robot to simulate with --compare, or path of a robot file.
         magnify: Factor by which bending is drawn larger at first, 1 to 300.
@@ -59,9 +61,7 @@ def view(
     if film is not None and film.suffix.lower() not in FILMS:
         raise Failure(f"film is {film}: must end in {' or '.join(FILMS)}", code=2)
     door = Door(address, port, insecure)
-    shows = (
-        compared(compare, robot) if compare is not None else recorded(Path(what)) if _is_file(what) else None
-    )
+    shows = _recorded_or_simulated(what, compare, robot, both=beside)
     if shows is None:
         if film is not None or html is not None:
             raise Failure("--film and --html need a recording or --compare", code=2)
@@ -80,6 +80,19 @@ def view(
         err.print(f"wrote {html}")
     if film is None and html is None:
         shows.serve(magnify, door)
+
+
+def _recorded_or_simulated(
+    what: str, compare: tuple[str, ...] | None, robot: str, *, both: bool
+) -> Shows | None:
+    """What is played back; None: a served robot is shown live."""
+    if compare is not None:
+        return compared(compare, robot)
+    if _is_file(what):
+        return (repeated if both else recorded)(Path(what))
+    if both:
+        raise Failure("--beside needs a recording", code=2)
+    return None
 
 
 def _is_file(what: str) -> bool:

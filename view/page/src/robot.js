@@ -3,6 +3,7 @@ import * as THREE from "three";
 import { Arm } from "./arm.js";
 
 const TRACE = 120; // points
+const JUMP = 0.15; // way between two pictures that is not drawn as a trace [m]
 const APART = 0.02; // angle from which on the ghost is seen beside the arm [rad]
 
 export class Robot {
@@ -50,6 +51,7 @@ export class Robot {
     if (this.ghost.root.visible) this.ghost.pose(reference, []);
     this.line.visible = appearance.trace;
     const last = this.points.at(-1);
+    if (last && last.distanceTo(flange) > JUMP) this.points = [];
     if (!last || last.distanceToSquared(flange) > 1e-8) {
       this.points.push(flange);
       if (this.points.length > TRACE) this.points.shift();
