@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 LEAD = 150
 """Ticks at rest that are shown before a motion."""
+REST = 500
+"""Ticks that are shown after it."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def recorded(file: Path) -> Shows:
 
 
 def repeated(file: Path) -> Shows:
-    """Of a recording, the motion without and with a shaper of which most vibration was taken away."""
+    """Of a recording, the motion without and with a shaper by which the tool is at rest the most earlier."""
     from tvist_lab.metrics import Measured, pairs
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read
@@ -83,16 +85,17 @@ def repeated(file: Path) -> Shows:
             raise Failure(
                 f"{file} holds no motion both without and with a shaper: make it twice, with none first"
             )
-        best = max(found, key=lambda one: one.change.less_percent or 0.0)
+        best = max(found, key=lambda one: (one.change.gain_ms or 0, one.change.less_percent))
         look, shaper = _look_of(content), best.shaper or "the shaper"
         ticks = content.recording["tick"]
         tracks = []
         for place, label in ((best.unshaped, "without"), (best.shaped, f"with {shaper}")):
             motion = measured.motions[place]
-            first, last = int(ticks[motion.start]) - LEAD, int(ticks[motion.end - 1])
+            first = int(ticks[motion.start]) - LEAD
+            last = min(int(ticks[motion.reference_stop]) + REST, int(ticks[motion.end - 1]))
             states = [state for state in content.states if first <= state.tick <= last]
             truths = [truth for truth in content.truths if first <= truth.tick <= last]
-            begun = content.recording.time[motion.start] - LEAD * PERIOD
+            begun = float(content.recording.time[motion.start]) - LEAD * PERIOD
             tracks.append(Track(Shown(label, look), states, truths, begun))
     change = best.change
     verdict = Verdict(change.less_percent, change.gain_ms, change.before, change.after)

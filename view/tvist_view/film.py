@@ -42,7 +42,7 @@ LEAD_S = 0.25
 """Of a single motion the plot begins this long before the stop: there it matters [s]."""
 HOLD_S = 2.0
 """Time for which the last picture stays [s]."""
-QUALITY = 62
+QUALITY = 76
 """Of a WebP's pictures, of 100."""
 
 

@@ -16,6 +16,8 @@ EVERY = 5
 
 MOVES = 1e-7
 """Change of a reference within a tick from which on it moves [rad]."""
+SET = 0.05
+"""Change of a reference within a tick from which on it was set elsewhere, as by a reset [rad]."""
 CALM = 50
 """Ticks of rest from which on a motion has ended."""
 
@@ -70,7 +72,8 @@ class Track:
     def stops(self) -> list[float]:
         """Times at which the reference before the shaper came to rest for a while [s]."""
         q = np.array([state.reference_q for state in self._states])
-        moves = np.abs(np.diff(q, axis=0, prepend=q[:1])).max(axis=1) > MOVES
+        change = np.abs(np.diff(q, axis=0, prepend=q[:1])).max(axis=1)
+        moves = (change > MOVES) & (change < SET)
         ends = np.flatnonzero(moves[:-1] & ~moves[1:])
         return [float(self.signals.time[end]) for end in ends if not moves[end + 1 : end + CALM].any()]
 

@@ -71,7 +71,7 @@ def _print_next(recording: Path) -> None:
     """Print four commands that work as they stand; each is one line, however narrow the terminal, to be copied."""
     name = program()
     commands = {
-        f"{name} view {recording} --magnify 100": "plays the motions back on a web page, the bending drawn larger",
+        f"{name} view {recording} --beside": "shows a motion without and with shaping on a web page, magnified",
         f"{name} paper --runs 1 --no-baselines": "prints the paper's tables beside ours",
         f"{name} serve": "starts a robot: leave it running, and in a second terminal",
         f"{name} move Q3 --shaper none": "moves it, unshaped; with --shaper zv, shaped",
