@@ -8,6 +8,7 @@ import jsonschema
 import msgpack
 import pytest
 
+from .served import Served, free_endpoint
 from .wire import PATIENCE, PLAYING, Q1, STATE_FIELDS, STOPPED, TICK, Wire
 
 Q_NEAR = [angle + 0.1 for angle in Q1]
@@ -204,10 +205,11 @@ class TestWhatIsSaid:
         assert second["tick"] > first["tick"]
         assert second["ticks_per_second"] > 0.0
 
-    def test_truth_is_told_only_where_the_server_was_asked_to(self, live, stepped):
-        live.listen("state", "truth")
-        live.until(live.wait("state")["tick"] + 100)
-        assert live.received["truth"] == []
+    def test_truth_is_told_where_the_server_was_asked_to_and_to_who_asks_on_its_own_machine(
+        self, live, stepped
+    ):
+        live.listen("truth")
+        live.wait("truth")
         stepped.listen("truth")
         with stepped.control() as token:
             tick = stepped.step(token, 2)["tick"]
@@ -221,6 +223,17 @@ class TestWhatIsSaid:
             for reply in live.session.liveliness().get("tvist/*/alive", timeout=PATIENCE)
         ]
         assert keys == ["tvist/ur5e/alive"]
+
+
+def test_truth_is_not_told_to_who_may_be_on_another_machine():
+    port = free_endpoint().rpartition(":")[2]
+    with (
+        Served("--insecure", endpoint=f"tcp/0.0.0.0:{port}"),
+        Wire(f"tcp/127.0.0.1:{port}") as wire,
+    ):
+        wire.listen("state", "truth")
+        wire.until(wire.wait("state")["tick"] + 100)
+        assert wire.received["truth"] == []
 
 
 def test_a_message_may_come_on_no_key_but_its_own(live):

@@ -65,7 +65,7 @@ class Watcher:
                 "frame",
                 {
                     "t": state.timestamp,
-                    "row": [round(value, 7) for value in row],
+                    "row": [round(value, 6) for value in row],
                     "samples": columns,
                     "f_d": state.estimated_f_d[0] if state.estimated_f_d else None,
                     "zeta": state.estimated_zeta[0] if state.estimated_zeta else None,

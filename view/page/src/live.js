@@ -6,6 +6,7 @@ import { inWords, Stage } from "./stage.js";
 import { motionsOf } from "./words.js";
 
 const SPAN = 6; // seconds shown
+const PLOT_EVERY = 3; // pictures of the arm
 const JOG_MS = 50; // how often the page says that a jog button is still down
 const WAITS_MS = 1500; // until the page asks for its server again
 
@@ -228,11 +229,13 @@ export class Live {
   _draw() {
     if (this.drawn || !this.last || !this.robot) return;
     this.drawn = true;
+    this.send({ do: "seen" });
     this.robot.show(this.last, this.stage.appearance);
+    this.pictures = (this.pictures ?? 0) + 1;
+    if (this.pictures % PLOT_EVERY) return;
     const seconds = this.columns[0].map((time) => time - this.now);
     this.alpha.show([seconds, this.columns[1]]);
     this.qdd.show([seconds, this.columns[2], this.columns[3]]);
     this.alpha.say(this.note ?? "");
-    this.send({ do: "seen" });
   }
 }

@@ -43,6 +43,10 @@ export class Robot {
   }
 
   show(row, appearance) {
+    // An arm that stands still is not drawn again: without a graphics processor each picture takes a whole core.
+    const asked = JSON.stringify([Array.from(row), appearance]);
+    if (asked === this.asked) return;
+    this.asked = asked;
     const { q, bends, reference } = Robot.drawn(row, this.joints, this.links, appearance);
     const flange = this.arm.pose(q, bends);
     // Where both coincide, their surfaces would flicker.
@@ -64,6 +68,7 @@ export class Robot {
   }
 
   forget() {
+    this.asked = null;
     this.points = [];
     this.line.geometry.setDrawRange(0, 0);
   }
