@@ -68,6 +68,8 @@ def recorded(file: Path) -> Shows:
 
 def repeated(file: Path) -> Shows:
     """Of a recording, the motion without and with a shaper by which the tool is at rest the most earlier."""
+    import numpy as np
+
     from tvist_lab.metrics import Measured, pairs
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read
@@ -91,7 +93,10 @@ def repeated(file: Path) -> Shows:
         tracks = []
         for place, label in ((best.unshaped, "without"), (best.shaped, f"with {shaper}")):
             motion = measured.motions[place]
-            first = int(ticks[motion.start]) - LEAD
+            before = slice(max(motion.start - LEAD, 0), motion.start + 1)
+            way = np.abs(np.diff(content.recording["reference_q"][before], axis=0)).max(axis=1)
+            set_elsewhere = np.flatnonzero(way > 0.0)  # as by a reset
+            first = int(ticks[before][set_elsewhere[-1] + 1 if len(set_elsewhere) else 0])
             last = min(int(ticks[motion.reference_stop]) + REST, int(ticks[motion.end - 1]))
             states = [state for state in content.states if first <= state.tick <= last]
             truths = [truth for truth in content.truths if first <= truth.tick <= last]

@@ -458,6 +458,12 @@ def test_the_demonstration_replays_equal_and_its_recording_gives_the_same_figure
     first = tvist("log", "report", tmp_path / "demo" / "demo.mcap", *page).assert_done().json["verdict"][0]
     assert f"{100.0 * (1.0 - after / before):.0f} %" in first
     assert "less vibration after the stop with zv than without a shaper, at rest" in first
+    shown = tmp_path / "beside.html"
+    tvist("view", tmp_path / "demo" / "demo.mcap", "--beside", "--html", shown).assert_done()
+    boot = json.loads(re.search(r'id="boot">(.*?)</script>', shown.read_text()).group(1))
+    assert boot["result"]["less_percent"] == pytest.approx(100.0 * (1.0 - after / before))
+    assert boot["result"]["motion"] == "Q1 → Q3"
+    assert [track["label"] for track in boot["tracks"]] == ["without", "with zv"]
 
 
 def test_the_paper_in_one_run_prints_its_tables(tmp_path):

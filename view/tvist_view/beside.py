@@ -117,13 +117,15 @@ async def _pass(robot: Robot, seconds: float) -> None:
     await robot.until(now + round(seconds / 0.002))
 
 
-def _curves(look: Look, *runs: Run) -> dict[str, list[float]]:
-    """|α| of both motions over the time since each began."""
-    shown = []
+def _curves(look: Look, *runs: Run) -> dict[str, Any]:
+    """|α| of both motions over the time since each began, and when the reference of the first one stopped."""
+    shown, stop = [], 0.0
     for run in runs:
         signals = signals_of(look, run.states, {truth.tick: truth for truth in run.truths})
         moving = np.flatnonzero(signals.unshaped > 1e-3)
         begun = signals.time[moving[0]] if len(moving) else signals.time[0]
+        if len(moving) and not stop:
+            stop = round(float(signals.time[moving[-1]] - begun), 4)
         shown.append((signals.time - begun, np.nan_to_num(signals.alpha)))
     last = max(time[-1] for time, _ in shown)
     grid = np.linspace(0.0, last, POINTS)
@@ -134,4 +136,4 @@ def _curves(look: Look, *runs: Run) -> dict[str, list[float]]:
         inside = time >= 0.0
         np.maximum.at(out, np.searchsorted(grid, time[inside]).clip(0, POINTS - 1), alpha[inside])
         curves.append(np.round(out, 4).tolist())
-    return {"time": np.round(grid, 4).tolist(), "without": curves[0], "shaped": curves[1]}
+    return {"stop": stop, "time": np.round(grid, 4).tolist(), "without": curves[0], "shaped": curves[1]}

@@ -29,6 +29,7 @@ export function slider(label, { min, max, step, value, unit = "", hint = "", cha
     },
     onchange: () => changed?.(+input.value),
   });
+  write(said, `${show(+input.value)}${unit}`); // a slider keeps to its steps
   const row = h("label", { class: "row", title: hint }, h("span", {}, label), input, said);
   return { row, input, value: () => +input.value, set: (v) => { input.value = v; write(said, `${show(v)}${unit}`); } };
 }

@@ -18,7 +18,7 @@ export class Lesson {
     this.tabs = ["One mass", "UR5e"].map((name, number) => h("button", { type: "button", role: "tab", onclick: () => this.open(number) }, name));
     bar.append(h("div", { class: "line", role: "tablist" }, logo, h("b", {}, "Why an arm rings, and what two impulses do"), h("span", { class: "space" }), ...this.tabs));
     this.turn = turn;
-    this.one = [1, -1].map((side, i) => new Robot(scene, look, { at: [0, side * APART, 0], colour: TWO[i].colour }));
+    this.one = [-1, 1].map((side, i) => new Robot(scene, look, { at: [0, side * APART, 0], colour: TWO[i].colour }));
     this.swings = new Plot(plots, "Deflection of the spring [mrad]", TWO, { least: 5, signed: true });
     this.curve = new Plot(plots, "Vibration that two impulses leave [%]", [{ label: "over the error of the frequency [%]", colour: COLOURS.with }, { label: "this one", colour: COLOURS.without, points: true }], { least: 100, x: "%" });
     const ask = () => this.ask();
@@ -26,14 +26,14 @@ export class Lesson {
     this.f_d = slider("frequency", { min: low, max: high, step: 0.01, value: (low + high) / 2, unit: " Hz", show: (v) => v.toFixed(2), moved: ask,
       hint: "The elbow gives it: stretched out the arm is heavy and slow, folded it is light and quick." });
     this.zeta = slider("damping ζ", { min: 0, max: 0.3, step: 0.005, value: 0.03, show: (v) => v.toFixed(3), moved: ask, hint: "How soon it stops by itself." });
-    this.error = slider("error", { min: -50, max: 50, step: 1, value: 0, unit: " %", moved: ask, hint: "How wrong the frequency is that the shaper believes in." });
+    this.error = slider("its error", { min: -50, max: 50, step: 1, value: 0, unit: " %", moved: ask, hint: "How wrong the frequency is that the shaper believes in." });
     this.words = h("p", {});
     this.large = h("p", { class: "big" });
     const first = h("div", {}, h("h2", {}, "One mass on a spring"),
       h("p", {}, "An arm that turns and stops swings on, like a mass on a spring: the orange one. The blue one makes the same motion in two parts, half of it at once, half of it half a swing later. The second half swings against the first, and nothing is left."),
-      h("p", {}, "That takes the right frequency. Give the shaper a wrong one, and see what stays."),
+      h("p", {}, "That takes the right frequency. Give the shaper a wrong one, by its error, and see what stays."),
       this.f_d.row, this.zeta.row, this.error.row, this.large, this.words);
-    this.armError = slider("error", { min: -50, max: 50, step: 1, value: 0, unit: " %" });
+    this.armError = slider("its error", { min: -50, max: 50, step: 1, value: 0, unit: " %" });
     this.armZeta = slider("believed ζ", { min: 0, max: 0.6, step: 0.01, value: zeta, show: (v) => v.toFixed(2) });
     this.go = h("button", { type: "button", class: "ab", onclick: () => this.run() }, "Move the UR5e");
     this.armLarge = h("p", { class: "big" });

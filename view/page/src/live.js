@@ -1,11 +1,12 @@
 // The live page: a robot that is served, and the cockpit that moves it.
 import { check, h, LOGO, slider, write } from "./dom.js";
-import { COLOURS, Plot } from "./plots.js";
+import { COLOURS, Plot, roundUp } from "./plots.js";
 import { Robot } from "./robot.js";
 import { inWords, Stage } from "./stage.js";
 import { motionsOf } from "./words.js";
 
 const SPAN = 6; // seconds shown
+const BEFORE_S = 0.2, SETTLED_S = 0.05; // of an A/B: shown before the stop, and left out of the scale after it
 const PLOT_EVERY = 3; // pictures of the arm
 const JOG_MS = 50; // how often the page says that a jog button is still down
 const WAITS_MS = 1500; // until the page asks for its server again
@@ -54,7 +55,7 @@ export class Live {
     logo.innerHTML = LOGO;
     this.stage.bar.append(
       h("div", { class: "line" }, logo, this.picker, this.state, this.who, this.take, h("span", { class: "space" }), this.stop),
-      h("div", { class: "line scrolls" }, this.motions, h("label", { class: "shaper" }, "shaper ", this.shaper), this.ab, this.open));
+      h("div", { class: "line scrolls" }, this.ab, this.motions, h("label", { class: "shaper" }, "shaper ", this.shaper), this.open));
     this.more = document.getElementById("more");
   }
 
@@ -219,10 +220,16 @@ export class Live {
     this.over = null;
     this.alpha.box.hidden = !!result;
     if (!result) return;
+    // Braking would hide what rings after it: the scale is that of the rest.
+    const curves = [result.without, result.shaped];
+    const rings = curves.flatMap((curve) => curve.filter((_, i) => result.time[i] > result.stop + SETTLED_S));
+    const most = roundUp(1.1 * Math.max(...rings, 0.1));
     this.over = new Plot(this.stage.plots, "Tool acceleration |α| [m/s²]",
-      [{ label: "without", colour: COLOURS.without }, { label: `with ${result.with}`, colour: COLOURS.with }]);
+      [{ label: "without", colour: COLOURS.without }, { label: `with ${result.with}`, colour: COLOURS.with }],
+      { range: [Math.max(result.stop - BEFORE_S, 0), result.time.at(-1)], least: most });
+    this.over.say("around the stop");
     this.stage.plots.prepend(this.over.box);
-    this.over.show([result.time, result.without, result.shaped]);
+    this.over.show([result.time, ...curves.map((curve) => curve.map((value) => Math.min(value, most)))]);
     this.over.box.append(h("button", { type: "button", class: "close", ariaLabel: "back to the live plot", onclick: () => this._overlay(null) }, "×"));
   }
 

@@ -18,7 +18,7 @@ export class Stage {
     this.notice = h("div", { class: "notice", hidden: true, role: "alert" });
     const views = ["front", "side", "top", "reset"].map((view) =>
       h("button", { type: "button", onclick: () => this.scene.look(view), title: `look from the ${view}` }, view));
-    this.main.append(this.badge, h("div", { class: "views" }, ...views), this.card, this.notice);
+    this.main.append(this.badge, h("div", { class: "views" }, "view ", ...views), this.card, this.notice);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.scene.setTheme(theme()));
     new ResizeObserver(() => this.resize()).observe(this.main);
     this.resize();
@@ -88,10 +88,12 @@ export class Stage {
   }
 }
 
+const figure = (value) => value.toFixed(value < 0.1 ? 3 : 2);
+
 /** The result of a comparison in words, as `tvist demo` says it. */
 export function inWords({ less_percent: less, earlier_ms: earlier, before, after, with: name, motion }) {
   const large = less === null ? "not measurable" : `${Math.abs(less).toFixed(0)} % ${less >= 0 ? "less" : "more"} vibration`;
   const second = earlier === null ? "" : `at rest ${Math.abs(earlier).toFixed(0)} ms ${earlier >= 0 ? "earlier" : "later"}`;
-  const figures = before === null || after === null ? "" : `: without ${before.toFixed(2)}, with ${name} ${after.toFixed(2)} m/s² after the stop`;
+  const figures = before === null || after === null ? "" : `: without ${figure(before)}, with ${name} ${figure(after)} m/s² after the stop`;
   return { large, second, small: `${motion}${figures}` };
 }
