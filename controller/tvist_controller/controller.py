@@ -323,7 +323,8 @@ class Controller(WholeRobot):
             ValueError: The plant does not provide it.
         """
         try:
-            return self._reporter.truth(self.tick_number, self.cycle.line.plant)
+            plant = self.cycle.line.plant
+            return self._reporter.truth(self.tick_number, plant, with_modes=self.setup.truth)
         except PlantError as error:
             self._failed = error
             return None

@@ -10,6 +10,7 @@ from tvist_plant.plant import PERIOD, ModalPlant, Plant, PlantTruth, Truthful
 from tvist_protocol.stream import Truth
 from tvist_shaping.base import Filter
 
+NO_MODES: dict[str, list[float]] = {"f_d": [], "zeta": [], "participation": []}
 TRUE_MODES_EVERY = 50
 """Ticks between two computations of the arm's true modes, whose eigenvalue problem takes a good part of a tick."""
 
@@ -61,15 +62,20 @@ class Reporter:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self._kinematics = self._kinematics.with_tool(offset)
 
-    def truth(self, tick: int, plant: Plant) -> Truth:
+    def truth(self, tick: int, plant: Plant, *, with_modes: bool) -> Truth:
         """Return what a real robot cannot measure, after a tick.
 
         Its modes are updated every `TRUE_MODES_EVERY` ticks; they are empty lists if the plant does not provide them.
 
+        Args:
+            tick: Number of the tick.
+            plant: The plant.
+            with_modes: Whether modes are wanted: they take half a tick to compute.
+
         Raises:
             ValueError: The plant does not provide the truth.
         """
-        if not self._true_modes or tick % TRUE_MODES_EVERY == 0:
+        if with_modes and (not self._true_modes or tick % TRUE_MODES_EVERY == 0):
             modes = plant.modes() if isinstance(plant, ModalPlant) else None
             self._true_modes = {
                 name: [] if modes is None else getattr(modes, name)[: self._joints].tolist()
@@ -87,7 +93,7 @@ class Reporter:
             tool_acceleration=truth.specific_force.tolist(),
             static_gear_deflection=_listed(truth.static_gear_deflection),
             static_link_deflection=_listed(truth.static_link_deflection),
-            **self._true_modes,
+            **(self._true_modes or NO_MODES),
         )
 
     def restart(self) -> None:
