@@ -1,10 +1,21 @@
 """How much less a motion shakes with a shaper, by the same measure as `tvist log compare`."""
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from msgspec.structs import replace
+
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tvist_lab.recordings import Recording
+    from tvist_protocol.stream import Truth
     from tvist_view.beside import Run, Verdict
+
+PERIOD = 0.002
+"""Duration of a tick [s]."""
+MOST = 0.8
+"""Share of the ticks whose truth must have come for it to be used: a busy machine loses some [-]."""
 
 
 def judge(without: "Run", shaped: "Run") -> "Verdict":
@@ -30,13 +41,28 @@ def judge(without: "Run", shaped: "Run") -> "Verdict":
 
 
 def _recording(run: "Run") -> "Recording":
-    """One motion as columns: where a truth was lost on the way, by the sensor."""
+    """One motion as columns, by the truth, or by the sensor where few truths have come."""
     from tvist_lab.recordings.recorded_columns import recording_of_messages
 
-    states, truths = run.states, run.truths
-    if truths:  # at both ends a state may have come without its truth
-        states = [state for state in states if truths[0].tick <= state.tick <= truths[-1].tick]
-    known = {truth.tick for truth in truths}
-    if not all(state.tick in known for state in states):
-        states, truths = run.states, []
-    return recording_of_messages(states, run.events, truths)
+    truths = sorted(run.truths, key=lambda truth: truth.tick)
+    if len(truths) < MOST * len(run.states):
+        return recording_of_messages(run.states, run.events)
+    # At both ends a state may have come without its truth.
+    states = [state for state in run.states if truths[0].tick <= state.tick <= truths[-1].tick]
+    between = [truth for first, second in pairwise(truths) for truth in _between(first, second)]
+    return recording_of_messages(
+        states, run.events, sorted([*truths, *between], key=lambda truth: truth.tick)
+    )
+
+
+def _between(first: "Truth", second: "Truth") -> "Iterator[Truth]":
+    """What was lost between two truths, by a straight line: |α| falls steeply at a stop, so that a hole would show."""
+    for tick in range(first.tick + 1, second.tick):
+        share = (tick - first.tick) / (second.tick - first.tick)
+        mixed = {
+            name: [
+                a + share * (b - a) for a, b in zip(getattr(first, name), getattr(second, name), strict=True)
+            ]
+            for name in ("tool_acceleration", "flange_pose")
+        }
+        yield replace(first, tick=tick, timestamp=first.timestamp + (tick - first.tick) * PERIOD, **mixed)
