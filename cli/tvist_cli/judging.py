@@ -5,39 +5,39 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
+from tvist_plant.plant import PERIOD
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from tvist_lab.change import Change
     from tvist_lab.recordings import Recording
     from tvist_protocol.stream import Truth
     from tvist_view.beside import Run, Verdict
 
-PERIOD = 0.002
-"""Duration of a tick [s]."""
 MOST = 0.8
 """Share of the ticks whose truth must have come for it to be used: a busy machine loses some [-]."""
 
 
 def judge(without: "Run", shaped: "Run") -> "Verdict":
     """Measure one motion without and with a shaper, each with the rest after it; what it lacks is None."""
+    from tvist_lab.change import Change
     from tvist_lab.metrics.comparison import compare
     from tvist_lab.metrics.table import Measured
-    from tvist_view.beside import Verdict
 
     first, second = (Measured.of(_recording(run)) for run in (without, shaped))
     motions = compare(first, second).motions
     if not motions:
-        return Verdict(None, None, None, None)
-    one = motions[0]
-    before, after = one.first.peak_m_s2, one.second.peak_m_s2
-    still = one.first.still_after_ms, one.second.still_after_ms
-    change = one.impact_percent["peak"]
-    return Verdict(
-        less_percent=None if change is None else -change,
-        earlier_ms=None if still[0] is None or still[1] is None else still[0] - still[1],
-        before=before,
-        after=after,
-    )
+        return verdict(Change(None, None, None, None))
+    both = motions[0].first, motions[0].second
+    return verdict(Change(*(one.peak_m_s2 for one in both), *(one.still_after_ms for one in both)))
+
+
+def verdict(change: "Change") -> "Verdict":
+    """What a shaper changed, as the page is told."""
+    from tvist_view.beside import Verdict
+
+    return Verdict(change.less_percent, change.gain_ms, change.before, change.after)
 
 
 def _recording(run: "Run") -> "Recording":

@@ -19,7 +19,7 @@ NICE = 5
 
 @dataclass(frozen=True)
 class Door:
-    """Where a page is served."""
+    """Address and port of a page."""
 
     address: str
     port: int

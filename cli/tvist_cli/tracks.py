@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.judging import judge
+from tvist_cli.judging import judge, verdict
 from tvist_cli.output import progress
 from tvist_cli.pages import Door, serve_page
 from tvist_cli.serving import compile_if_new
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from tvist_view.look import Look
     from tvist_view.track import Track
 
+MAGNIFY = 100.0
+"""Magnification of the bending, unless another is given [-]."""
 LEAD = 150
 """Ticks at rest that are shown before a motion."""
 REST = 500
@@ -25,7 +27,7 @@ REST = 500
 
 @dataclass(frozen=True)
 class Shows:
-    """What is shown."""
+    """Runs for a page to play back."""
 
     title: str
     tracks: "list[Track]"
@@ -74,7 +76,6 @@ def repeated(file: Path) -> Shows:
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read
     from tvist_plant.plant import PERIOD
-    from tvist_view.beside import Verdict
     from tvist_view.look import GeometryError
     from tvist_view.playback import said
     from tvist_view.track import Shown, Track, TrackError
@@ -102,9 +103,7 @@ def repeated(file: Path) -> Shows:
             truths = [truth for truth in content.truths if first <= truth.tick <= last]
             begun = float(content.recording.time[motion.start]) - LEAD * PERIOD
             tracks.append(Track(Shown(label, look), states, truths, begun))
-    change = best.change
-    verdict = Verdict(change.less_percent, change.gain_ms, change.before, change.after)
-    return Shows(f"{file.stem}: {best.name}", tracks, said(verdict, shaper, best.name))
+    return Shows(f"{file.stem}: {best.name}", tracks, said(verdict(best.change), shaper, best.name))
 
 
 def compared(shapers: Sequence[str], robot: str) -> Shows:

@@ -125,16 +125,22 @@ class Host:
             for event in events:
                 sink.event(event)
             sink.report(report)
-        published = self.controller.setup.truth
-        wanting = [sink for sink in self._sinks if published or sink.wants_truth]
-        if wanting and (truth := self.controller.truth()) is not None:
-            for sink in wanting:
-                sink.truth(truth)
+        self._tell_truth()
         if self.controller.session.lease is not self.standing.lease:
             self.standing = self._standing()
         for one in news:
             self.socket(one)
         self.tell_raised()
+
+    def _tell_truth(self) -> None:
+        """Pass on what a real robot cannot measure, computed once, to those who want it."""
+        published, truth = self.controller.setup.truth, None
+        for sink in self._sinks:
+            if published or sink.wants_truth:
+                truth = truth or self.controller.truth()
+                if truth is None:
+                    return
+                sink.truth(truth)
 
     def tell_raised(self) -> None:
         """Pass on what methods of the plant have raised."""

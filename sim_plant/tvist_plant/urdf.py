@@ -57,7 +57,7 @@ def read_urdf(path: str | Path) -> dict[str, Any]:
             if link not in links:
                 raise UrdfError(f"{where}: joint {joint.name}: there is no link {link!r:.{LONGEST_NAME}}")
     base = _root(links, joints, where)
-    tree = _Tree(joints)
+    tree = _Tree(base, joints)
     chain = _chain(base, tree, where)
     return _content(str(root.get("name") or Path(path).stem), Path(path), links, tree, chain, where)
 
@@ -65,7 +65,8 @@ def read_urdf(path: str | Path) -> dict[str, Any]:
 class _Tree:
     """Joints by the links that they connect, found without looking at all of them."""
 
-    def __init__(self, joints: list[Joint]) -> None:
+    def __init__(self, root: str, joints: list[Joint]) -> None:
+        self.root = root
         self.to = {joint.child: joint for joint in joints}
         self.of: defaultdict[str, list[Joint]] = defaultdict(list)
         for joint in joints:
@@ -149,11 +150,9 @@ def _content(
             upright[:2, 3] = 0.0
             placement = upright @ placement
         placements.append([*placement[:3, 3].tolist(), *angles(placement[:3, :3])])
-    root, away = chain[0].parent, np.eye(4)
-    while root in tree.to:
-        root = tree.to[root].parent
+    away = np.eye(4)
     away[:2, 3] = -first[:2, 3]  # the base frame is on the first joint's axis
-    shown = [(-1, root, away), *((at, joint.child, intos[at]) for at, joint in enumerate(chain))]
+    shown = [(-1, tree.root, away), *((at, joint.child, intos[at]) for at, joint in enumerate(chain))]
     meshes = [
         mesh
         for at, link, into in shown

@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 import threading
@@ -12,18 +11,11 @@ import pytest
 from tests import forked
 from tests.conformance.served import PATIENCE
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-ARGUMENTS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-]
+from tvist_view.film import FLAGS
+from tvist_view.film import browser as browser_that_draws
+
+CHROMIUM = browser_that_draws()
+ARGUMENTS = [flag for flag in FLAGS if not flag.startswith("--headless")]  # playwright says that itself
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """The page in the repository is what its sources build."""
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -24,3 +25,11 @@ def test_building_the_page_again_gives_the_same_bytes(tmp_path):
     for name in ("page.html", "page.licences.txt"):
         built, kept = ((folder / name).read_bytes() for folder in (tmp_path, VIEW / "tvist_view"))
         assert built == kept, f"{name} is not what view/page builds: run make page"
+
+
+def test_the_logo_of_page_and_report_is_that_of_the_documents():
+    drawn = re.findall(r' d="([^"]+)"', (VIEW.parent / "docs" / "images" / "logo.svg").read_text())
+    assert drawn
+    for file in ("view/tvist_view/page.html", "lab/tvist_lab/report/page.html.j2"):
+        text = (VIEW.parent / file).read_text()
+        assert all(path in text for path in drawn), file

@@ -15,10 +15,10 @@ from tvist_protocol.errors import ProtocolError, RefusedError
 from tvist_protocol.stream import Event, State, Truth
 from tvist_view.look import Look
 from tvist_view.pilot import Doing, motion
-from tvist_view.signals import signals_of
+from tvist_view.signals import moves, signals_of
 
-REST_S = 1.0
-"""Time after a motion that is looked at, and in which the arm comes to rest before the next one [s]."""
+REST = 500
+"""Ticks after a motion that are looked at, half of which let the arm come to rest before one."""
 POINTS = 600
 """Points of a curve that the page draws."""
 
@@ -79,12 +79,12 @@ def beside(
             for name, words in (("none", "without"), (shaper, f"with {shaper}")):
                 tell(f"{words}: to the start …")
                 await motion([start])(arm)
-                await _pass(robot, REST_S / 2)
+                await robot.advance(REST // 2)
                 await arm.set_shaper(name, modes=info.modes)
                 tell(f"{words} …")
                 with _gathered(robot) as gathered:
                     await arm.move_j(end)
-                    await _pass(robot, REST_S)
+                    await robot.advance(REST)
                 runs.append(gathered)
             verdict = await asyncio.to_thread(judge, *runs)
             done({**vars(verdict), "with": shaper, **_curves(look, *runs)})
@@ -111,22 +111,14 @@ def _gathered(robot: Robot) -> Iterator[Run]:
             end()
 
 
-async def _pass(robot: Robot, seconds: float) -> None:
-    """Let simulation time pass."""
-    now = (await robot.state()).tick
-    await robot.until(now + round(seconds / 0.002))
-
-
 def _curves(look: Look, *runs: Run) -> dict[str, Any]:
     """|α| of both motions over the time since each began, and when the reference of the first one stopped."""
-    shown, stop = [], 0.0
-    for run in runs:
-        signals = signals_of(look, run.states, {truth.tick: truth for truth in run.truths})
-        moving = np.flatnonzero(signals.unshaped > 1e-3)
-        begun = signals.time[moving[0]] if len(moving) else signals.time[0]
-        if len(moving) and not stop:
-            stop = round(float(signals.time[moving[-1]] - begun), 4)
-        shown.append((signals.time - begun, np.nan_to_num(signals.alpha)))
+    signals = [signals_of(look, run.states, {truth.tick: truth for truth in run.truths}) for run in runs]
+    spans = [moves(one) or (one.time[0], one.time[0]) for one in signals]
+    stop = round(float(spans[0][1] - spans[0][0]), 4)
+    shown = [
+        (one.time - begun, np.nan_to_num(one.alpha)) for one, (begun, _) in zip(signals, spans, strict=True)
+    ]
     last = max(time[-1] for time, _ in shown)
     grid = np.linspace(0.0, last, POINTS)
     # The largest value in each step, so that no peak is lost between two points.

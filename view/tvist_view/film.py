@@ -4,14 +4,16 @@ import asyncio
 import io
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from PIL import Image
+from websockets.exceptions import ConnectionClosed
 
+from tvist_view.signals import BRAKES_S
 from tvist_view.stage import Tab, open_stage, page
 from tvist_view.track import Track
 
@@ -32,8 +34,6 @@ FLAGS = (
 )
 FIRST_S, NEXT_S = 120.0, 60.0
 """Time that the browser may take for the first picture, and for each later one [s]."""
-SETTLED_S = 0.02
-"""Time after a stop within which the tool still brakes [s]."""
 SLOW, SLOW_S = 5, 0.4
 """After a stop everything is this much slower, for this long [s]: the arm rings for a few tenths of a second."""
 REST_S = 1.0
@@ -85,7 +85,7 @@ class Film:
         self.end = max(track.end for track in tracks)
         self._stops = [track.stops for track in tracks]
         after = [
-            track.signals.between(at + SETTLED_S, at + REST_S).largest_alpha()
+            track.signals.between(at + BRAKES_S, at + REST_S).largest_alpha()
             for track, stops in zip(tracks, self._stops, strict=True)
             for at in stops
         ]
@@ -113,7 +113,7 @@ class Film:
         return found[:-1] or found
 
     def _slow(self, time: float) -> bool:
-        return any(at - SETTLED_S <= time < at + SLOW_S for at in self._stops[0])
+        return any(at - BRAKES_S <= time < at + SLOW_S for at in self._stops[0])
 
     async def pictures(
         self, times: Sequence[float], progress: Callable[[], None] = lambda: None
@@ -123,28 +123,33 @@ class Film:
         Raises:
             FilmError: There is no browser, or it draws nothing.
         """
-        drawn: asyncio.Future[list[Image.Image]] = asyncio.get_running_loop().create_future()
+        tabs: asyncio.Queue[Tab] = asyncio.Queue()
+        drawn = asyncio.Event()
 
         async def meet(tab: Tab) -> None:
-            found: list[Image.Image] = []
-            told = aiter(tab)
-            for time in times:
-                content = {"time": time - self.start, "slow": SLOW if self._slow(time) else 1}
-                await tab.send("draw", content)
-                picture = await asyncio.wait_for(anext(told), NEXT_S if found else FIRST_S)
-                found.append(Image.open(io.BytesIO(picture)).convert("RGB"))  # type: ignore[arg-type]
-                progress()
-            drawn.set_result(found)
+            tabs.put_nowait(tab)
+            await drawn.wait()  # its connection ends with this
 
-        async with open_stage(page(self._boot), meet, "127.0.0.1", 0) as url, _browser(url) as browser:
-            ended = asyncio.ensure_future(browser.wait())
-            await asyncio.wait(
-                {drawn, ended}, timeout=FIRST_S + NEXT_S * len(times), return_when="FIRST_COMPLETED"
-            )
-            ended.cancel()
-            if not drawn.done():
-                raise FilmError("the browser has ended without drawing: try it with another Chromium")
-            return drawn.result()
+        async with open_stage(page(self._boot), meet, "127.0.0.1", 0) as url, _browser(url) as process:
+            found: list[Image.Image] = []
+            try:
+                first, ended = asyncio.ensure_future(tabs.get()), asyncio.ensure_future(process.wait())
+                await asyncio.wait({first, ended}, timeout=FIRST_S, return_when="FIRST_COMPLETED")
+                ended.cancel()
+                tab = await asyncio.wait_for(first, 0)
+                told = aiter(tab)
+                for time in times:
+                    content = {"time": time - self.start, "slow": SLOW if self._slow(time) else 1}
+                    await tab.send("draw", content)
+                    picture = await asyncio.wait_for(anext(told), NEXT_S if found else FIRST_S)
+                    assert isinstance(picture, bytes)  # as our page sends it
+                    found.append(Image.open(io.BytesIO(picture)).convert("RGB"))
+                    progress()
+            except (TimeoutError, StopAsyncIteration, ConnectionClosed):
+                raise FilmError("the browser does not draw: try it with another Chromium") from None
+            finally:
+                drawn.set()
+            return found
 
     def write(self, file: Path, progress: Callable[[], None] = lambda: None) -> None:
         """Write all pictures as an animated WebP or GIF, by the file's suffix.
@@ -164,10 +169,15 @@ class Film:
         first.save(file, save_all=True, append_images=later, duration=durations, loop=0, **options)
 
 
+def browser() -> str | None:
+    """Path of a browser that draws films; None if there is none."""
+    return next(filter(None, map(shutil.which, BROWSERS)), None)
+
+
 @asynccontextmanager
-async def _browser(url: str):  # type: ignore[no-untyped-def]  # noqa: ANN202
+async def _browser(url: str) -> AsyncIterator[asyncio.subprocess.Process]:
     """A headless browser that shows a page."""
-    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    program = browser()
     if program is None:
         raise FilmError("films are drawn by Chromium, and there is none: apt-get install chromium")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:

@@ -10,6 +10,7 @@ from msgspec import Meta, Struct
 
 from tvist_view.look import Floats, Look
 from tvist_view.oscillator import TURN, impulses_in_words, leftover, leftovers, swing
+from tvist_view.signals import MOVING, moves
 from tvist_view.stage import Tab, page
 from tvist_view.track import Track
 
@@ -127,13 +128,12 @@ def _short(values: Floats) -> list[float]:
 
 def _ran(done: Compared, zeta: float) -> dict[str, Any]:
     unshaped, shaped = done.left
-    signals = done.unshaped.signals
-    moving = np.flatnonzero(signals.unshaped > 1e-3)
-    start = done.unshaped.start
+    start, moved = done.unshaped.start, moves(done.unshaped.signals)
+    assert moved is not None  # it is a motion of ours
     return {
         "tracks": [track.packed(start) for track in (done.unshaped, done.shaped)],
-        "begin": float(signals.time[moving[0]]) - start - 0.05,
-        "stop": float(signals.time[moving[-1]]) - start,
+        "begin": moved[0] - start - 0.05,
+        "stop": moved[1] - start,
         "share": shaped / unshaped,
         "words": f"{impulses_in_words(done.f_d, zeta)} They are right for {done.f_d:.2f} Hz. After the stop the tool "
         f"shook with {unshaped:.2f} m/s², shaped with {shaped:.2f}.",
@@ -143,7 +143,7 @@ def _ran(done: Compared, zeta: float) -> dict[str, Any]:
 def largest_after_stop(track: Track) -> float:
     """Largest acceleration of the tool once the shaped reference has come to rest [m/s²]."""
     signals = track.signals
-    moving = np.flatnonzero(signals.acceleration > 1e-3)
+    moving = np.flatnonzero(signals.acceleration > MOVING)
     return float(np.nan_to_num(signals.alpha[moving[-1] + 5 :]).max(initial=0.0))
 
 

@@ -14,7 +14,7 @@ class Meshes:
     """The files, each at a path of the page."""
 
     def __init__(self) -> None:
-        self._files: dict[str, Path] = {}
+        self._paths: dict[Path, str] = {}
 
     def offer(self, geometry: Geometry) -> list[str]:
         """Offer a robot's meshes; where one is not here or of another kind, none: the page draws the arm itself."""
@@ -24,13 +24,11 @@ class Meshes:
             for file in found
         ):
             return []
-        paths = [
-            f"/mesh/{len(self._files) + number}{file.suffix.lower()}" for number, file in enumerate(found)
-        ]
-        self._files.update(zip(paths, found, strict=True))
-        return paths
+        for file in found:
+            # A robot that comes back has its old paths.
+            self._paths.setdefault(file, f"/mesh/{len(self._paths)}{file.suffix.lower()}")
+        return [self._paths[file] for file in found]
 
     def content(self, path: str) -> bytes | None:
         """Content of a file that was offered."""
-        file = self._files.get(path)
-        return None if file is None else file.read_bytes()
+        return next((file.read_bytes() for file, its in self._paths.items() if its == path), None)

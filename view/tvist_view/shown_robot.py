@@ -97,22 +97,21 @@ class ShownRobot:
     async def _run(self) -> None:
         place, lead = self._place, "No robot"
         while True:
+            self._described = {}
             try:
                 async with await Robot.connect(
                     place.endpoint, self._name, security=place.security, namespace=place.namespace
                 ) as robot:
                     await self._shows(robot, await robot.info())
             except (ClientError, RefusedError, GeometryError) as error:
-                lead = "The robot cannot be drawn" if isinstance(error, GeometryError) else lead
-                self._away(f"{lead}. {error}. The page waits for it.", str(error))
-            lead = "The robot has gone" if self._described else lead
-            self._described = {}
+                if self._described:
+                    lead = "The robot has gone"
+                said = "The robot cannot be drawn" if isinstance(error, GeometryError) else lead
+                self._away(f"{said}. {error}. The page waits for it.", str(error))
             await asyncio.sleep(RETRY_S)
 
     def _away(self, sentence: str, why: str) -> None:
         """Say why there is no robot, once."""
-        if self._described:
-            sentence = sentence.replace("No robot.", "The robot has gone.", 1)
         self._described = {}
         if sentence != self._absent:
             self._absent = sentence

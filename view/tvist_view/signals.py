@@ -14,6 +14,8 @@ GRAVITY = 9.81
 """Gravity of the simulated world [m/s²]."""
 RESTS = 1e-9
 """Change of a reference within a tick that counts as none [rad]."""
+MOVING = 1e-3
+"""Acceleration of a reference from which on it moves, in a recorded motion [rad/s²]."""
 BRAKES_S = 0.02
 """Time after the shaped reference has stopped within which the tool still brakes [s]."""
 KEPT = 3000
@@ -153,6 +155,12 @@ class Running:
         """All that is kept."""
         columns = np.array(self.kept).reshape(-1, 4).T
         return Signals(*columns)
+
+
+def moves(signals: Signals) -> tuple[float, float] | None:
+    """Times at which the reference before the shaper accelerates first and last [s]; None if it does not."""
+    moving = signals.time[signals.unshaped > MOVING]
+    return (float(moving[0]), float(moving[-1])) if len(moving) else None
 
 
 def rests_since(signals: Signals) -> tuple[float, float] | None:

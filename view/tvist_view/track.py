@@ -13,7 +13,6 @@ from tvist_view.signals import Signals, signals_of
 
 EVERY = 5
 """Ticks between two rows that the page gets: between them it draws what is between."""
-
 MOVES = 1e-7
 """Change of a reference within a tick from which on it moves [rad]."""
 SET = 0.05

@@ -8,10 +8,10 @@ from tvist_cli.output import out, print_json, program, progress, words
 from tvist_cli.pages import Door
 from tvist_cli.serving import compile_if_new
 from tvist_cli.tables import print_paper
-from tvist_cli.tracks import recorded
+from tvist_cli.tracks import MAGNIFY, recorded
 
-MAGNIFIED, PORT = 100.0, 8080
-"""Magnification and port of the page of --view."""
+PORT = 8080
+"""Port of the page of --view."""
 
 
 def demo(
@@ -64,7 +64,7 @@ def demo(
     if not result.equal:
         raise Failure("the recording differs from its replay or from what the client received")
     if view:
-        recorded(result.recording).serve(MAGNIFIED, Door("127.0.0.1", PORT, insecure=False))
+        recorded(result.recording).serve(MAGNIFY, Door("127.0.0.1", PORT, insecure=False))
 
 
 def _print_next(recording: Path) -> None:

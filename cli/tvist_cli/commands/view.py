@@ -8,12 +8,10 @@ from cyclopts import Parameter
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import err, progress
 from tvist_cli.pages import Door, serve_page
-from tvist_cli.tracks import Shows, compared, recorded, repeated
+from tvist_cli.tracks import MAGNIFY, Shows, compared, recorded, repeated
 
 LONGEST_S = 120.0
 """Longest recording that is written as film or HTML [s]."""
-MAGNIFY = 100.0
-"""Magnification of the bending, unless another is given [-]."""
 FILMS = (".webp", ".gif")
 
 
@@ -85,7 +83,7 @@ def view(
 def _recorded_or_simulated(
     what: str, compare: tuple[str, ...] | None, robot: str, *, both: bool
 ) -> Shows | None:
-    """What is played back; None: a served robot is shown live."""
+    """Return what to play back; None if a served robot is shown live."""
     if compare is not None:
         return compared(compare, robot)
     if _is_file(what):

@@ -11,7 +11,7 @@ from tvist_controller.foresight.stops import StopPlan, StopPlanner
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.trajectory import Forecast, JointStop, PathStop, SlowedStop, StuckError, Trajectory
+from tvist_controller.trajectory import AnyStop, Forecast, JointStop, StuckError, Trajectory
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
@@ -147,7 +147,7 @@ class Outlook:
 
     def _plan(
         self,
-        stop: JointStop | PathStop | SlowedStop | None,
+        stop: AnyStop | None,
         wanted: float | None,
         duration: float,
         end: Floats,

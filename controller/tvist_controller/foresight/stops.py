@@ -11,7 +11,7 @@ import numpy as np
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import GENTLEST_STOP, StopTorque, torque_along
-from tvist_controller.trajectory import Forecast, JointStop, MotionLimits, PathStop, SlowedStop
+from tvist_controller.trajectory import AnyStop, Forecast, JointStop, MotionLimits, PathStop, SlowedStop
 from tvist_plant.description import RobotDescription
 
 S = TypeVar("S", JointStop, PathStop, SlowedStop)
@@ -54,7 +54,7 @@ class References(Protocol):
 class StopPlan:
     """A stop and its limits."""
 
-    trajectory: JointStop | PathStop | SlowedStop | None
+    trajectory: AnyStop | None
     """Trajectory of the stop; None if the present motion runs out by itself."""
     acceleration: float | None
     """Acceleration limit of the stop [rad/s^2]; None for the motion's own."""

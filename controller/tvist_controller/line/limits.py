@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from tvist_controller.line.differentiator import Floats, Target, central_differences
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.trajectory import JointStop, MotionLimits, Path, PathStop, SlowedStop
+from tvist_controller.trajectory import AnyStop, MotionLimits, Path
 from tvist_plant.description import RobotDescription
 
 TORQUE_SHARE = 0.9
@@ -125,7 +125,7 @@ class StopTorque:
         self._failed: int | None = None
         """Number of the moment at which the last stop that does not hold needed too much."""
 
-    def holds(self, stop: JointStop | PathStop | SlowedStop, *, rebound: bool = True) -> bool:
+    def holds(self, stop: AnyStop, *, rebound: bool = True) -> bool:
         """Return whether a stop keeps within these torques.
 
         The torque at the very start belongs to the motion; only what follows is caused by the stop. Thirty-two
@@ -149,9 +149,7 @@ class StopTorque:
             self._failed = int(np.argmin(within))
         return bool(within.all())
 
-    def _within(
-        self, stop: JointStop | PathStop | SlowedStop, times: Floats, *, rebound: bool
-    ) -> npt.NDArray[np.bool_]:
+    def _within(self, stop: AnyStop, times: Floats, *, rebound: bool) -> npt.NDArray[np.bool_]:
         """Return at which of k times a stop keeps within the torques, shape (k,)."""
         dynamics = self._dynamics
         q, qd, qdd = stop.states(times)

@@ -103,7 +103,7 @@ class Motions:
 
     @property
     def stops_at(self) -> tuple[int, float] | None:
-        """Where the running motion ends, of which a stop has begun, as `progress`; None if it ends elsewhere."""
+        """Progress at which a stop of the running motion ends; None if no stop on its path has begun."""
         return self._running.stops_at if isinstance(self._running, RunningMove) else None
 
     def set_speed(self, fraction: float) -> None:

@@ -111,7 +111,7 @@ class RunningMove:
 
     @property
     def stops_at(self) -> tuple[int, float] | None:
-        """Where a stop that has begun ends, as `progress`; None if no stop on the path has begun."""
+        """Progress at which a stop that has begun ends; None if no stop on the path has begun."""
         forecast, present = self._cycle.trajectory.forecast, self.progress
         if present is None or forecast is None or forecast.path is not self._trajectory.path:
             return None

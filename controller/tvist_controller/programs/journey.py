@@ -68,7 +68,7 @@ class Journey:
         self.outcome: str | None = None
         """Event that ended it."""
         self._stops_at: tuple[int, float] | None = None
-        """Where the protective stop ends that has ended it, see `stop`."""
+        """Progress at which its protective stop ends, see `stop`; None without one."""
         self.skipped = False
         """True after a call of `abort`; a motion that was being planned then is not started."""
         self.over = False

@@ -16,7 +16,11 @@ from tvist_controller.trajectory.stop import JointStop
 from tvist_controller.trajectory.stream import SetpointStream
 from tvist_controller.trajectory.tool_speed import ToolKinematics, ToolSpeed
 
+AnyStop = JointStop | PathStop | SlowedStop
+"""Any stop."""
+
 __all__ = [
+    "AnyStop",
     "Bends",
     "Curve",
     "DoubleS",

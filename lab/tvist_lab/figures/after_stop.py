@@ -173,7 +173,7 @@ class Shown(NamedTuple):
     curves: Mapping[str, Recorded]
     """Name of each curve to what was recorded."""
     said: str = ""
-    """What is written into the panel."""
+    """Words written into the panel."""
 
 
 def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> Figure:

@@ -40,7 +40,7 @@ def for_print(figure: Figure) -> str:
 
 
 def is_below(box: Legend) -> bool:
-    """Whether a legend is one of explanations below the panels."""
+    """Return whether a legend lies below the panels and holds explanations."""
     return "lower" in str(box._outside_loc)  # type: ignore[attr-defined]  # noqa: SLF001  not public
 
 

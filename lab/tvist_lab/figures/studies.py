@@ -34,7 +34,7 @@ FLOOR = 1e-4
 def study_figure(summary: Sequence[dict[str, Any]], by: Sequence[str], show: Sequence[str]) -> Figure:
     """Draw medians, with a band from the 5th to the 95th percentile; of few rows, from the least to the most.
 
-    Where the first axis is of numbers they are lines with bands, otherwise dots with bars.
+    They are lines with bands if the first axis is numeric, otherwise dots with bars.
 
     Args:
         summary: Entries of `tvist_lab.study.study.Study.summary`.

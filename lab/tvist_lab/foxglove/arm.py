@@ -34,7 +34,7 @@ class Arm:
     bending: tuple[int, ...]
     """Links that bend, each in its middle, about y and then z."""
     bodies: tuple[Body, ...]
-    """What is drawn, each in the frame of its link, -1 for the base."""
+    """Bodies to draw, each in the frame of its link, -1 for the base."""
 
     def steps(self, q: Floats, bends: Floats) -> tuple[Floats, Floats]:
         """Return each link's frame in that of the link before.

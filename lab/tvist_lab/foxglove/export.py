@@ -54,7 +54,7 @@ def export(content: RecordingFile, path: Path) -> list[str]:
         path: File to write.
 
     Returns:
-        What is missing in the added channels, in sentences.
+        Sentences about what the added channels lack.
 
     Raises:
         RecordingError: The recording does not say what its robot looks like.

@@ -39,6 +39,23 @@ export function check(label, checked, hint, changed) {
   return h("label", { class: "tick", title: hint }, input, label);
 }
 
-export const LOGO = `<svg viewBox="0 0 64 64" width="26" height="26" aria-hidden="true"><path fill="none" stroke="#D55E00" stroke-width="5" stroke-linecap="round" stroke-linejoin="round" d="M5 30C9 4 15 4 19 24S27 44 31 28s7-14 11 0 6 8 9 2 4-2 8-2"/><path stroke="#0072B2" stroke-width="5" stroke-linecap="round" d="M5 52h54"/></svg>`;
+const LOGO = `<svg viewBox="0 0 64 64" width="26" height="26" fill="none" stroke-width="5" stroke-linecap="round" stroke-linejoin="round" aria-hidden="true"><path stroke="#D55E00" d="M5.0,4.0 6.1,6.7 7.2,12.0 8.4,18.8 9.5,26.0 10.6,32.4 11.8,37.2 12.9,39.9 14.0,40.3 15.1,38.5 16.2,35.1 17.4,30.6 18.5,26.0 19.6,21.8 20.8,18.7 21.9,17.0 23.0,16.8 24.1,17.9 25.2,20.1 26.4,23.0 27.5,26.0 28.6,28.7 29.8,30.7 30.9,31.8 32.0,32.0 33.1,31.2 34.2,29.8 35.4,28.0 36.5,26.0 37.6,24.2 38.8,22.9 39.9,22.2 41.0,22.1 42.1,22.6 43.2,23.5 44.4,24.7 45.5,26.0 46.6,27.1 47.8,28.0 48.9,28.5 50.0,28.5 51.1,28.2 52.2,27.6 53.4,26.8 54.5,26.0 55.6,25.3 56.8,24.7 57.9,24.4 59.0,24.4"/><path stroke="#0072B2" d="M5,56H59"/></svg>`;
+
+/** The logo, as it is in the documents. */
+export function logo() {
+  const mark = h("span", { class: "logo" });
+  mark.innerHTML = LOGO;
+  return mark;
+}
+
+/** The page's connection to its server; each message calls `on_` and its type of the page. */
+export function connected(page) {
+  const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/`);
+  socket.onmessage = ({ data }) => {
+    const { type, ...content } = JSON.parse(data);
+    page[`on_${type}`](content, socket);
+  };
+  return socket;
+}
 
 export const theme = () => (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");

@@ -1,6 +1,7 @@
 // Pictures for a film: runs beside each other, what they are called, how their tools shake, and the number.
 // The server asks for a time and gets a picture of it; nothing plays.
 import * as THREE from "three";
+import { connected } from "./dom.js";
 import { COLOURS, roundUp } from "./plots.js";
 import { inWords } from "./stage.js";
 import { Scene } from "./scene.js";
@@ -23,13 +24,13 @@ export class Film {
     this.scene.keep(this.tracks.flatMap((track) => track.outlines(this.appearance)));
     this.alpha = columns(this.tracks, "alpha");
     this.picture = Object.assign(document.createElement("canvas"), { width, height });
-    const socket = new WebSocket(`ws://${location.host}/`);
-    socket.onmessage = async ({ data }) => {
-      const { time, slow } = JSON.parse(data);
-      this.draw(time, slow);
-      const blob = await new Promise((done) => this.picture.toBlob(done, "image/png"));
-      socket.send(await blob.arrayBuffer());
-    };
+    connected(this);
+  }
+
+  async on_draw({ time, slow }, socket) {
+    this.draw(time, slow);
+    const blob = await new Promise((done) => this.picture.toBlob(done, "image/png"));
+    socket.send(await blob.arrayBuffer());
   }
 
   draw(time, slow) {

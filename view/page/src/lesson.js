@@ -1,5 +1,5 @@
 // The lesson: one mass on a spring and two impulses, then the same on the UR5e. Each tab has sliders of its own.
-import { h, LOGO, slider, write } from "./dom.js";
+import { connected, h, logo, slider, write } from "./dom.js";
 import { COLOURS, Plot } from "./plots.js";
 import { Robot } from "./robot.js";
 import { Stage } from "./stage.js";
@@ -13,10 +13,8 @@ export class Lesson {
   constructor({ look, range, turn, ur5e_zeta: zeta }) {
     this.stage = new Stage({ factor: MAGNIFIED, ghost: false });
     const { scene, plots, bar } = this.stage;
-    const logo = h("span", { class: "logo" });
-    logo.innerHTML = LOGO;
     this.tabs = ["One mass", "UR5e"].map((name, number) => h("button", { type: "button", role: "tab", onclick: () => this.open(number) }, name));
-    bar.append(h("div", { class: "line", role: "tablist" }, logo, h("b", {}, "Why an arm rings, and what two impulses do"), h("span", { class: "space" }), ...this.tabs));
+    bar.append(h("div", { class: "line", role: "tablist" }, logo(), h("b", {}, "Why an arm rings, and what two impulses do"), h("span", { class: "space" }), ...this.tabs));
     this.turn = turn;
     this.one = [-1, 1].map((side, i) => new Robot(scene, look, { at: [0, side * APART, 0], colour: TWO[i].colour }));
     this.swings = new Plot(plots, "Deflection of the spring [mrad]", TWO, { least: 5, signed: true });
@@ -48,12 +46,8 @@ export class Lesson {
     this.time = 0;
     this.open(0);
     this.stage.each.push((seconds) => this._step(seconds));
-    this.socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/`);
+    this.socket = connected(this);
     this.socket.onopen = ask;
-    this.socket.onmessage = ({ data }) => {
-      const { type, ...content } = JSON.parse(data);
-      this[`on_${type}`](content);
-    };
   }
 
   open(number) {

@@ -1,5 +1,5 @@
 // The live page: a robot that is served, and the cockpit that moves it.
-import { check, h, LOGO, slider, write } from "./dom.js";
+import { connected, h, logo, slider, write } from "./dom.js";
 import { COLOURS, Plot, roundUp } from "./plots.js";
 import { Robot } from "./robot.js";
 import { inWords, Stage } from "./stage.js";
@@ -27,11 +27,7 @@ export class Live {
   }
 
   _connect() {
-    this.socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/`);
-    this.socket.onmessage = ({ data }) => {
-      const { type, ...content } = JSON.parse(data);
-      this[`on_${type}`](content);
-    };
+    this.socket = connected(this);
     this.socket.onclose = () => {
       this.on_notice({ text: "The page's server has ended: start tvist view again.", lasting: true });
       this._state("gone", "page's server has ended", "");
@@ -51,10 +47,8 @@ export class Live {
       onchange: () => this.send({ do: "shape", shaper: this.shaper.value, modes: this.modes?.value() ?? null }) });
     this.ab = button("A/B", { class: "ab", onclick: () => this.send({ do: "compare", ...this.chosen, shaper: this.shaper.value }) });
     this.open = button("more", { ariaExpanded: "false", onclick: () => this._toggle() });
-    const logo = h("span", { class: "logo" });
-    logo.innerHTML = LOGO;
     this.stage.bar.append(
-      h("div", { class: "line" }, logo, this.picker, this.state, this.who, this.take, h("span", { class: "space" }), this.stop),
+      h("div", { class: "line" }, logo(), this.picker, this.state, this.who, this.take, h("span", { class: "space" }), this.stop),
       h("div", { class: "line scrolls" }, this.ab, this.motions, h("label", { class: "shaper" }, "shaper ", this.shaper), this.open));
     this.more = document.getElementById("more");
   }

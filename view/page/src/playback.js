@@ -1,6 +1,6 @@
 // The page of recorded runs: one robot, or several beside each other at the same tick, with a bar of time.
 import * as THREE from "three";
-import { h, LOGO, write } from "./dom.js";
+import { h, logo, write } from "./dom.js";
 import { COLOURS, Plot } from "./plots.js";
 import { inWords, Stage } from "./stage.js";
 import { columns, Track } from "./tracks.js";
@@ -52,8 +52,6 @@ export class Playback {
   }
 
   _bar(title) {
-    const logo = h("span", { class: "logo" });
-    logo.innerHTML = LOGO;
     this.play = h("button", { type: "button", onclick: () => this.toggle() }, "pause");
     this.scrub = h("input", { type: "range", class: "time", min: 0, max: this.end, step: 0.002, value: 0, ariaLabel: "time", oninput: () => this.seek(+this.scrub.value) });
     this.clock = h("output", {});
@@ -62,7 +60,7 @@ export class Playback {
     const more = document.getElementById("more");
     more.append(this.stage.choices());
     const open = h("button", { type: "button", onclick: () => (more.hidden = !more.hidden) }, "more");
-    this.stage.bar.append(h("div", { class: "line" }, logo, h("b", {}, title), this.play, this.scrub, this.clock, pace, open));
+    this.stage.bar.append(h("div", { class: "line" }, logo(), h("b", {}, title), this.play, this.scrub, this.clock, pace, open));
   }
 
   toggle() {

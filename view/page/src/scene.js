@@ -8,7 +8,7 @@ const THEMES = {
 };
 const FOV = 32; // of the camera, upright [deg]
 const FILLED = 0.86, LEAST = 0.5, EASE = 4; // share of the picture that the arms fill; below the least the camera comes closer
-export const VIEWS = { front: [1, 0, 0.12], side: [0, -1, 0.12], top: [0.001, 0, 1] };
+const VIEWS = { front: [1, 0, 0.12], side: [0, -1, 0.12], top: [0.001, 0, 1] };
 
 export class Scene {
   constructor(canvas, { theme = "light", shadows = true } = {}) {
