@@ -23,6 +23,7 @@ from tvist_controller.dispatch.planner import Planner
 from tvist_controller.dispatch.program_commands import ProgramCommands
 from tvist_controller.dispatch.setpoints import Setpoints, Unreadable
 from tvist_controller.dispatch.table import COMMANDS, CommandTable, WholeRobot
+from tvist_controller.experience.motion_record import Beliefs
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.tool_forces import ToolForces
@@ -47,7 +48,10 @@ from tvist_controller.setup import Setup, body
 from tvist_plant.fingerprint import fingerprint
 from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError
 from tvist_protocol import commands as c
+from tvist_protocol.commands import Forget
 from tvist_protocol.io import Io
+from tvist_protocol.lessons import Lesson
+from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event, EventKind, State, Truth
@@ -75,7 +79,7 @@ class Controller(WholeRobot):
         self.tick_number = 0
         self.counters = Counters()
         self._events: list[Event] = []
-        planner = Planner(setup)
+        planner = self._planner = Planner(setup)
         self._failed: PlantError | None = None
         """Failure of the plant between two ticks, with which the next one deals."""
         self._next_timeout = -math.inf
@@ -372,6 +376,30 @@ class Controller(WholeRobot):
             shape_guided=self.setup.shape_servo,
             cell=self.cell,
         )
+
+    # ------------------------------------------------------------------ what it learns from its motions
+
+    @property
+    def holds_arm(self) -> bool:
+        """Whether the drives hold or move the arm."""
+        return self.motion.robot_mode is RobotMode.RUNNING
+
+    def beliefs(self) -> Beliefs:
+        """Return what it takes the arm for."""
+        basis = self.filters.basis
+        return Beliefs(self._payload.assumed, basis.source.calibration, basis.name)
+
+    def learn(self, lesson: Lesson) -> None:
+        """Take a lesson at rest, which changes how it moves from now on."""
+        self._assume(lesson.payload, lesson.why)
+
+    def forget(self, call: Call[Forget]) -> None:  # noqa: ARG002  there is one thing to forget
+        """Assume what was declared again."""
+        if self._payload.assumed != self.declared:
+            self._assume(self.declared, f"the declared {self.declared.mass:g} kg are assumed again")
+
+    def _assume(self, payload: Payload, why: str) -> None:
+        self._payload.learn(payload, self._planner.filters.with_payload(payload, self.filters.basis), why)
 
     # ------------------------------------------------------------------ commands that concern the whole robot
 

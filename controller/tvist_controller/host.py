@@ -6,6 +6,8 @@ does this through `simulation.step`.
 
 from collections.abc import Callable, Sequence
 
+import msgspec
+
 from tvist_controller.about import info_of
 from tvist_controller.authority.session import is_holders
 from tvist_controller.authority.standing import Standing
@@ -14,6 +16,7 @@ from tvist_controller.cell.urcap import changes
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
 from tvist_controller.dispatch.setpoints import Unreadable
+from tvist_controller.experience.experience import Experience
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.socket_ports import NoPorts, SocketPorts
 from tvist_controller.programs.socket_traffic import SocketNews
@@ -38,10 +41,17 @@ class Host:
         controller: The robot.
         sinks: Sinks that take its output, in this order.
         ports: Network for the sockets of programs; None if there is none, so that none can be opened.
+        experience: What the robot makes of its motions; None if it learns nothing.
     """
 
-    def __init__(self, controller: Controller, *sinks: Sink, ports: SocketPorts | None = None) -> None:
-        self.controller = controller
+    def __init__(
+        self,
+        controller: Controller,
+        *sinks: Sink,
+        ports: SocketPorts | None = None,
+        experience: Experience | None = None,
+    ) -> None:
+        self.controller, self._experience = controller, experience
         self._ports = ports or NoPorts()
         self.failure: str | None = None
         """Why the controller has stopped ticking; None if it ticks."""
@@ -114,6 +124,8 @@ class Host:
 
     def tick(self) -> None:
         """Compute one control period."""
+        if self._experience is not None and self.controller.cycle.mode.at_rest:
+            self._learn(self._experience)
         self.controller.begin_tick()
         news = self._carry_out_orders()
         io = self.controller.changed_io()
@@ -121,6 +133,8 @@ class Host:
             for sink in self._sinks:
                 sink.io(io)
         report, events = self.controller.complete_tick()
+        if self._experience is not None:
+            self._experience.watch(report.sample, self.controller.beliefs, held=self.controller.holds_arm)
         for sink in self._sinks:
             for event in events:
                 sink.event(event)
@@ -131,6 +145,14 @@ class Host:
         for one in news:
             self.socket(one)
         self.tell_raised()
+
+    def _learn(self, experience: Experience) -> None:
+        for lesson in experience.lessons():
+            self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
+            self.controller.learn(lesson)
+        for error in experience.raised():
+            for sink in self._sinks:
+                sink.raised(error)
 
     def _tell_truth(self) -> None:
         """Pass on what a real robot cannot measure, computed once, to those who want it."""

@@ -1,8 +1,10 @@
 """The server within a process, without network, thread or clock. Time advances when a client steps it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from tvist_controller.controller import Controller
+from tvist_controller.experience.experience import Experience
+from tvist_controller.experience.lesson import Student
 from tvist_controller.host import Host
 from tvist_controller.reporting.report import Report
 from tvist_controller.reporting.sink import Sink, Topic
@@ -20,16 +22,18 @@ class LoopbackHost(Sink):
     Args:
         setup: Initial setup; its clock should be `free` or `lockstep`.
         plant: Plant to control; None for the flexible arm of the setup.
+        students: Who studies the robot's motions.
 
     Raises:
         ValueError: The setup is invalid, or the plant does not fit it.
     """
 
-    def __init__(self, setup: Setup, plant: Plant | None = None) -> None:
+    def __init__(self, setup: Setup, plant: Plant | None = None, students: Sequence[Student] = ()) -> None:
         self.controller = Controller(setup, plant)
         self.entries: list[Entry] = []
         """Inputs of the controller; together with the setup, all that a replay needs."""
-        self._host = Host(self.controller, self)
+        experience = Experience(setup.description.joints, students) if students else None
+        self._host = Host(self.controller, self, experience=experience)
         self._callbacks: dict[Topic, list[Callable[[bytes], object]]] = {}
 
     def request(self, client: str, data: bytes) -> bytes:  # noqa: ARG002  the network does not name its clients either

@@ -14,7 +14,7 @@ from tvist_plant.plant_checks import check_unpaced
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError, TvistError
-from tvist_protocol.journal import Entry, message_of
+from tvist_protocol.journal import Entry, lesson_of, message_of
 from tvist_protocol.recorded import THIS_BEHAVIOUR
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording import Recorder
@@ -207,17 +207,23 @@ def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
                     "the journal has requests for a gripper, but the recorded robot has no cell"
                 )
             controller.cell.answer(entry.data or b"")
+        case "lesson":
+            controller.learn(lesson_of(entry))
         case "setpoint_refused":
             controller.refuse_setpoint(entry.why or "")
         case _:
-            message = message_of(entry)
-            if isinstance(message, Setpoint):
-                controller.receive_setpoint(message)
-                return
-            session = entry.session
-            if session is None and isinstance(message, TakeControl | HandOver):
-                session = presence.session_of(message.client)
-            controller.receive(message, session=session)
+            _give_message(controller, entry, presence)
+
+
+def _give_message(controller: Controller, entry: Entry, presence: Presence) -> None:
+    message = message_of(entry)
+    if isinstance(message, Setpoint):
+        controller.receive_setpoint(message)
+        return
+    session = entry.session
+    if session is None and isinstance(message, TakeControl | HandOver):
+        session = presence.session_of(message.client)
+    controller.receive(message, session=session)
 
 
 def known_fields(states: Sequence[State]) -> list[str]:

@@ -18,6 +18,7 @@ from tvist_protocol.codec import (
 )
 from tvist_protocol.commands import (
     Command,
+    Forget,
     HandOver,
     KeepAlive,
     MoveJ,
@@ -80,7 +81,7 @@ from tvist_protocol.values import PROTOCOL_VERSION, Payload
 
 __all__ = [
     "CODE_MEANINGS", "EVENT_MEANINGS", "MAX_BYTES", "PROTOCOL_VERSION", "Accepted", "ArcSegment", "Bank",
-    "CalibrationInfo", "Clock", "Code", "Command", "Done", "Event", "EventKind", "ForwardKinematics",
+    "CalibrationInfo", "Clock", "Code", "Command", "Done", "Event", "EventKind", "Forget", "ForwardKinematics",
     "HandOver", "Info", "Interpreter", "InverseKinematics", "Io", "JointSegment", "KeepAlive", "Limits",
     "LineSegment", "Message", "MoveC", "MoveJ", "MoveL", "MovePath", "Pause", "Payload", "Posture",
     "PowerOff", "PowerOn", "ProcessSegment", "ProgramClosePopup", "ProgramInterpret", "ProgramLabel", "ProgramLoad",

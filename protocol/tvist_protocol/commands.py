@@ -4,7 +4,7 @@ A constructor does not validate; `tvist_protocol.codec.check` does, and the serv
 """
 
 from math import isfinite
-from typing import Any
+from typing import Any, Literal
 
 from tvist_protocol.client_message import ClientMessage
 from tvist_protocol.errors import ProtocolError, short
@@ -214,6 +214,15 @@ class SetPayload(ClientMessage, frozen=True, kw_only=True, tag="set_payload", om
     """Time in which the torques change over to it; a shorter one than 0.5 s takes 0.5 s [s]."""
 
 
+class Forget(ClientMessage, frozen=True, kw_only=True, tag="forget"):
+    """Undo what the robot has learnt from its motions."""
+
+    token: Token
+    """Token of the lease."""
+    what: Literal["payload"]
+    """What to forget: the payload that it assumes instead of the declared one."""
+
+
 class SetSpeed(ClientMessage, frozen=True, kw_only=True, tag="set_speed"):
     """Scale the speed of motions."""
 
@@ -277,6 +286,7 @@ Command = (
     | SetShaper
     | SetEstimator
     | SetPayload
+    | Forget
     | SetSpeed
     | SetIo
     | SetRegisters

@@ -11,9 +11,18 @@ from msgspec import Meta, Struct
 from tvist_protocol.commands import Command, Setpoint
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import explain_content
+from tvist_protocol.lessons import Lesson
 
 EntryKind = Literal[
-    "command", "setpoint", "setpoint_refused", "client_seen", "client_gone", "missed", "socket", "gripper"
+    "command",
+    "setpoint",
+    "setpoint_refused",
+    "client_seen",
+    "client_gone",
+    "missed",
+    "socket",
+    "gripper",
+    "lesson",
 ]
 SocketChange = Literal["opened", "failed", "received", "closed", "expired"]
 """What happened to a program's socket: it was opened or could not be, has received bytes, or was closed from outside;
@@ -29,14 +38,15 @@ class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
     kind: EntryKind
     """Kind of entry: a message, an unreadable set-point of the lease's holder, the end of the session that had
     control or the clock, ticks that began too late, what happened to a program's socket, or what a client has
-    asked of the cell's gripper, except to be told something. Recordings made before sessions were distinguished contain
+    asked of the cell's gripper, except to be told something, or what the robot has learnt. Recordings made before
+    sessions were distinguished contain
     every liveliness token that came or went."""
     client: str | None = None
     """Client that it came from or concerns, if known."""
     session: str | None = None
     """Session that got control or the clock, or has ended; empty if the client's liveliness token does not name it."""
     message: Annotated[dict[str, Any], Meta(extra_json_schema={"properties": {}})] | None = None
-    """Decoded message, for a command or a set-point."""
+    """Decoded message, for a command or a set-point; for a lesson, that."""
     count: int | None = None
     """Number of ticks that began too late."""
     why: str | None = None
@@ -59,6 +69,19 @@ def entry_of(tick: int, message: Command | Setpoint, client: str | None = None) 
     """
     kind: EntryKind = "setpoint" if type(message) is Setpoint else "command"
     return Entry(tick=tick, kind=kind, client=client, message=msgspec.to_builtins(message))
+
+
+def lesson_of(entry: Entry) -> Lesson:
+    """Return the lesson of an entry.
+
+    Raises:
+        ProtocolError: The entry contains none, or an invalid one.
+    """
+    try:
+        return msgspec.convert(entry.message, Lesson)
+    except msgspec.ValidationError as error:
+        where = f"the journal's lesson before tick {entry.tick}"
+        raise ProtocolError("malformed", "message", f"{where} is invalid: {error}") from error
 
 
 def message_of(entry: Entry) -> Command | Setpoint:

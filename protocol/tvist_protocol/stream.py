@@ -19,6 +19,7 @@ EventKind = Literal[
     "protective_stop",
     "safety_stop",
     "shaper_changed",
+    "learnt",
     "warning",
     "program_started",
     "program_stopped",
@@ -38,6 +39,7 @@ EVENT_MEANINGS: dict[EventKind, str] = {
     "protective_stop": "the robot stops to protect itself; `code` gives the reason",
     "safety_stop": "the safety system stops the robot; `category` is the category of the stop, `why` the reason",
     "shaper_changed": "the shaper or the estimator has changed",
+    "learnt": "the robot has learnt from its last motions, or forgets that; `why` says what",
     "warning": "a condition that the user should know about; the robot did not stop",
     "program_started": "the program `program` begins",
     "program_stopped": "the program `program` has ended; `why` gives the reason if it was ended, a `warning` with a "

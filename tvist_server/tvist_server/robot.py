@@ -7,6 +7,8 @@ from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.dispatch.planner import Planner
+from tvist_controller.experience.experience import Experience, at_once
+from tvist_controller.experience.lesson import Student
 from tvist_controller.host import Host
 from tvist_controller.line.rehearsal import rehearse
 from tvist_controller.programs.socket_traffic import SocketNews
@@ -29,6 +31,7 @@ from tvist_server.publisher import Publisher
 from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
 from tvist_server.recording.recorder import Recorder
+from tvist_server.studies import Studies
 
 LOCAL = "127.0.0.1"
 """Address of this machine, from which commands of this process come."""
@@ -45,6 +48,7 @@ class ServedRobot:
         programs: Folder with programs that clients load by their names.
         hosts: Machines that programs may connect to, besides the one that sent them [none].
         keep: Number of ticks that the recording keeps at least; None keeps all.
+        students: Who studies the robot's motions, so that it learns.
 
     Raises:
         ValueError: The setup is invalid.
@@ -60,6 +64,7 @@ class ServedRobot:
         programs: ProgramFolder | None = None,
         hosts: AllowedHosts | None = None,
         keep: int | None = None,
+        students: Sequence[Student] = (),
     ) -> None:
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
@@ -89,7 +94,12 @@ class ServedRobot:
         sinks += [] if observe is None else [observe(self.controller)]
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
         """Gateway for the sockets of programs."""
-        self._host = Host(self.controller, *sinks, black_box, self._publisher, ports=self.sockets)
+        self._studies = Studies() if students and self._realtime else None
+        later = at_once if self._studies is None else self._studies.later
+        experience = Experience(setup.description.joints, students, later) if students else None
+        self._host = Host(
+            self.controller, *sinks, black_box, self._publisher, ports=self.sockets, experience=experience
+        )
         plant = self.controller.cycle.line.plant
         knows = isinstance(plant, Truthful) and plant.truth() is not None
         self.want_truth = self._publisher.want_truth if knows and not setup.truth else None
@@ -192,6 +202,8 @@ class ServedRobot:
         """Close its gateways; the controller's thread has ended."""
         if self._plans is not None:
             self._plans.close()
+        if self._studies is not None:
+            self._studies.close()
         for gateway in self._gateways:
             gateway.close()
 

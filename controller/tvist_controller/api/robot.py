@@ -6,6 +6,10 @@ The modules behind it may change.
 from tvist_controller.about import info_of
 from tvist_controller.authority.presence import Presence
 from tvist_controller.controller import Controller
+from tvist_controller.experience.experience import Experience
+from tvist_controller.experience.lesson import Student
+from tvist_controller.experience.motion_record import Beliefs, MotionRecord
+from tvist_controller.experience.twin import Twin
 from tvist_controller.host import Host
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.programs.compiling import ScriptCompiler
@@ -15,15 +19,20 @@ from tvist_controller.reporting.sink import Sink
 from tvist_controller.sources.own_plants import OwnPlant, RecordedPlant
 
 __all__ = [
+    "Beliefs",
     "Controller",
+    "Experience",
     "Host",
     "LoopbackHost",
+    "MotionRecord",
     "OwnPlant",
     "Presence",
     "RecordedPlant",
     "ScriptCompiler",
     "Sink",
     "SocketNews",
+    "Student",
+    "Twin",
     "info_of",
     "truth_of",
 ]

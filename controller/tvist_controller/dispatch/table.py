@@ -21,7 +21,7 @@ from tvist_controller.planning.reachable import Reachable
 from tvist_controller.safety.declared_payload import DeclaredPayload
 from tvist_controller.safety.faults import Faults
 from tvist_plant.description import RobotDescription
-from tvist_protocol.commands import Command
+from tvist_protocol.commands import Command, Forget
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.replies import Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
@@ -52,7 +52,12 @@ class WholeRobot(ABC):
     def check_step(self, call: Call[SimulationStep]) -> Reply:
         """Check that a client may advance time; the host then does so."""
 
+    @abstractmethod
+    def forget(self, call: Call[Forget]) -> None:
+        """Undo what the robot has learnt."""
+
     rows: ClassVar[tuple[Row, ...]] = (
+        Row(Forget, lambda self, call: self.forget(call), changes_io=True),
         Row(
             SimulationReset,
             lambda self, call: self.place(call),

@@ -84,7 +84,7 @@ class ControlCycle:
         )  # fmt: skip
         measured = line.plant.step(command)
         self.sample = Sample(
-            mode, reference, line.shaped.joints.window, target, signals, command.torque, measured,
+            mode, reference, line.shaped.joints.window, target, signals, command, measured,
             line.drives.reference, refused,
         )  # fmt: skip
         self._settle()  # last, so that the tick that comes to rest is still reported as one of the motion
@@ -196,7 +196,5 @@ class ControlCycle:
         if measured is None and isinstance(plant, Placeable):
             measured = plant.reset(command, payload=carried, seed=seed)
         assert measured is not None, "what cannot be placed is measured"
-        self.sample = Sample(
-            self.mode, q, line.shaped.joints.window, target, signals, command.torque, measured
-        )
+        self.sample = Sample(self.mode, q, line.shaped.joints.window, target, signals, command, measured)
         return self.sample

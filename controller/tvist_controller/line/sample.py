@@ -7,6 +7,7 @@ from tvist_controller.line.drive_feed_forward import MotorReference
 from tvist_controller.line.guard import Obstacle
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.line_tick import TORQUE
+from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import Measurement
 
 
@@ -23,8 +24,8 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
     """q* and its derivatives at the previous tick, since central differences cost one tick of delay."""
     signals: Floats
     """All signals before the arm, shape (9, n), see `line_tick`."""
-    fed_forward: Floats
-    """Torque with rotors and friction, as the drives receive it, shape (n,) [N m]."""
+    command: DriveCommand
+    """What the drives receive."""
     measured: Measurement
     """Measurement of the arm."""
     motors: MotorReference | None = None
@@ -37,3 +38,8 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
         """τ* of the rigid arm for the target, shape (n,) [N m]."""
         torque: Floats = self.signals[TORQUE]
         return torque
+
+    @property
+    def fed_forward(self) -> Floats:
+        """Torque with rotors and friction, as the drives receive it, shape (n,) [N m]."""
+        return self.command.torque

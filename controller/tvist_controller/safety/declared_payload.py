@@ -18,6 +18,7 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.values import Payload
+from tvist_shaping.base import Filter
 
 
 def _payload_of(command: SetPayload) -> Payload:
@@ -41,6 +42,8 @@ class DeclaredPayload:
     def __init__(self, payload: Payload, motion: MotionControl, filters: Filters, emit: Emit) -> None:
         self.payload = payload
         """Declared payload."""
+        self.assumed = payload
+        """Payload that dynamics and modes are computed with: the declared one, or what the robot has learnt."""
         self._motion, self._filters, self._emit = motion, filters, emit
         self._description = motion.cycle.description
         self._monitor = PayloadMonitor(self._description, body(payload))
@@ -69,9 +72,22 @@ class DeclaredPayload:
         carried = body(payload)
         self._motion.ahead.check_payload(carried, tvist)
         self.payload = payload
-        self._motion.cycle.line.dynamics.declare(
-            carried, max(round(call.command.transition_time / PERIOD), SLEW)
-        )
+        self._assume(payload, tvist, max(round(call.command.transition_time / PERIOD), SLEW))
+
+    def learn(self, payload: Payload, tvist: Filter | None, why: str) -> None:
+        """Assume another payload than the declared one, in dynamics and modes only.
+
+        Args:
+            payload: What the arm carries.
+            tvist: Filter for it; None if its modes are not known to differ.
+            why: What was learnt, in words.
+        """
+        self._assume(payload, tvist, SLEW)
+        self._emit("learnt", why=why)
+
+    def _assume(self, payload: Payload, tvist: Filter | None, ticks: int) -> None:
+        self.assumed, carried = payload, body(payload)
+        self._motion.cycle.line.dynamics.declare(carried, ticks)
         self._filters.declare(payload, tvist)
         self._monitor.declare(carried)
         self._held = False

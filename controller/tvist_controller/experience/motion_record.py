@@ -1,0 +1,129 @@
+"""A motion from rest to rest as the drives were told to make it, and what the arm's own sensors said meanwhile."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.line_mode import LineMode
+from tvist_controller.line.sample import Sample
+from tvist_plant.drives import DriveCommand
+from tvist_protocol.calibration import Calibration
+from tvist_protocol.values import Payload
+
+LONGEST = 10_000
+"""Number of ticks of the longest motion that is recorded; of a longer one nothing is kept."""
+AFTER = 150
+"""Number of ticks that are recorded after a motion has ended, in which the arm rings down."""
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """What the controller took the arm for during a motion."""
+
+    payload: Payload
+    """Payload that dynamics and modes were computed with."""
+    calibration: Calibration | None
+    """Calibration of the filter's modes; None for constant modes."""
+    shaper: str
+    """Name of the filter."""
+
+
+@dataclass(frozen=True)
+class MotionRecord:
+    """A motion of T ticks, of which the last ones are at rest."""
+
+    rest: DriveCommand
+    """Command under which the arm rested before it."""
+    commands: Floats
+    """q_r, q̇_r and τ_ff of each tick, shape (T, 3, n) [rad, rad/s, N m]."""
+    q: Floats
+    """Measured joint angles, shape (T, n) [rad]."""
+    moments: Floats
+    """Measured motor torques on the joint side, shape (T, n) [N m]."""
+    accelerometer: Floats
+    """Specific force in the flange frame, shape (T, 3) [m/s^2]."""
+    stop: int
+    """Number of ticks until the commands rested."""
+    whole: bool
+    """Whether it went as planned: shaped from rest to rest, without stop, stream or bypass."""
+    beliefs: Beliefs
+    """What the controller took the arm for."""
+
+
+class MotionRecorder:
+    """Records one motion after the other.
+
+    Args:
+        joints: Number of joints n.
+    """
+
+    def __init__(self, joints: int) -> None:
+        n = self._n = joints
+        self._rows = np.empty((LONGEST + AFTER, 5 * n + 3))
+        self._ticks, self._stop = 0, 0
+        self._whole = self._moves = False
+        self._rest, self._at = DriveCommand(*np.zeros((3, n))), np.zeros(n)
+        self._before: DriveCommand | None = None
+        self._beliefs: Beliefs | None = None
+
+    @property
+    def begins(self) -> bool:
+        """Whether the next tick in motion is the first one of a record, which needs to know what is believed."""
+        return not self._moves or self._stop > 0
+
+    def take(self, sample: Sample, beliefs: Beliefs | None = None) -> MotionRecord | None:
+        """Take a tick.
+
+        Args:
+            sample: Signals of the tick, in which the drives hold or move the arm.
+            beliefs: What the controller takes the arm for; used at the beginning of a motion only.
+
+        Returns:
+            The motion that is complete with this tick, or that the next one has cut short; None if there is none.
+        """
+        resting, done = sample.mode.at_rest, None
+        if not resting and self.begins:
+            done = self._finished()
+            self._ticks, self._stop, self._moves, self._whole = 0, 0, True, True
+            self._beliefs, self._rest = beliefs, self._before or sample.command
+        elif self._stop and not np.array_equal(sample.reference, self._at):
+            self.forget()  # it was placed elsewhere
+        self._before = sample.command
+        if not self._moves:
+            return done
+        self._whole = self._whole and (resting or sample.mode is LineMode.SHAPED)
+        if self._ticks < len(self._rows):
+            self._note(self._rows[self._ticks], sample)
+        self._ticks += 1
+        if resting and not self._stop:
+            self._stop, self._at = self._ticks, sample.reference
+        if self._stop and self._ticks == self._stop + AFTER:
+            done = self._finished()
+            self.forget()
+        return done
+
+    def forget(self) -> None:
+        """Drop the present motion, since the drives do not hold the arm."""
+        self._moves, self._ticks, self._stop = False, 0, 0
+
+    def _note(self, row: Floats, sample: Sample) -> None:
+        n, command, measured = self._n, sample.command, sample.measured
+        row[:n], row[n : 2 * n], row[2 * n : 3 * n] = command.q, command.qd, command.torque
+        row[3 * n : 4 * n], row[4 * n : 5 * n] = measured.q, measured.moment
+        row[5 * n :] = measured.accelerometer
+
+    def _finished(self) -> MotionRecord | None:
+        if not self._stop or self._stop > LONGEST or self._beliefs is None:
+            return None
+        n, rows = self._n, self._rows[: self._ticks].copy()
+        return MotionRecord(
+            rest=self._rest,
+            commands=rows[:, : 3 * n].reshape(-1, 3, n),
+            q=rows[:, 3 * n : 4 * n],
+            moments=rows[:, 4 * n : 5 * n],
+            accelerometer=rows[:, 5 * n :],
+            stop=self._stop,
+            whole=self._whole,
+            beliefs=self._beliefs,
+        )
