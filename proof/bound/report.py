@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from proof.bound.least_time import MODES, bound
+from proof.bound.with_lead import bound_with_lead
 from tvist_controller.api.line import body, load_calibration, paper_payload
 from tvist_lab.runners import Processes, in_order
 from tvist_lab.study.case import Case
@@ -53,7 +54,9 @@ class Bounded:
     name: str
     move: Move
     bound: float
-    """The bound [ms]."""
+    """The bound without feed-forward [ms]."""
+    with_lead: float
+    """That with feed-forward of the elasticity [ms]."""
     judged: dict[str, Row]
     """Row of each shaper."""
 
@@ -84,9 +87,11 @@ def bounded(job: BoundJob) -> Bounded:
     arm = FlexibleArm(job.description, body(paper_payload(job.description, job.move.mass)))
     modes = arm.modes(target)
     least = bound(start, target, PAPER, modes.f_d[:MODES], modes.zeta[:MODES])
+    lead = bound_with_lead(job.description, job.move, PAPER)
     methods = tuple(Named(Recipe(name, job.calibration), name) for name in job.shapers)
     rows = measure(Job(Case(job.description, job.move), methods))
-    return Bounded(job.name, job.move, round(1e3 * least, 6), {row["shaper"]: row for row in rows})
+    judged = {row["shaper"]: row for row in rows}
+    return Bounded(job.name, job.move, round(1e3 * least, 6), round(1e3 * lead, 6), judged)
 
 
 def report(found: Sequence[Bounded]) -> dict[str, Any]:
@@ -94,6 +99,7 @@ def report(found: Sequence[Bounded]) -> dict[str, Any]:
     return {
         "moves": [_row(one) for one in found],
         "bound_ms": _spread([one.bound for one in found]),
+        "bound_with_lead_ms": _spread([one.with_lead for one in found]),
         "summary": {name: _summary(found, name) for name in found[0].judged},
     }
 
@@ -105,6 +111,7 @@ def _row(one: Bounded) -> dict[str, Any]:
         "target": list(one.move.target),
         "payload_kg": one.move.mass,
         "bound_ms": one.bound,
+        "bound_with_lead_ms": one.with_lead,
         "shapers": {
             name: {
                 "delay_ms": row["delay_ms"],
@@ -158,7 +165,10 @@ def tables(result: dict[str, Any]) -> list[tuple[Sequence[str], list[list[str]]]
         ]
         for name, one in result["summary"].items()
     ]
-    bounds = [[f"{value:.0f}" for value in result["bound_ms"].values()]]
+    bounds = [
+        [name, *(f"{value:.0f}" for value in result[key].values())]
+        for name, key in (("without", "bound_ms"), ("with", "bound_with_lead_ms"))
+    ]
     moves = [
         [row["name"], f"{row['payload_kg']:.1f}", f"{row['bound_ms']:.0f}"]
         + [
@@ -172,7 +182,7 @@ def tables(result: dict[str, Any]) -> list[tuple[Sequence[str], list[list[str]]]
     columns += tuple(f"{name} {what}" for name in result["summary"] for what in ("ms", "less %"))
     return [
         (SUMMARY, summary),
-        ([f"bound ms, {name}" for name in result["bound_ms"]], bounds),
+        (["feed-forward", *(f"bound ms, {name}" for name in result["bound_ms"])], bounds),
         (columns, moves),
     ]
 

@@ -74,15 +74,23 @@ SMOOTHED: Mapping[str, FeedForward] = MappingProxyType(
     {"elastic": "elastic", "elastic-position": "elastic-position"}
 )
 """Filters that only smooth the reference, with the feed-forward that stills the arm."""
-SMOOTHING = (14, 8)
-"""Ticks of their running means."""
+SMOOTHING = 40
+"""Length of their smoothing if the name says none [ms]."""
+SMOOTHINGS = range(8, 62, 2)
+"""Lengths that a name may say, as in `elastic-16` [ms]: shorter ones leave the lead little torque, and longer ones gain
+little.
+"""
+FIRST = 0.63
+"""Share of the first of two running means in both, tuned at 40 ms [-]."""
+_LENGTH = re.compile(r"(.+)-(\d+)")
 OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
     {
         "auto": "four modes with any payload, at a constant mean delay: keeps the limits",
         "short": "like auto: shorter, leaves slightly more",
         AIMED: "like auto, for motions with a known end: shorter",
         PLANNED: "moves to a known target are planned to leave no vibration; like auto-target for other motions",
-        "elastic": "smoothing alone, and feed-forward of the arm's elasticity: half the delay of auto",
+        "elastic": "smoothing alone, and feed-forward of the arm's elasticity: half the delay of auto; elastic-16 "
+        "smooths over 16 ms, from 8 to 60, instead of 40",
         "elastic-position": "like elastic, for drives that take positions and velocities, but no torques",
         ELASTIC_AUTO: "auto, smoothed, with feed-forward of the arm's elasticity: leaves least",
     }
@@ -112,7 +120,7 @@ class Registry:
             if not (isinstance(shaper.name, str) and _NAME.fullmatch(shaper.name)):
                 limit = "1 to 64 of a-z 0-9 _ - . , ( ), the first a letter or a digit"
                 raise DesignError("name", shaper.name, limit)
-            if shaper.name in {*SHAPERS, *DESIGNS, *SMOOTHED, *found}:
+            if shaper.name in {*SHAPERS, *DESIGNS, *found} or _smoothing(shaper.name):
                 raise DesignError("name", shaper.name, "a name that no other shaper has")
             if isinstance(shaper, FirShaper) and shaper.period != PERIOD:
                 raise DesignError("period", shaper.period, f"{PERIOD:g} s, as that of all filters by name")
@@ -128,8 +136,9 @@ class Registry:
 
         Raises:
             UnknownShaperError: There is no shaper of that name; the error lists all names and the most similar one.
+            DesignError: Its name says a length that it cannot have.
         """
-        if name not in self.names():
+        if name not in self.names() and not _smoothing(name):
             near = get_close_matches(name, self.names(), n=1)
             raise UnknownShaperError(name, self.names(), near[0] if near else None)
 
@@ -147,7 +156,7 @@ class Registry:
         shaper = self.own.get(name)
         if isinstance(shaper, FirShaper):
             return shaper.modes
-        if name in SMOOTHED:
+        if _smoothing(name):
             return 1
         return DESIGNS[name](1.0).modes if name in DESIGNS else modes
 
@@ -158,7 +167,8 @@ class Registry:
             UnknownShaperError: There is no shaper of that name.
         """
         self.check(name)
-        return "elastic" if name == ELASTIC_AUTO else SMOOTHED.get(name, "rigid")
+        smoothing = _smoothing(name)
+        return smoothing[0] if smoothing else "elastic" if name == ELASTIC_AUTO else "rigid"
 
     def make_filter(self, name: str, estimator: Estimator, *, joints: int) -> Filter:
         """Create a filter by name.
@@ -173,9 +183,9 @@ class Registry:
             FilterError: Filter and estimator do not fit together.
             ShaperFailureError: The function of a user's own shaper fails for the modes at q = 0.
         """
-        feed_forward = self.feed_forward_of(name)
-        if name in SMOOTHED:
-            weights = running_means(*SMOOTHING)
+        feed_forward, smoothing = self.feed_forward_of(name), _smoothing(name)
+        if smoothing:
+            weights = running_means(*means_of(smoothing[1]))
             return SmoothingFilter(name, weights, estimator, joints=joints, feed_forward=feed_forward)
         if name in DESIGNS:
             kind = _KINDS.get(name, SteadyFilter)
@@ -185,6 +195,31 @@ class Registry:
         if isinstance(shaper, FirShaper):
             return SteadyFilter(shaper.design(), estimator, joints=joints)
         return TvistFilter(shaper, estimator, joints=joints)
+
+
+def means_of(length: int) -> tuple[int, int]:
+    """Return the ticks of the two running means that smooth over a length [ms]."""
+    both = length // 2 + 2
+    first = round(FIRST * both)
+    return first, both - first
+
+
+def _smoothing(name: str) -> tuple[FeedForward, int] | None:
+    """Return feed-forward and length [ms] of a filter that only smooths; None for any other name.
+
+    Raises:
+        DesignError: Its name says a length that no such filter has.
+    """
+    if name in SMOOTHED:
+        return SMOOTHED[name], SMOOTHING
+    found = _LENGTH.fullmatch(name)
+    if found is None or found[1] not in SMOOTHED:
+        return None
+    length = int(found[2])
+    if length not in SMOOTHINGS:
+        limit = f"even, from {SMOOTHINGS.start} to {SMOOTHINGS[-1]} ms, as in {found[1]}-16"
+        raise DesignError(f"length of {found[1]}", length, limit)
+    return SMOOTHED[found[1]], length
 
 
 BUILT_IN = Registry()

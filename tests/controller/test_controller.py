@@ -261,6 +261,7 @@ WRONG = [
     (c.ServoStart, {"velocity": 4.0}, "limit_velocity", "velocity"),
     (c.ServoStart, {"acceleration": 1e-9}, "out_of_range", "acceleration"),
     (c.SetShaper, {"name": "zvdddd"}, "unknown_shaper", "name"),
+    (c.SetShaper, {"name": "elastic-17"}, "out_of_range", "name"),
     (c.SetShaper, {"name": "zv", "modes": 2}, "out_of_range", "modes"),
     (c.SetEstimator, {"name": "modal"}, "missing_field", "calibration"),
     (c.SetEstimator, {"name": "neural"}, "unknown_estimator", "name"),

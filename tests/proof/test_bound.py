@@ -2,13 +2,22 @@
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
+from proof.bound import with_lead
 from proof.bound.least_time import bound, farthest, least_ticks, poles_of
 from scipy import sparse
 from scipy.optimize import linprog
 from scipy.signal import cont2discrete
 
-from tvist_controller.api.line import MotionLimits
+from tvist_controller.api.line import MotionLimits, body, paper_payload
+from tvist_controller.line.differentiator import Target
+from tvist_controller.line.elastic_lead import wanted_lead
+from tvist_controller.line.elastic_model import ElasticModel
+from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_lab.study.line import PAPER
+from tvist_lab.study.moves import Move
+from tvist_plant.description import load
+from tvist_plant.model import flexible_model
 from tvist_plant.plant import PERIOD as H
 
 NONE = np.zeros((0, 2))
@@ -70,3 +79,40 @@ def test_a_mode_costs_time_and_a_second_one_more():
     two = bound(start, target, PAPER, F_D, ZETA)
     assert 0.0 < one < 0.5 / F_D[0]  # sooner than a zero-vibration shaper
     assert one <= two < 0.5 / F_D[0] + 0.5 / F_D[1]
+
+
+ARM = load("ur5e").disturbed_by(())
+MOVE = Move(tuple(ARM.poses["Q1"]), tuple(ARM.poses["Q3"]), 5.0)
+
+
+def weaker(share):
+    return replace(ARM, limits=replace(ARM.limits, torque=tuple(share * t for t in ARM.limits.torque)))
+
+
+def test_with_a_lead_the_torque_alone_costs_time():
+    strong, own, weak = (
+        with_lead.bound_with_lead(arm, MOVE, PAPER) for arm in (weaker(100.0), ARM, weaker(0.1))
+    )
+    assert strong <= own <= 2.01 * H < weak
+
+
+def test_the_lead_of_the_bound_is_that_of_the_controller():
+    payload = body(paper_payload(ARM, MOVE.mass))
+    flexible = flexible_model(ARM, payload)
+    stiffness = np.zeros(flexible.model.nv)
+    stiffness[flexible.joints], stiffness[flexible.flexes] = (
+        ARM.drives.gear_stiffness,
+        flexible.flex_stiffness,
+    )
+    model = ElasticModel(ARM, stiffness, np.zeros_like(stiffness))
+    loads = model.loads()
+    loads.carry(InverseDynamics(ARM, payload).payload_parameters)
+    q, along = np.array(MOVE.start) + 0.3, np.array([1.0, -0.4, 0.7, 0.1, 0.0, 0.2])
+    load_on, jacobian = loads.of(Target(q, np.zeros(6), along))
+    lead = np.empty(6)
+    wanted_lead(
+        load_on, jacobian, model.joints, model.flexes, stiffness, np.zeros_like(stiffness),
+        model.deflections(load_on), lead,
+    )  # fmt: skip
+    data, springs = flexible.model.createData(), np.array(ARM.drives.gear_stiffness)
+    assert with_lead._lead(flexible, data, springs, q, along) == pytest.approx(lead, rel=1e-9, abs=1e-15)

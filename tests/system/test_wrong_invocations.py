@@ -186,7 +186,7 @@ MISUSE = [
     (("evaluate", "--random", "2", "--shaper", "zzz"), ["'zzz'", "zvd"]),
     (("evaluate",), ["--moves FILE or --random N"]),
     (("evaluate", "--random", "2", "--disturbances", "wind"), ["'wind'", "friction"]),
-    (("shaperbench", "--against", "zzz"), ["against is 'zzz'"]),
+    (("shaperbench", "--against", "zzz"), ["against: there is no method 'zzz'"]),
     (("paper", "--calibration", "nope"), ["calibration 'nope'"]),
     (("serve", "--shaper", "zzz"), ["'zzz'", "zvd"]),
     (("serve", "--clock", "sometimes"), ["clock is 'sometimes'", "'realtime'"]),

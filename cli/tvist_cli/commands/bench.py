@@ -26,11 +26,12 @@ def bench(*, seconds: float = 10.0, shaper: str = "zv", json: bool = False) -> N
     from tvist_lab.bench.speed import speed
     from tvist_server.config import ConfigError
     from tvist_shaping import BUILT_IN
+    from tvist_shaping.errors import ShapingError
 
     if seconds < 0.0:
         raise Failure(f"seconds is {seconds:g}: must be at least 0", code=2)
-    if (shaper := shaper.lower()) not in BUILT_IN.names():
-        raise Failure(f"there is no shaper {shaper}: see tvist shapers", code=2)
+    with told(ShapingError, code=2):
+        BUILT_IN.check(shaper := shaper.lower())
     try:
         with told(ConfigError, code=2):
             result = speed(seconds, shaper, lambda what: err.print(f"measuring {what} ..."))

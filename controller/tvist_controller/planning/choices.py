@@ -9,7 +9,7 @@ from tvist_protocol.commands import SetEstimator
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
-from tvist_shaping.errors import EstimatorError, ShapingError, UnknownShaperError
+from tvist_shaping.errors import DesignError, EstimatorError, ShapingError, UnknownShaperError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.named import BUILT_IN, Registry
@@ -33,6 +33,8 @@ def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) 
         own = known.modes_of(name, modes)
     except UnknownShaperError as error:
         raise RefusalError("unknown_shaper", where, str(error)) from error
+    except DesignError as error:
+        raise RefusalError("out_of_range", where, str(error)) from error
     if modes not in {1, own}:
         why = f"modes is {modes}; the filter {name} always has {own}"
         raise RefusalError("out_of_range", "modes", why, own)

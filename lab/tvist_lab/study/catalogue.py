@@ -6,11 +6,12 @@ from pathlib import Path
 
 from tvist_controller.api.line import OwnShaper
 from tvist_lab.study.foreign import FromFile
-from tvist_lab.study.menus import ROWS, UNSHAPED, Kind, Row, names, rows
+from tvist_lab.study.menus import ROWS, UNSHAPED, Kind, Row, names, row, rows
 from tvist_lab.study.method import Constant, Held, Longer, Method, Named, PeriodOfJerk, Waiting
 from tvist_lab.study.recipes import Recipe, longest_mean_delay, robust
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
+from tvist_shaping.errors import UnknownShaperError
 
 MOST_DECLARED = 1.1
 """Largest declared mass of the bench, relative to the rating [-]."""
@@ -77,13 +78,16 @@ def some(
 
     Raises:
         KeyError: There is no method of a name; the message lists all and the most similar one.
+        DesignError: A name has a parameter that no filter has.
     """
-    recipe, known = Recipe("zv", calibration), {row.name: row for row in rows()}
-    for name in wanted:
-        if name not in known:
-            like = "".join(f", did you mean {near!r}?" for near in get_close_matches(name, known, 1))
-            raise KeyError(f"there is no method {name!r}{like} There are {', '.join(known)}")
-    return tuple(made(known[name], recipe, description) for name in wanted)
+    recipe = Recipe("zv", calibration)
+    try:
+        chosen = [row(name) for name in wanted]
+    except UnknownShaperError as error:
+        known = [one.name for one in rows()]
+        like = "".join(f", did you mean {near!r}" for near in get_close_matches(error.name, known, 1))
+        raise KeyError(f"there is no method {error.name!r}{like}: there are {', '.join(known)}") from error
+    return tuple(made(one, recipe, description) for one in chosen)
 
 
 def baselines(recipe: Recipe, description: RobotDescription, masses: tuple[float, float]) -> list[Method]:

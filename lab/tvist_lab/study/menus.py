@@ -65,7 +65,8 @@ ROWS = (
     Row("auto-target", "constant mean delay, given the end of each move", ("bench", "paths", "bound")),
     Row("short", "constant mean delay, short", ("bench", "paths")),
     Row("planned", "planned to leave no vibration", ("bound",)),
-    Row("elastic", "smoothing, elastic feed-forward", ("bench",)),
+    Row("elastic", "smoothing, elastic feed-forward", ("bench", "bound")),
+    Row("elastic-16", "smoothing of 16 ms, elastic feed-forward", ("bench", "bound")),
     Row("elastic-position", "smoothing, elastic feed-forward without torques", ("bench",)),
     Row("elastic-auto", "auto, smoothing, elastic feed-forward", ("bench",)),
     Row("product", "constant mean delay, product of three ZV", ("bench",), "held", modes=3),
@@ -86,6 +87,20 @@ def rows(menu: Menu | None = None) -> list[Row]:
         if name not in known
     ]
     return [row for row in (*ROWS, *more) if menu is None or menu in row.menus]
+
+
+def row(name: str) -> Row:
+    """Return a method's row; a filter whose name has a parameter, as `elastic-20`, needs none of its own.
+
+    Raises:
+        UnknownShaperError: There is no method of that name.
+        DesignError: The name has a parameter that no filter has.
+    """
+    known = next((one for one in rows() if one.name == name), None)
+    if known is None:
+        BUILT_IN.check(name)
+        known = Row(name, name)
+    return known
 
 
 def names(menu: Menu) -> tuple[str, ...]:
