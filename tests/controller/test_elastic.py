@@ -10,10 +10,10 @@ from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, cal
 from tvist_controller.calibrations import load
 from tvist_controller.line.differentiator import Target
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.line.elastic_lead import follow
 from tvist_controller.line.elastic_model import ElasticModel
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.kinematics import ForwardKinematics
+from tvist_controller.line.motor_command import follow
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.sources.elastic_source import elastic_model
@@ -107,7 +107,7 @@ def test_a_payload_counts_like_a_body_of_the_model():
     target = Target(Q3, np.zeros(6), np.array([1.0, -2.0, 3.0, 1.0, 0.5, 2.0]))
     loads = {}
     for name, dynamics in (("heavy", heavy), ("light", light)):
-        springs = stage()._loads
+        springs = stage()._springs
         springs.carry(dynamics.payload_parameters)
         found = springs.of(target)[0][elastic_model(UR5E, MODAL).joints]
         loads[name] = found

@@ -101,7 +101,9 @@ class DriveFeedForward:
         if elastic is None or self._share == 0:
             self.reference = None
             return plain
-        command = elastic.command(target, signals[TORQUE], carried, self._joints.sag(signals[STATIC]))
+        command = elastic.command(
+            target, signals[TORQUE], carried, self._joints.sag(signals[STATIC]), smooth=may_begin
+        )
         if self._share < FADE:
             command = self._blend(plain, command)
         self.reference = MotorReference(command.qd, elastic.qdd, command.torque, elastic.limited)

@@ -3,8 +3,9 @@
 import numpy as np
 
 from tvist_controller.line.differentiator import Floats, Target
-from tvist_controller.line.elastic_lead import follow, motor_reference, wanted_lead
+from tvist_controller.line.elastic_lead import lead_of
 from tvist_controller.line.elastic_model import ElasticModel
+from tvist_controller.line.motor_command import motor_command
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 
@@ -19,7 +20,8 @@ SETTLED = 1e-8
 class ElasticFeedForward:
     """Commands for drives that move an elastic arm.
 
-    With the lead w of `elastic_lead` the drives get q* + w, q̇* + ẇ, and τ* + B (q̈* + ẅ) + friction(q̇* + ẇ). Central
+    With the lead w of `elastic_lead` the drives get q* + w, q̇* + ẇ, and τ* + B (q̈* + ẅ) + friction(q̇* + ẇ), where τ*
+    contains what the bending links' own acceleration adds. Central
     differences give ẇ and ẅ, so commands are a tick later than their target, as `delay` says. ẅ is a fourth derivative
     of the reference, so that must be smooth; where it is not, as at the beginning of a stop, ẅ is limited to the torque
     that the target leaves, and w and ẇ stay continuous.
@@ -38,7 +40,7 @@ class ElasticFeedForward:
         self.delay = period
         """Time by which commands are later than their targets [s]."""
         self._period, self._torques = period, torques
-        self._model, self._loads = model, model.loads()
+        self._model, self._springs = model, model.loads()
         self._damping = model.damping_time / period
         self._rotor = np.array(drives.rotor_inertia)
         friction = np.array(drives.coulomb_friction)
@@ -46,7 +48,8 @@ class ElasticFeedForward:
         self._linear, self._width = drives.linear_friction, drives.friction_width
         self._friction = friction / self._width if self._linear else drives.friction_feedforward * friction
         self._wanted, self._led = np.zeros((2, 3, description.joints))
-        self._before = np.zeros(model.size)
+        self._before, self._loads = np.zeros(model.size), np.zeros((2, model.size))
+        self._bent = np.zeros((3, len(model.flexes)))
         self._ticks = 0
         self._late: tuple[Target, Floats, Floats | None] | None = None
         """Target of the tick before, its torque with that of the rotors, and its sag."""
@@ -72,7 +75,13 @@ class ElasticFeedForward:
         self.reset()
 
     def command(
-        self, target: Target, torque: Floats, carried: Floats, sag: Floats | None = None
+        self,
+        target: Target,
+        torque: Floats,
+        carried: Floats,
+        sag: Floats | None = None,
+        *,
+        smooth: bool = True,
     ) -> DriveCommand:
         """Take a target, and return the command for the target of the tick before.
 
@@ -81,38 +90,24 @@ class ElasticFeedForward:
             torque: τ* of the rigid arm, shape (n,) [N m].
             carried: Inertial parameters of the payload, see `InverseDynamics.payload_parameters`.
             sag: A further lead, by the twist of the gears under gravity, shape (n,) [rad].
+            smooth: Whether the reference is, so that its sixth derivative says how bending links accelerate.
         """
-        model, wanted, led = self._model, self._wanted, self._led
-        self._loads.carry(carried)
-        load, jacobian = self._loads.of(target)
-        needed = torque + self._rotor * target.qdd
-        wanted[2], wanted[1] = wanted[1], wanted[0]
-        if self._late is None:
-            self._late = (target, needed, sag)
-            self._before[:] = model.deflections(load)
-        wanted_lead(
-            load,
-            jacobian,
-            model.joints,
-            model.flexes,
-            model.stiffness,
-            self._damping,
-            self._before,
-            wanted[0],
-        )
-        if self._ticks < len(led):  # no history yet
-            wanted[self._ticks + 1 :] = wanted[0]
-            led[:], self.limited, self._ticks = wanted, False, self._ticks + 1
-        else:
-            room = np.maximum(self._most - np.abs(self._late[1]), self._least) / self._rotor
-            self.limited = follow(wanted, led, room, self._period)
-        late, its_torque, its_sag = self._late
-        self._late = (target, needed, sag)
-        q, qd, motor_torque, acceleration = motor_reference(
-            late.q, late.qd, its_torque, led, self._rotor, self._friction, self._width, self._linear, self._torques,
-            self._period,
+        model, springs, first = self._model, self._springs, self._late is None
+        springs.carry(carried)
+        needed, command, qdd = np.empty(len(torque)), np.empty((3, len(torque))), np.empty(len(torque))
+        lead_of(
+            springs.chain, target.q, target.qd, target.qdd, model.joints, model.flexes, model.stiffness, self._damping,
+            self._bent, self._before, first, smooth, self._period, springs.motion, springs.scratch, springs.jacobian,
+            self._loads, self._wanted, torque, self._rotor, self._torques, needed,
         )  # fmt: skip
-        self.qdd = late.qdd + acceleration
+        late, its_torque, its_sag = self._late or (target, needed, sag)
+        self._late = (target, needed, sag)
+        self.limited = motor_command(
+            late.q, late.qd, late.qdd, its_torque, self._wanted, self._led, self._ticks, self._most, self._least,
+            self._rotor, self._friction, self._width, self._linear, self._torques, self._period, command, qdd,
+        )  # fmt: skip
+        self.qdd, self._ticks = qdd, self._ticks + 1
+        q, qd, motor_torque = command
         if sag is not None and its_sag is not None:
             q += its_sag
             qd += (sag - its_sag) / self._period

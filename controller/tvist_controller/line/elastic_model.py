@@ -4,6 +4,8 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.line.elastic_lead import loads_of
+from tvist_plant.chain import BODY, SCRATCH, chain_of
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, flexible_model, rigid_model
 
@@ -28,12 +30,6 @@ class ElasticModel:
         """Return a calculator of the loads on the springs, with a state of its own."""
         return SpringLoads(self._description)
 
-    def deflections(self, load: Floats) -> Floats:
-        """Deflections under a constant load, shape (N,) [rad]: gears twist with it, and links bend against it."""
-        found: Floats = load / self.stiffness
-        found[self.flexes] *= -1.0
-        return found
-
     @property
     def size(self) -> int:
         """Number N of coordinates."""
@@ -41,7 +37,7 @@ class ElasticModel:
 
 
 class SpringLoads:
-    """Torques on all springs that a motion of the unbent arm needs, and the flange's Jacobian.
+    """Torques on all springs that a motion of the arm needs, and the flange's Jacobian.
 
     Args:
         description: The robot, of which masses and geometry are used.
@@ -49,18 +45,17 @@ class SpringLoads:
 
     def __init__(self, description: RobotDescription) -> None:
         flexible = flexible_model(description, Payload())
-        self._model, self._flange = flexible.model, flexible.flange
-        self._model.gravity = pin.Motion.Zero()  # gravity's share is static: it makes the arm sag, not swing
-        self._data = self._model.createData()
+        model, rigid = flexible.model, rigid_model(description, Payload())
+        self.chain = chain_of(model, flexible.flange)
+        """Parameters of the links with the payload, see `tvist_plant.chain`, shape (N+1, 22)."""
+        self.scratch, self.motion = np.zeros((model.nv + 1, SCRATCH)), np.zeros((3, model.nv))
+        """Scratch of the kernels in `elastic_lead`, as the next one."""
+        self.jacobian = np.zeros((3, model.nv))
         self._joints = flexible.joints
-        frame = self._model.frames[self._flange]
-        self._last = frame.parentJoint
-        self._bare = self._model.inertias[self._last].toDynamicParameters()
-        rigid = rigid_model(description, Payload())
+        self._bare = self.chain[-2, BODY:].copy()
         own = rigid.frames[rigid.getFrameId(FLANGE)]
-        self._placement = frame.placement * own.placement.inverse()
+        self._placement = model.frames[flexible.flange].placement * own.placement.inverse()
         self._added: Floats | None = None
-        self._q, self._qd, self._qdd = np.zeros((3, self._model.nv))
 
     def carry(self, added: Floats) -> None:
         """Set the payload.
@@ -71,21 +66,19 @@ class SpringLoads:
         """
         if added is not self._added:
             self._added = added
-            parameters = self._bare + _moved(added, self._placement)
-            self._model.inertias[self._last] = pin.Inertia.FromDynamicParameters(parameters)
+            self.chain[-2, BODY:] = self._bare + _moved(added, self._placement)
 
     def of(self, target: Target) -> tuple[Floats, Floats]:
-        """Compute the loads for links that are not bent.
+        """Compute the loads for links that are not bent and do not bend.
 
         Returns:
-            Torques on the springs without gravity, shape (N,) [N m], and the flange's Jacobian in the base's axes,
-            shape (6, N).
+            Torques on the springs without gravity, shape (N,) [N m], and the flange's translation Jacobian in the
+            base's axes, shape (3, N).
         """
-        joints, q = self._joints, self._q
-        q[joints], self._qd[joints], self._qdd[joints] = target.q, target.qd, target.qdd
-        load = pin.rnea(self._model, self._data, q, self._qd, self._qdd)
-        jacobian = pin.computeFrameJacobian(self._model, self._data, q, self._flange, pin.LOCAL_WORLD_ALIGNED)
-        return load, jacobian.reshape(6, -1)  # that of a single coordinate has one dimension
+        motion, load = np.zeros_like(self.motion), np.empty(self.motion.shape[1])
+        motion[:, self._joints] = target.q, target.qd, target.qdd
+        loads_of(self.chain, motion, self.scratch, self.jacobian, load)
+        return load, self.jacobian
 
 
 def _moved(parameters: Floats, placement: pin.SE3) -> Floats:
