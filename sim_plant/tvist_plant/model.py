@@ -75,7 +75,8 @@ def flexible_model(
     Args:
         description: The robot.
         payload: Carried payload.
-        torsion: Stiffness of each link that bends against twisting about its x axis; None if it does not [N m/rad].
+        torsion: Stiffness of each link that bends against twisting about the line along x through its centre
+            of mass; None if it does not [N m/rad].
     """
     flexibility = description.link_flexibility
     stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))
@@ -102,7 +103,11 @@ def flexible_model(
         flexes += bending[-2:]
         stiffness += [stiffness_of[number]] * 2
         if torsion is not None:
-            parent = model.addJoint(parent, pin.JointModelRX(), pin.SE3.Identity(), f"{name}_torsion")
+            # A tube twists about its middle, which the line between the joints' frames may be far from.
+            _, y, z = frame.rotation @ np.array(description.links.com[number])
+            axis = pin.SE3(np.eye(3), np.array([0.0, y, z]))
+            parent = model.addJoint(parent, pin.JointModelRX(), axis, f"{name}_torsion")
+            middle *= axis
             flexes.append(model.nv - 1)
             stiffness.append(torsion)
         placement = middle.inverse() * frame

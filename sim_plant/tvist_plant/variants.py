@@ -110,10 +110,11 @@ def _heavier(payload: Payload) -> Payload:
 
 
 def _sharper(share: float, description: RobotDescription, seed: int) -> RobotDescription:  # noqa: ARG001  not drawn
-    """Return an arm whose friction changes sign within a share of the speed."""
+    """Return an arm whose friction, never linear, changes sign within a share of the speed."""
     drives = description.drives
     return structs.replace(
-        description, drives=structs.replace(drives, friction_width=share * drives.friction_width)
+        description,
+        drives=structs.replace(drives, friction_width=share * drives.friction_width, linear_friction=False),
     )
 
 

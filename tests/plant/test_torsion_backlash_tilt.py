@@ -75,16 +75,16 @@ def test_a_twisting_link_rings_at_the_frequency_of_its_spring_and_what_hangs_on_
 
 
 def beyond_the_elbow(arm, q):
-    """Moment of inertia of the far half of the forearm, the wrist and the payload about the forearm's x axis."""
+    """Moment of inertia of the far half of the forearm, the wrist and the payload about the forearm's centre line."""
     model = rigid_model(arm, arm.payload)
     data = model.createData()
     pin.forwardKinematics(model, data, q)
     elbow = data.oMi[3]
-    total = 0.5 * arm.links.mass[2] * arm.links.com[2][2] ** 2 + 0.5 * arm.links.inertia[2][0]
+    line = np.array([0.0, *arm.links.com[2][1:]])  # the forearm's frames at both ends have the same axes
+    total = 0.5 * arm.links.inertia[2][0]
     for joint in (4, 5, 6):
         moved = (elbow.inverse() * data.oMi[joint]).act(model.inertias[joint])
-        total += (moved.inertia + moved.mass * (moved.lever @ moved.lever * np.eye(3)))[0, 0]
-        total -= moved.mass * moved.lever[0] ** 2
+        total += moved.inertia[0, 0] + moved.mass * np.sum((moved.lever - line)[1:] ** 2)
     return total
 
 
