@@ -1,4 +1,4 @@
-"""`tvist shaperbench`: rank shapers, your own included, on ten simulated arms."""
+"""`tvist shaperbench`: rank shapers, your own included, on thirteen simulated arms."""
 
 from datetime import UTC, datetime
 from itertools import chain
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from tvist_controller.sources.own_shapers import OwnShaper
     from tvist_lab.report import Page
 
-MOVES, QUICK = 100, 3
-"""Number of moves, and that with --quick."""
+QUICK = 3
+"""Number of moves with --quick."""
 
 
 def shaperbench(
@@ -36,17 +36,17 @@ def shaperbench(
     report: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Rank shapers by how soon ten different arms come to rest, and by the vibration until then.
+    """Rank shapers by how soon thirteen different arms come to rest, and by the vibration until then.
 
     Every shaper gets the same random moves with payloads of 0 to 5 kg, of which the controller assumes 100, 110 and
-    90 %. Ten arms follow its reference; all but one differ from the controller's model. A shaper that uses future
+    90 %. Thirteen arms follow its reference; all but one differ from the controller's model. A shaper that uses future
     samples or does not report its full delay is listed but not ranked.
 
     Args:
         shaper: Python file with a class that has step(q_ref, info) -> q_star, and optionally reset(q) and delay in s;
             or with a function step. Or FILE.py:NAME, as for tvist serve.
         quick: Run only a few moves, with one payload error each.
-        moves: Number of moves [100, or 3 with --quick].
+        moves: Number of moves [60, or 3 with --quick].
         against: Names of the shapers and baselines to run, in addition to waiting; default: all.
         seed: Seed of moves, payloads, gear errors and parameter scatter.
         calibration: Name of a calibration that comes with the package, or path of a calibration file; it needs a modal
@@ -61,6 +61,7 @@ def shaperbench(
     from tvist_lab.studies import leaderboard
     from tvist_lab.studies import shaperbench as bench
     from tvist_lab.study.arms import ARMS
+    from tvist_lab.study.held_out import MOVES
 
     places = Places(output=output, markdown=markdown, figures=figures, look=look, report=report)
     places.check()
@@ -117,8 +118,14 @@ def _mine(shaper: str) -> "str | OwnShaper":
 def _page(result: dict[str, Any]) -> str:
     from tvist_lab.studies.leaderboard import ON_PAGE, best_in_bold, ranked
     from tvist_lab.studies.pages import page
+    from tvist_lab.study.held_out import said
 
-    more = {"ranked": ranked(result), "columns": ON_PAGE, "best_in_bold": best_in_bold}
+    more = {
+        "ranked": ranked(result),
+        "columns": ON_PAGE,
+        "best_in_bold": best_in_bold,
+        "held_out": said(result["seed"]),
+    }
     return page("shaperbench", result, typed(), **more)
 
 

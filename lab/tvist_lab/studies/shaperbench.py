@@ -1,4 +1,4 @@
-"""ShaperBench: all methods on ten arms with the same random moves and wrong payloads, and round corners."""
+"""ShaperBench: all methods on thirteen arms with the same random moves and wrong payloads, and round corners."""
 
 import math
 from collections.abc import Iterator, Sequence

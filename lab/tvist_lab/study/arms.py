@@ -7,10 +7,21 @@ from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import Placeable
 from tvist_plant.variants import AS_DESCRIBED, VARIANTS, Variant, scattered, stiffer, with_springs
 
-__all__ = ["ARMS", "AS_DESCRIBED", "PERTURBED", "ArmVariant", "scattered", "stiffer", "with_springs"]
+__all__ = [
+    "ARMS",
+    "AS_DESCRIBED",
+    "JUDGED",
+    "PERTURBED",
+    "ArmVariant",
+    "scattered",
+    "stiffer",
+    "with_springs",
+]
 
 PERTURBED = ("stribeck", "hysteresis", "torsion", "base", "backlash", "combined")
 """Names of the plants by which robustness is judged, besides wrong springs and payloads."""
+JUDGED = ("calibrated", *PERTURBED, "springs-30", "springs+30")
+"""Names of the plants on which two methods are compared."""
 
 
 @dataclass(frozen=True)

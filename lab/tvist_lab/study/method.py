@@ -129,6 +129,18 @@ class Named(Stepping):
 
 
 @dataclass(frozen=True)
+class ShapedAlone(Named):
+    """A filter without the elastic feed-forward that it is made for, to see what that brings."""
+
+    def elastic(self, task: Task) -> None:
+        """Return None: the drives get the feed-forward of the paper's controller."""
+
+    def shaped(self, task: Task) -> Shaped:
+        """Shape the reference, or a motion that is planned for the filter; see `Named.shaped`."""
+        return replace(super().shaped(task), elastic=None)
+
+
+@dataclass(frozen=True)
 class Constant(Stepping):
     """A shaper of the catalogue with constant modes: those of the move's target, or some for a whole range."""
 
@@ -203,6 +215,20 @@ class Planned(Method):
     def shapes(self) -> bool:
         """False: a stream or a curved path is no motion that it could plan."""
         return False
+
+
+@dataclass(frozen=True)
+class AsServed(Planned):
+    """A motion that a robot plans for a filter: it is no shaped reference, on the bench either."""
+
+    by: Named
+    """The filter."""
+    name: str
+    label: str
+
+    def shaped(self, task: Task) -> Shaped:
+        """Return the motion as a robot makes it."""
+        return self.by.shaped(replace(task, as_served=True))
 
 
 @dataclass(frozen=True)
