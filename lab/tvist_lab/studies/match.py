@@ -138,9 +138,9 @@ def table(first: str, second: str) -> list[Shown]:
     def sure(name: str) -> Shown:
         def text(entry: Entry) -> str | None:
             value, ends = entry["difference"][name], entry["difference"][f"{name}_interval"]
-            return (
-                value if value is None or ends is None else f"{value:+.1f} [{ends[0]:+.1f}, {ends[1]:+.1f}]"
-            )
+            if value is None:
+                return None
+            return f"{value:+.1f}" + ("" if ends is None else f" [{ends[0]:+.1f}, {ends[1]:+.1f}]")
 
         return Shown(f"difference {name}", text)
 
