@@ -13,11 +13,12 @@ from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.sources.mode_source import ModeSource, first_source
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_controller.sources.own_shapers import OwnShaper
+from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
 from tvist_plant.plant import Placeable, Plant
 from tvist_plant.plant_checks import measured_standing
-from tvist_plant.variants import hidden_arm
+from tvist_plant.variants import hidden_variant
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
@@ -121,7 +122,8 @@ class Setup:
         """
         carried = body(self.carried or self.payload)
         if self.hidden is not None:
-            return hidden_arm(self.description, carried, self.hidden)
+            arm = hidden_variant(self.hidden).make(self.description, carried, self.seed)
+            return called(arm, self.description.joints, untold=True)
         return None if self.plant is None else self.plant.make(self.description, carried, self.seed)
 
     def standing(self, plant: Plant | None) -> "Setup":

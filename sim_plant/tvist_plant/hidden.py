@@ -5,14 +5,11 @@ its dampers, loops, rotors and friction are others, and what it carries is not q
 factors are uniform within 1 ± a share, and independent of each other.
 """
 
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 from msgspec.structs import replace
 
-from tvist_plant.drives import DriveCommand
-from tvist_plant.model import Floats
-from tvist_plant.plant import Breakable, Loadable, Measurement, Placeable, Pushable
 from tvist_plant.robot_tables import Drives, LinkFlexibility, Payload, RobotDescription
 
 DRIVES: Final = {
@@ -75,43 +72,3 @@ def hidden_payload(declared: Payload, seed: int) -> Payload:
     x, y, z = (np.array(declared.com) + random.uniform(-CENTRE, CENTRE, 3)).tolist()
     xx, xy, xz, yy, yz, zz = (factor * value for value in declared.inertia)
     return Payload(mass=factor * declared.mass, com=(x, y, z), inertia=(xx, xy, xz, yy, yz, zz))
-
-
-class SimulatedArm(Placeable, Loadable, Pushable, Breakable, Protocol):
-    """What can be done to a simulated arm without knowing it."""
-
-
-class Untold:
-    """A simulated arm that keeps to itself what a real one would: truth, modes, and what it would do next.
-
-    Args:
-        arm: The arm.
-    """
-
-    def __init__(self, arm: SimulatedArm) -> None:
-        self._arm = arm
-
-    @property
-    def payload(self) -> Payload:
-        """The payload that it is said to carry."""
-        return self._arm.payload
-
-    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
-        """Put the arm at rest; see `Placeable`."""
-        return self._arm.reset(command, payload=payload, seed=seed)
-
-    def step(self, command: DriveCommand) -> Measurement:
-        """Move the arm by one period; see `Plant`."""
-        return self._arm.step(command)
-
-    def load(self, payload: Payload) -> None:
-        """Say that it carries another payload from now on; see `Loadable`."""
-        self._arm.load(payload)
-
-    def push(self, torque: Floats) -> None:
-        """Push the joints; see `Pushable`."""
-        self._arm.push(torque)
-
-    def make_nan(self) -> None:
-        """Make the state NaN; see `Breakable`."""
-        self._arm.make_nan()

@@ -14,7 +14,7 @@ from msgspec import structs
 
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.hidden import Untold, hidden, hidden_payload
+from tvist_plant.hidden import hidden, hidden_payload
 from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.plant import Measurement, Placeable
 from tvist_plant.robot_tables import Payload, RobotDescription
@@ -235,17 +235,6 @@ def hidden_variant(seed: int) -> Variant:
         partial(_hidden, seed),
         carries=partial(hidden_payload, seed=seed),
     )
-
-
-def hidden_arm(description: RobotDescription, said: Payload, seed: int) -> Untold:
-    """Create a hidden robot that tells no more than a real one.
-
-    Args:
-        description: The robot file.
-        said: Payload that it is said to carry.
-        seed: Seed of the draw.
-    """
-    return Untold(_Mistaken(hidden(description, seed), said, partial(hidden_payload, seed=seed)))
 
 
 def scattered(share: float) -> Variant:

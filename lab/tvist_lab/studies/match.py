@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import binom, binomtest
+from scipy.stats import binom
 
 from tvist_controller.api.line import MotionLimits
 from tvist_lab.recordings import Floats
@@ -90,7 +90,6 @@ def _entry(first: dict[int, Row], second: dict[int, Row]) -> dict[str, Any]:
             "p5": None if p5[0] is None or p5[1] is None else p5[0] - p5[1],
             "p5_interval": bootstrap(both, _between_p5) if enough else None,
         },
-        "sign_test_p": sign_test(differences) if enough else None,
         "verdict": TOO_FEW if middle is None else verdict(middle),
     }
 
@@ -104,12 +103,6 @@ def exact_interval(differences: Floats) -> list[float]:
     ordered = np.sort(differences)
     outside = int(binom.ppf(0.025, len(ordered), 0.5))  # P(fewer lie below the median) is less than 2.5 %
     return [float(ordered[outside - 1]), float(ordered[len(ordered) - outside])]
-
-
-def sign_test(differences: Floats) -> float:
-    """Probability of at least so unequal signs if neither method is better, exact and two-sided; zeros do not count."""
-    better, worse = int((differences > 0.0).sum()), int((differences < 0.0).sum())
-    return float(binomtest(better, better + worse).pvalue) if better + worse else 1.0
 
 
 def verdict(interval: Sequence[float]) -> str:

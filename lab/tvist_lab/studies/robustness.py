@@ -1,7 +1,6 @@
 """Reduction of vibration by each method on arms other than calibrated, or that carry more or less than declared."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,18 +31,8 @@ FIRST = (Shown("shaper", "name"), Shown("delay ms", "delay_ms", 0))
 """First columns of all tables."""
 
 
-@dataclass(frozen=True)
-class Wrong:
-    """What is wrong in a column of the tables."""
-
-    arm: Variant = AS_DESCRIBED
-    """The arm."""
-    payload_error: float = 0.0
-    """Error of the declared mass [-]."""
-
-
-Columns = Mapping[str, Mapping[str, Wrong]]
-"""The columns of each kind of table, by their titles."""
+Columns = Mapping[str, Mapping[str, tuple[Variant, float]]]
+"""The columns of each kind of table by their titles: the arm, and the error of the declared mass [-]."""
 
 
 def columns(hidden: Sequence[int] = ()) -> Columns:
@@ -59,10 +48,10 @@ def columns(hidden: Sequence[int] = ()) -> Columns:
     plants = [*map(variant, PERTURBED), *map(hidden_variant, hidden)]
     return {
         "stiffness": {
-            title: Wrong(with_springs(1.0 + error)) for title, error in titled("stiffness").items()
+            title: (with_springs(1.0 + error), 0.0) for title, error in titled("stiffness").items()
         },
-        "payload": {title: Wrong(payload_error=error) for title, error in titled("payload").items()},
-        PLANT: {one.name: Wrong(one) for one in plants},
+        "payload": {title: (AS_DESCRIBED, error) for title, error in titled("payload").items()},
+        PLANT: {one.name: (one, 0.0) for one in plants},
     }
 
 
@@ -76,8 +65,8 @@ def jobs(
     """Return all jobs: error of the payload by move, each by all methods on all arms with that error."""
     arms: dict[float, dict[str, Variant]] = {}
     for kind in columns(hidden).values():
-        for wrong in kind.values():
-            arms.setdefault(wrong.payload_error, {})[wrong.arm.name] = wrong.arm
+        for arm, error in kind.values():
+            arms.setdefault(error, {})[arm.name] = arm
     return [
         Job(
             Case(
@@ -120,8 +109,7 @@ def _entry(method: Method, rows: Sequence[Row], every: Columns) -> dict[str, Any
         "delay_ms": round(float(np.median([row["delay_ms"] for row in rows])), 6),
         **{
             kind: {
-                title: _reductions(cells.get((wrong.arm.name, wrong.payload_error), []))
-                for title, wrong in those.items()
+                title: _reductions(cells.get((arm.name, error), [])) for title, (arm, error) in those.items()
             }
             for kind, those in every.items()
         },

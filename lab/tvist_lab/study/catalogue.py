@@ -8,14 +8,12 @@ from tvist_controller.api.line import OwnShaper
 from tvist_lab.study.foreign import FromFile
 from tvist_lab.study.menus import ROWS, UNSHAPED, Kind, Row, names, rows
 from tvist_lab.study.method import (
-    AsServed,
     Constant,
     Held,
     Longer,
     Method,
     Named,
     PeriodOfJerk,
-    ShapedAlone,
     Waiting,
 )
 from tvist_lab.study.recipes import Recipe, longest_mean_delay, robust
@@ -65,11 +63,8 @@ _MAKERS: dict[Kind, Callable[[Row, Recipe, RobotDescription, tuple[float, float]
     "filter": lambda row, recipe, *_: Named(
         Recipe(row.of or row.name, recipe.calibration, modes=row.modes), row.name, row.label
     ),
-    "planned": lambda row, recipe, *_: AsServed(
-        Named(Recipe(row.name, recipe.calibration), row.name, row.label), row.name, row.label
-    ),
-    "shaped alone": lambda row, recipe, *_: ShapedAlone(
-        Recipe(row.of, recipe.calibration), row.name, row.label
+    "shaped alone": lambda row, recipe, *_: Named(
+        Recipe(row.of, recipe.calibration), row.name, row.label, alone=True
     ),
     "for target": lambda row, recipe, *_: Constant(recipe, row.name, row.label, row.of, row.modes),
     "for payload": lambda row, recipe, *_: Constant(recipe, row.name, row.label, row.of, for_payload=True),

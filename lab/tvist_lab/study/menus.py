@@ -13,17 +13,9 @@ Menu = Literal["bench", "robustness", "baselines", "paths", "bound", "lesson"]
 bound; and where the notebooks offer it.
 """
 Kind = Literal[
-    "filter",
-    "for target",
-    "for payload",
-    "for workspace",
-    "held",
-    "longer",
-    "as long as",
-    "jerk of a period",
-    "planned",
+    "filter", "for target", "for payload", "for workspace", "held", "longer", "as long as", "jerk of a period",
     "shaped alone",
-]
+]  # fmt: skip
 UNSHAPED = "none"
 """Name of waiting on the bench, where it goes through the same line as the others."""
 
@@ -76,7 +68,7 @@ ROWS = (
     Row("auto", "constant mean delay, auto", ("bench", "robustness", "paths", "bound")),
     Row("auto-target", "constant mean delay, given the end of each move", ("bench", "robustness", "paths", "bound")),
     Row("short", "constant mean delay, short", ("bench", "paths")),
-    Row("planned", "planned to leave no vibration", ("bench", "robustness", "bound"), "planned"),
+    Row("planned", "planned to leave no vibration", ("bench", "robustness", "bound")),
     Row("smoothing", "smoothing of elastic alone", ("bench", "robustness"), "shaped alone", "elastic"),
     Row("elastic", "smoothing, elastic feed-forward", ("bench", "robustness")),
     Row("elastic-position", "smoothing, elastic feed-forward without torques", ("bench",)),

@@ -85,7 +85,7 @@ def robustness(
             typed(),
             tables=tables(hidden or ()),
             held_out=said(seed),
-            plants=[(one.arm.name, one.arm.label) for one in columns(hidden or ())[PLANT].values()],
+            plants=[(one.name, one.label) for one, _ in columns(hidden or ())[PLANT].values()],
         ),
         draw=lambda: _figures(result),
     )
