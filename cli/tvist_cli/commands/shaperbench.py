@@ -118,14 +118,8 @@ def _mine(shaper: str) -> "str | OwnShaper":
 def _page(result: dict[str, Any]) -> str:
     from tvist_lab.studies.leaderboard import ON_PAGE, best_in_bold, ranked
     from tvist_lab.studies.pages import page
-    from tvist_lab.study.held_out import said
 
-    more = {
-        "ranked": ranked(result),
-        "columns": ON_PAGE,
-        "best_in_bold": best_in_bold,
-        "held_out": said(result["seed"]),
-    }
+    more = {"ranked": ranked(result), "columns": ON_PAGE, "best_in_bold": best_in_bold}
     return page("shaperbench", result, typed(), **more)
 
 

@@ -49,7 +49,7 @@ def robustness(
     from tvist_lab.studies.robustness import PLANT, columns, jobs, report, tables
     from tvist_lab.studies.shaperbench import CALIBRATION, draw
     from tvist_lab.study.engine import made
-    from tvist_lab.study.held_out import MOVES, said
+    from tvist_lab.study.held_out import MOVES
     from tvist_lab.study.menus import names
     from tvist_lab.study.shaping import ShaperFaultError
 
@@ -84,7 +84,6 @@ def robustness(
             result,
             typed(),
             tables=tables(hidden or ()),
-            held_out=said(seed),
             plants=[(one.name, one.label) for one, _ in columns(hidden or ())[PLANT].values()],
         ),
         draw=lambda: _figures(result),
