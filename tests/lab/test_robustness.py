@@ -61,7 +61,6 @@ def test_the_report_is_ordered_by_delay_and_names_what_does_not_count(done):
     }
     about = {"moves": 1, "seed": 0, "shapers": entries}
     more = {
-        "held_out": said(0),
         "plants": [(one.name, one.label) for one, _ in columns()[PLANT].values()],
     }
     written = page("robustness", about, "a command", tables=tables(), **more)
