@@ -11,6 +11,7 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import out, say, typed
 from tvist_cli.shapers_of import load_given, modal_calibration, on_the_bench
+from tvist_cli.simulated_arm import plants_of
 from tvist_cli.studying import Figures, Places, check_range, check_seed, command, gathered, give, show
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ def shaperbench(
     quick: bool = False,
     moves: int | None = None,
     against: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    hidden: Annotated[list[int] | None, Parameter(consume_multiple=True)] = None,
     seed: int = 0,
     calibration: str | None = None,
     output: Path | None = None,
@@ -48,6 +50,8 @@ def shaperbench(
         quick: Run only a few moves, with one payload error each.
         moves: Number of moves [60, or 3 with --quick].
         against: Names of the shapers and baselines to run, in addition to waiting; default: all.
+        hidden: Seeds of hidden robots, each of which is one more arm: its springs, dampers, loops, rotors, friction and
+            payload are drawn from its seed.
         seed: Seed of moves, payloads, gear errors and parameter scatter.
         calibration: Name of a calibration that comes with the package, or path of a calibration file; it needs a modal
             model [ur5e_modal].
@@ -72,22 +76,29 @@ def shaperbench(
     against = None if against is None else [name.lower() for name in against]
     mine = None if shaper is None else _mine(shaper)
     description, methods = on_the_bench(known, against, mine)
+    arms = [*ARMS, *plants_of([], hidden, description)]
     drawn = bench.draw(description, count, seed)
     faults = [bench.inspect(one, description, drawn) for one in methods]
     sound = [one for one, fault in zip(methods, faults, strict=True) if fault is None]
-    jobs = bench.jobs(description, sound, drawn, seed, quick=quick)
+    jobs = bench.jobs(description, sound, drawn, seed, quick=quick, arms=arms)
     bends = bench.bends(description, sound, drawn)
     work: Any = chain(bench.play(jobs), map(bench.bend, bends))
     found = gathered(work, len(jobs) + len(bends), "motions")
     rows, bent = chain.from_iterable(found[: len(jobs)]), zip(bends, found[len(jobs) :], strict=True)
-    options = {"shaper": shaper, "against": against, "calibration": calibration, "quick": quick}
+    options = {
+        "shaper": shaper,
+        "against": against,
+        "hidden": hidden,
+        "calibration": calibration,
+        "quick": quick,
+    }
     result = {
         "date": datetime.now(UTC).date().isoformat(),
         "command": command("shaperbench", **options, moves=count, seed=seed),
         "moves": count,
         "seed": seed,
         "payload_errors": list(bench.PAYLOAD_ERRORS),
-        "arms": {arm.name: arm.label for arm in ARMS},
+        "arms": {arm.name: arm.label for arm in arms},
         "calibration": known.name,
         **leaderboard.leaderboard(methods, faults, list(rows), list(bent)),
     }

@@ -9,7 +9,6 @@ import numpy as np
 from tvist_lab.markdown_table import markdown_table
 from tvist_lab.recordings import Floats
 from tvist_lab.studies.shaperbench import PAYLOAD_ERRORS, Bend, fault_of
-from tvist_lab.study.arms import ARMS
 from tvist_lab.study.held_out import median_and_p5, percentiles
 from tvist_lab.study.measures import WORTH
 from tvist_lab.study.method import Method
@@ -101,11 +100,9 @@ def _entry(pairs: Sequence[Pair], bent: Sequence[float]) -> dict[str, Any]:
             "cost_us",
         )
     )
-    arms = {row["arm"] for row, _ in pairs}
     by_arm = {
-        arm.name: _summary([pair for pair in pairs if pair[0]["arm"] == arm.name])
-        for arm in ARMS
-        if arm.name in arms
+        arm: _summary([pair for pair in pairs if pair[0]["arm"] == arm])
+        for arm in dict.fromkeys(row["arm"] for row, _ in pairs)
     }
     return {
         **_summary(pairs),
