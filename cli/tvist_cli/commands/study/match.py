@@ -115,7 +115,6 @@ def match(
 def _method(name: str, description: "RobotDescription", calibration: str | None) -> "Method":
     """Return a method of the catalogue, or the shaper of a file."""
     from tvist_lab.study.catalogue import some
-    from tvist_lab.study.menus import rows
     from tvist_lab.study.method import Named
     from tvist_lab.study.recipes import Recipe
 
@@ -126,17 +125,15 @@ def _method(name: str, description: "RobotDescription", calibration: str | None)
             method = Named(Recipe(shaper, known, own=own), shaper, own[0].place)
             method.recipe.make(description, description.limits.payload)
         return method
-    every = [row.name for row in rows()]
-    if shaper not in every:
-        raise Failure(
-            f"shaper is {name!r}: must be FILE.py:NAME or one of {', '.join(sorted(every))}", code=2
-        )
     found = calibration_for(calibration, "elastic", (), 1, description)
     if found is None:
         model = description.robot.model
         raise Failure(f"the package has no calibration of a {model}: give --calibration FILE", code=2)
-    with designing():
-        return some([shaper], description, found)[0]
+    try:
+        with designing():
+            return some([shaper], description, found)[0]
+    except KeyError as error:
+        raise Failure(f"shaper is {name!r}: {error.args[0]}", code=2) from error
 
 
 def _print(result: dict[str, Any]) -> None:
