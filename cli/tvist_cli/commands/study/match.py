@@ -86,8 +86,14 @@ def match(
         raise Failure(f"both shapers are {pair[0].name}: give two different ones", code=2)
     with told(MovesError, code=2):
         drawn = draw_moves(description, moves, seed, masses).moves
-    with told(ValueError, code=2):
-        todo = jobs(arm, pair, arms, feasible(drawn, description, chosen), seed, chosen)
+    able = feasible(drawn, description, chosen)
+    if len(able) < LEAST:
+        raise Failure(
+            f"moves is {moves}, but the drives are strong enough for {len(able)} alone at these limits: must be at "
+            f"least {LEAST} of them",
+            code=2,
+        )
+    todo = jobs(arm, pair, arms, able, seed, chosen)
     done = gathered(
         made(todo), sum(job.motions for job in todo), "motions", ShaperFaultError, ValueError, weigh=len
     )
