@@ -46,7 +46,7 @@ GROUPS = {
     },
     "Studies": {
         "evaluate": "Compare the vibration of any moves unshaped and shaped.",
-        "shaperbench": "Rank shapers, your own included, on ten simulated arms.",
+        "shaperbench": "Rank shapers, your own included, on thirteen simulated arms.",
         "study": f"Run a study, one's own from a file or one of {', '.join(STUDY)}.",
     },
     "Make and manage": {

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cyclopts.argument import ArgumentCollection
 
 _LOG = ("record", "info", "analyze", "compare", "report", "export", "replay")
-_STUDIES = ("robustness", "paths", "tracking", "map")
+_STUDIES = ("robustness", "match", "paths", "tracking", "map")
 
 INSTEAD = {
     **{name: f"tvist log {name}" for name in _LOG},

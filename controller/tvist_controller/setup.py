@@ -13,10 +13,12 @@ from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.sources.mode_source import ModeSource, first_source
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_controller.sources.own_shapers import OwnShaper
+from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
 from tvist_plant.plant import Placeable, Plant
 from tvist_plant.plant_checks import measured_standing
+from tvist_plant.variants import hidden_variant
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
@@ -57,7 +59,9 @@ class Setup:
     compensate_sag: bool = False
     """Whether the drives lead by the twist of the gears under gravity, so that the arm rests on its target."""
     plant: OwnPlant | None = None
-    """Plant that is not part of the package; None for the flexible arm of the description."""
+    """Plant other than the flexible arm of the description; None for that."""
+    hidden: int | None = None
+    """Seed of a hidden robot, see `tvist_plant.hidden`; None for the robot of the description."""
     shape_servo: bool = False
     """Whether `servoj`, `speedj` and `speedl` of programs are shaped where they begin at rest."""
     cell: Cell | None = None
@@ -95,6 +99,9 @@ class Setup:
         met = collisions.misplaced(np.array(self.q), declared, body(self.carried or self.payload))
         if met is not None:
             raise ValueError(f"start: {met}: choose a posture in which the arm and its payload are clear")
+        if self.hidden is not None and (self.truth or self.plant is not None):
+            given = "truth is on" if self.truth else "a plant is given"
+            raise ValueError(f"hidden is {self.hidden}, but {given}: leave one of them out")
         self.registry.check(self.shaper)
         if self.cell is not None:
             self.cell.check()
@@ -113,11 +120,11 @@ class Setup:
         Raises:
             OwnPlantError: It cannot be made.
         """
-        return (
-            None
-            if self.plant is None
-            else self.plant.make(self.description, body(self.carried or self.payload))
-        )
+        carried = body(self.carried or self.payload)
+        if self.hidden is not None:
+            arm = hidden_variant(self.hidden).make(self.description, carried, self.seed)
+            return called(arm, self.description.joints, untold=True)
+        return None if self.plant is None else self.plant.make(self.description, carried, self.seed)
 
     def standing(self, plant: Plant | None) -> "Setup":
         """Return the setup for a plant, which begins where it stands if it cannot be placed.
@@ -148,6 +155,7 @@ class Setup:
             "shape_servo": self.shape_servo,
             **({} if self.cell is None else {"cell": msgspec.to_builtins(self.cell)}),
             **({} if self.plant is None else {"plant": msgspec.to_builtins(self.plant.recorded)}),
+            **({} if self.hidden is None else {"hidden": self.hidden}),
             **({"instance": self.instance} if self.instance else {}),
         }
 
@@ -183,7 +191,7 @@ class Setup:
                 # Recordings from before these options existed do not have them.
                 **{
                     key: content[key]
-                    for key in ("compensate_sag", "shape_servo", "instance")
+                    for key in ("compensate_sag", "shape_servo", "instance", "hidden")
                     if key in content
                 },
             )

@@ -8,9 +8,10 @@ from typing import Any
 from msgspec.structs import fields
 
 from tvist_controller.api.line import OwnShaper, RecordedShaper, Setup
-from tvist_controller.api.robot import Controller, OwnPlant, Presence, RecordedPlant, SocketNews
+from tvist_controller.api.robot import Controller, OwnPlant, Presence, RecordedPlant, SocketNews, load_plant
 from tvist_lab.recordings.mcap_file import RecordingFile
 from tvist_plant.plant_checks import check_unpaced
+from tvist_plant.variants import VARIANTS
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError, TvistError
@@ -78,7 +79,7 @@ def replay_file(
         output: MCAP file for the replay's own recording.
         own_shapers: Shapers from files that the robot was served with, loaded again. A note reports each file that
             has changed since.
-        plant: Plant that the robot was served with, found again.
+        plant: Plant that the robot was served with, found again; one of this package is found by itself.
 
     Raises:
         ReplayError: The recording does not contain its robot's setup, or begins too late; or a shaper from a file or a
@@ -97,7 +98,8 @@ def replay_file(
     if (content.dropped or {}).get("journal"):
         raise ReplayError("the recorder dropped messages of the journal, so an equal run is not possible")
     used, notes = _used(content.start, own_shapers)
-    notes += _same_plant(content.start, plant)
+    plant, said = _same_plant(content.start, plant)
+    notes += said
     setup = Setup.from_builtins(content.start, used, plant)
     if content.behaviour != THIS_BEHAVIOUR:
         notes.append(
@@ -138,8 +140,8 @@ def _used(start: dict[str, Any], given: Sequence[OwnShaper]) -> tuple[list[OwnSh
     return used, notes
 
 
-def _same_plant(start: dict[str, Any], given: OwnPlant | None) -> list[str]:
-    """Check that the plant is the recorded one; return a note if its file has changed."""
+def _same_plant(start: dict[str, Any], given: OwnPlant | None) -> tuple[OwnPlant | None, list[str]]:
+    """Return the recorded plant, and a note if its file has changed."""
     try:
         recorded = checked(start["plant"], RecordedPlant) if "plant" in start else None
     except ProtocolError as error:
@@ -147,18 +149,17 @@ def _same_plant(start: dict[str, Any], given: OwnPlant | None) -> list[str]:
     if recorded is None:
         if given is not None:
             raise ReplayError(f"the robot was served without the plant {given.place}: leave it out")
-        return []
+        return None, []
+    if given is None and recorded.place in VARIANTS:
+        return load_plant(recorded.place), []
     if given is None:
         raise ReplayError(
             f"the robot was served with the plant {recorded.place}, which the recording does not contain: give "
             f"--plant {recorded.place}, or where it is now"
         )
     changed = given.sha256 != recorded.sha256
-    return (
-        [f"{given.place} is not what it was when the recording was made: states may differ"]
-        if changed
-        else []
-    )
+    notes = [f"{given.place} is not what it was when the recording was made: states may differ"]
+    return given, notes if changed else []
 
 
 def _write(setup: Setup, content: RecordingFile, done: Replay, output: Path) -> None:

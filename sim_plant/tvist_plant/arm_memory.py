@@ -32,7 +32,7 @@ class ArmMemory(NamedTuple):
     springs: Floats
     """Stiffness [N m/rad] and damping [N m s/rad] of each link and motor by itself, shape (2, N+n)."""
     joints: Floats
-    """Rows of `JointParameters`, shape (18, n)."""
+    """Rows of `JointParameters`, shape (19, n)."""
     chain: Floats
     """Parameters of the links, see `chain_of`, shape (N+1, 22)."""
     bodies: Floats

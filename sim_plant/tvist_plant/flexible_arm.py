@@ -13,10 +13,10 @@ from tvist_plant.arm_tick import evaluate, move, play, tick
 from tvist_plant.chain import BODY, body_of, chain_of
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand, LinearPart, Nonlinear
-from tvist_plant.imperfections import GearLaw, Imperfections, on_base
+from tvist_plant.imperfections import GearLaw, Imperfections, imperfect_model
 from tvist_plant.integrator import rows
 from tvist_plant.joint_parameters import packed
-from tvist_plant.model import FlexibleModel, Floats, flexible_model
+from tvist_plant.model import FlexibleModel, Floats
 from tvist_plant.modes import Modes, modes
 from tvist_plant.outside import Outside
 from tvist_plant.plant import PERIOD, Measurement, PlantError, PlantTruth, Response, played
@@ -69,8 +69,7 @@ class FlexibleArm:
     def _load(self, payload: Payload) -> None:
         """Create the models of the arm with this payload, and memory for its state."""
         self._payload = payload
-        flexible, base = flexible_model(self.description, payload), self._imperfections.base
-        self._flexible: FlexibleModel = flexible if base is None else on_base(flexible, base)
+        self._flexible: FlexibleModel = imperfect_model(self.description, payload, self._imperfections)
         self._outside = Outside(self._flexible)
         self._data: pin.Data = self._flexible.model.createData()
         self._linear = linear = LinearPart.of(self._flexible, self.description.drives)
@@ -142,7 +141,9 @@ class FlexibleArm:
         joints, flexes = self._flexible.joints, self._flexible.flexes
         gravity = pin.computeGeneralizedGravity(self._flexible.model, self._data, self._q)
         gears = self._gear_error(self._motor) - self._law.twist(gravity[joints])
-        return gears, -gravity[flexes] / self._flexible.flex_stiffness
+        given_way = np.zeros_like(gravity)
+        given_way[flexes] = -gravity[flexes] / self._flexible.flex_stiffness
+        return gears, given_way[self._flexible.bending]
 
     def step(self, command: DriveCommand) -> Measurement:
         """Move the arm by one period, while its drives go linearly from the previous command to this one.
@@ -273,7 +274,7 @@ class FlexibleArm:
             motor_q=self._motor.copy(),
             motor_qd=self._speed.copy(),
             gear_deflection=self._q[joints] - self._motor,
-            link_deflection=self._q[self._flexible.flexes],
+            link_deflection=self._q[self._flexible.bending],
             flange_position=flange[9:12].copy(),
             flange_rotation=flange[:9].reshape(3, 3).copy(),
             specific_force=self._specific_force,

@@ -9,9 +9,12 @@ A gear twisted by δ transmits the torque
 
     K δ                                   as described,
     K₁ δ up to |δ| = δ₁, K beyond it      piecewise (makers of strain wave gears give K₁ < K),
-    K δ + z                               with hysteresis, ż = r K δ̇ - |δ̇| z r K/z_max  (Dahl 1968).
+    K δ + z                               with hysteresis, ż = r K δ̇ - |δ̇| z r K/z_max  (Dahl 1968);
+    0 up to |δ| = b                       with backlash: the laws above hold for the twist beyond b.
 
-A yielding base stands on two springs about the world's x and y axes, and carries a ring with mass under the arm.
+The damper of a gear acts within its backlash, too, as oil and teeth do. A yielding base stands on two springs about the
+world's x and y axes, and carries a ring with mass under the arm. A tilted arm stands on a slope that nobody told its
+controller about: the world, in which the truth is given, is upright, and the arm is turned.
 """
 
 import math
@@ -20,8 +23,13 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from tvist_plant.description import RobotDescription
-from tvist_plant.model import FLANGE, FlexibleModel, Floats
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.model import FLANGE, FlexibleModel, Floats, flexible_model
+
+TOUCH = 1e-6
+"""Torque below which a gear at rest lies between the flanks of its backlash [N m]."""
+STEEPEST = math.pi / 6
+"""Largest tilt of an arm [rad]."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +78,12 @@ class Imperfections:
     """K₁ δ₁ divided by the joint's torque limit, at least 0 [-]."""
     base: YieldingBase | None = None
     """The yielding base; None for a rigid one."""
+    torsion: float | None = None
+    """Stiffness against twisting of each link that bends, above 0; None if they do not twist [N m/rad]."""
+    backlash: tuple[float, ...] = ()
+    """b of each joint, half of the width of its backlash, at least 0; empty for none [rad]."""
+    tilt: float = 0.0
+    """Angle by which the arm leans about the world's x axis, at most 30 degrees either way [rad]."""
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -79,6 +93,11 @@ class Imperfections:
         _check("hysteresis_torque", self.hysteresis_torque, 0.0, math.inf, above=True)
         _check("soft", self.soft, 0.0, 1.0, above=True)
         _check("soft_torque", self.soft_torque, 0.0, math.inf)
+        if self.torsion is not None:
+            _check("torsion", self.torsion, 0.0, math.inf, above=True)
+        for joint, width in enumerate(self.backlash):
+            _check(f"backlash[{joint}]", width, 0.0, math.inf)
+        _check("tilt", self.tilt, -STEEPEST, STEEPEST)
 
 
 @dataclass(frozen=True)
@@ -99,11 +118,22 @@ class GearLaw:
     """z_max, shape (n,) [N m]."""
     stiffness: Floats
     """K, shape (n,) [N m/rad]."""
+    backlash: Floats
+    """b, shape (n,) [rad]."""
 
     @classmethod
     def of(cls, imperfections: Imperfections, description: RobotDescription) -> "GearLaw":
-        """Scale the imperfections by the arm's gears and torque limits."""
+        """Scale the imperfections by the arm's gears and torque limits.
+
+        Raises:
+            ValueError: The arm has another number of joints than there are widths of backlash.
+        """
         limit = np.array(description.limits.torque)
+        backlash = np.array(imperfections.backlash or np.zeros(description.joints))
+        if len(backlash) != description.joints:
+            raise ValueError(
+                f"backlash has {len(backlash)} values: must have {description.joints}, one per joint"
+            )
         K = np.array(description.drives.gear_stiffness)
         return cls(
             breakaway=imperfections.breakaway,
@@ -113,6 +143,7 @@ class GearLaw:
             hysteresis=imperfections.hysteresis * K,
             hysteresis_torque=imperfections.hysteresis_torque * limit,
             stiffness=K,
+            backlash=backlash,
         )
 
     def twist(self, torque: Floats) -> Floats:
@@ -121,12 +152,33 @@ class GearLaw:
         Args:
             torque: Torque that the gears transmit, shape (n,) [N m].
         """
-        if not self.softness.any():
+        if not self.softness.any() and not self.backlash.any():
             return torque / self.stiffness
         soft = self.stiffness - self.softness
         within = np.minimum(np.abs(torque) / soft, self.soft_angle)
         beyond = np.maximum(np.abs(torque) - soft * self.soft_angle, 0.0)
-        return np.asarray(np.sign(torque) * (within + beyond / self.stiffness))
+        loose = self.backlash * np.clip(torque / TOUCH, -1.0, 1.0)
+        return np.asarray(loose + np.sign(torque) * (within + beyond / self.stiffness))
+
+
+def imperfect_model(
+    description: RobotDescription, payload: Payload, imperfections: Imperfections
+) -> FlexibleModel:
+    """Create the model of an arm with links that twist, on a base that yields or leans.
+
+    Raises:
+        ValueError: Links are to twist, but the arm has none that bends.
+    """
+    if imperfections.torsion is not None and not description.link_flexibility.links:
+        raise ValueError(
+            f"torsion is {imperfections.torsion:g} N m/rad, but no link of the {description.robot.model} bends: "
+            "links that bend can twist"
+        )
+    arm = flexible_model(description, payload, imperfections.torsion)
+    if imperfections.tilt != 0.0:
+        slope = pin.SE3(pin.rpy.rpyToMatrix(imperfections.tilt, 0.0, 0.0), np.zeros(3))
+        arm.model.jointPlacements[1] = slope * arm.model.jointPlacements[1]
+    return arm if imperfections.base is None else on_base(arm, imperfections.base)
 
 
 def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
@@ -147,6 +199,7 @@ def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
         model=whole,
         joints=place[arm.joints],
         flexes=np.concatenate([[0, 1], place[arm.flexes]]).astype(np.int64),
+        bending=place[arm.bending],
         flex_stiffness=np.concatenate([[base.stiffness] * 2, arm.flex_stiffness]),
         flex_damping=np.concatenate([[base.stiffness * base.damping_time] * 2, arm.flex_damping]),
         flange=whole.getFrameId(FLANGE),

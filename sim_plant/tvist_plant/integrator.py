@@ -109,8 +109,11 @@ def relaxed(z: float, twist: float, stiffness: float, most: float) -> float:
 
 @compiled
 def softened(joint: JointParameters, twist: float) -> float:
-    """Difference of a gear's torque from K δ, because it is softer near zero [N m]."""
-    return float(-joint.softness * min(max(twist, -joint.soft_angle), joint.soft_angle))
+    """Difference of a gear's torque from K δ, because it has backlash, or is softer near zero [N m]."""
+    loose = min(max(twist, -joint.backlash), joint.backlash)
+    beyond = twist - loose
+    soft = joint.softness * min(max(beyond, -joint.soft_angle), joint.soft_angle)
+    return float(-joint.gear_stiffness * loose - soft)
 
 
 @compiled
@@ -189,7 +192,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0915 - one 
                 swing = math.sin(joint.gear_waves * angle + joint.gear_phase)
             wave = joint.gear_stiffness * joint.gear_error * swing
             more = 0.0
-            if joint.softness != 0.0 or joint.hysteresis > 0.0:
+            if joint.softness != 0.0 or joint.hysteresis > 0.0 or joint.backlash > 0.0:
                 twisting = v[l] + 0.5 * h * a[l] - speed
                 twist = y[l] - y[m] + 0.5 * h * twisting - joint.gear_error * swing
                 more = softened(joint, twist) + dragged(joint, z[j], 0.5 * h * twisting)

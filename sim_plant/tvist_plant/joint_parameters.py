@@ -52,6 +52,8 @@ class JointParameters(NamedTuple):
     """r K [N m/rad]."""
     hysteresis_torque: float
     """z_max [N m]."""
+    backlash: float
+    """b [rad]."""
 
 
 ROWS = len(JointParameters._fields)
@@ -66,14 +68,14 @@ def of_joint(parameters: Floats, j: int) -> JointParameters:
         parameters[4, j], parameters[5, j], parameters[6, j], parameters[7, j],
         parameters[8, j], parameters[9, j], parameters[10, j], parameters[11, j],
         parameters[12, j], parameters[13, j], parameters[14, j], parameters[15, j],
-        parameters[16, j], parameters[17, j],
+        parameters[16, j], parameters[17, j], parameters[18, j],
     )  # fmt: skip
 
 
 def packed(
     joints: Integers, linear: LinearPart, nonlinear: Nonlinear, law: GearLaw, gear_phase: Floats
 ) -> Floats:
-    """Return one array of all parameters, one row each in the order of `JointParameters`, shape (18, n).
+    """Return one array of all parameters, one row each in the order of `JointParameters`, shape (19, n).
 
     Args:
         joints: Indices of the joints among the links, shape (n,).
@@ -101,5 +103,6 @@ def packed(
         "soft_angle": law.soft_angle,
         "hysteresis": law.hysteresis,
         "hysteresis_torque": law.hysteresis_torque,
+        "backlash": law.backlash,
     }
     return np.array([np.full(len(gear_phase), rows[name]) for name in JointParameters._fields])

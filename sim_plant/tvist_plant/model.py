@@ -4,7 +4,8 @@ There are two models of the same arm:
 
 - The *rigid* model is known to a controller: n joints, and the declared payload.
 - The *flexible* model is the simulated arm: the same joints and, in the middle of each link that bends, two virtual
-  revolute joints (about y and z). The mass of such a link is in two equal lumps at com ± √(Iyy/m) along the link,
+  revolute joints (about y and z), and a third about x where it also twists. The mass of such a link is in two equal
+  lumps at com ± √(Iyy/m) along the link,
   each with inertia Ixx/2 about every axis. Mass, centre of mass and Ixx are preserved; Iyy grows by Ixx (UR5e's upper
   arm: by 0.015, to 0.349 kg m²), Izz becomes equal to it, and products vanish. Lumps without inertia of their own
   would put the fastest pole at -1.6e6 1/s, beyond any integrator at 500 Hz.
@@ -30,11 +31,13 @@ class FlexibleModel:
     """The flexible model of an arm."""
 
     model: pin.Model
-    """Model with N = n + 2 x (links that bend) degrees of freedom, in the order of the chain."""
+    """Model with N = n + 2 x (links that bend) degrees of freedom, or more, in the order of the chain."""
     joints: Integers
     """Indices of the n joints."""
     flexes: Integers
-    """Indices of the virtual joints of bending links."""
+    """Indices of all virtual joints."""
+    bending: Integers
+    """Indices of those about y and z of bending links."""
     flex_stiffness: Floats
     """Stiffness of each virtual joint [N m/rad]."""
     flex_damping: Floats
@@ -64,13 +67,23 @@ def rigid_model(description: RobotDescription, payload: Payload) -> pin.Model:
     return model
 
 
-def flexible_model(description: RobotDescription, payload: Payload) -> FlexibleModel:
-    """Create the model of the arm with links that bend."""
+def flexible_model(
+    description: RobotDescription, payload: Payload, torsion: float | None = None
+) -> FlexibleModel:
+    """Create the model of the arm with links that bend.
+
+    Args:
+        description: The robot.
+        payload: Carried payload.
+        torsion: Stiffness of each link that bends against twisting about the line along x through its centre
+            of mass; None if it does not [N m/rad].
+    """
     flexibility = description.link_flexibility
     stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))
     model = pin.Model()
     joints: list[int] = []
     flexes: list[int] = []
+    bending: list[int] = []
     stiffness: list[float] = []
     parent, placement = 0, pin.SE3.Identity()
     for number, name in enumerate(description.robot.joints):
@@ -86,8 +99,17 @@ def flexible_model(description: RobotDescription, payload: Payload) -> FlexibleM
         middle = _shift(description.kinematics.a[number] / 2, description.kinematics.d[number])
         parent = model.addJoint(parent, pin.JointModelRY(), middle, f"{name}_bending_y")
         parent = model.addJoint(parent, pin.JointModelRZ(), pin.SE3.Identity(), f"{name}_bending_z")
-        flexes += [model.nv - 2, model.nv - 1]
+        bending += [model.nv - 2, model.nv - 1]
+        flexes += bending[-2:]
         stiffness += [stiffness_of[number]] * 2
+        if torsion is not None:
+            # A tube twists about its middle, which the line between the joints' frames may be far from.
+            _, y, z = frame.rotation @ np.array(description.links.com[number])
+            axis = pin.SE3(np.eye(3), np.array([0.0, y, z]))
+            parent = model.addJoint(parent, pin.JointModelRX(), axis, f"{name}_torsion")
+            middle *= axis
+            flexes.append(model.nv - 1)
+            stiffness.append(torsion)
         placement = middle.inverse() * frame
         model.appendBodyToJoint(parent, far, placement)
     bare = pin.Inertia(model.inertias[parent])
@@ -96,6 +118,7 @@ def flexible_model(description: RobotDescription, payload: Payload) -> FlexibleM
         model=model,
         joints=np.array(joints),
         flexes=np.array(flexes, dtype=np.int64),
+        bending=np.array(bending, dtype=np.int64),
         flex_stiffness=np.array(stiffness),
         flex_damping=np.array(stiffness) * flexibility.damping_time,
         flange=model.getFrameId(FLANGE),

@@ -56,9 +56,9 @@ class PlantTruth:
     gear_deflection: Floats
     """q - θ, shape (n,) [rad]."""
     link_deflection: Floats
-    """Angles of the virtual joints by which links bend; empty if links are rigid [rad]."""
+    """Angles of the virtual joints by which links bend, about y and z of each; empty if links are rigid [rad]."""
     flange_position: Floats
-    """Position of the flange, including deflections, shape (3,) [m]."""
+    """Position of the flange in the world, in which a tilted arm leans; deflections included, shape (3,) [m]."""
     flange_rotation: Floats
     """Orientation of the flange, deflections included, shape (3, 3)."""
     specific_force: Floats

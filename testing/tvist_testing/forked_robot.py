@@ -20,6 +20,7 @@ import threading
 from typing import Any
 
 from tvist_controller.sources.own_plants import load_plant
+from tvist_plant.variants import Variant
 from tvist_server.config_file import from_mapping
 from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError
@@ -73,7 +74,10 @@ def _listening(wanted: WantedRobot, preparation: Preparation) -> tuple[Server, d
         endpoint = f"tcp/{address}:{_free_port(address)}"
         options: dict[str, Any] = {**wanted.options, "listen": (endpoint,)}
         if (plant := options.get("plant")) is not None:
-            options["truth"] = hasattr(load_plant(plant).maker, "truth")
+            maker = load_plant(plant).maker
+            options["truth"] = isinstance(maker, Variant) or hasattr(maker, "truth")
+        if options.get("hidden") is not None:
+            options["truth"] = False
         place: dict[str, Any] = {"endpoint": endpoint}
         if wanted.ur:
             usual = address != "127.0.0.1"

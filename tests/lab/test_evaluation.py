@@ -10,9 +10,10 @@ from tvist_controller import calibrations
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.setup import body, paper_payload
-from tvist_lab.studies.evaluate import interval, jobs, report
+from tvist_lab.studies.evaluate import jobs, report
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import baselines
+from tvist_lab.study.held_out import interval
 from tvist_lab.study.line import (
     PAPER,
     lengthened,

@@ -15,8 +15,8 @@ from tvist_controller.sources.own_plants import (
     OwnPlant,
     OwnPlantError,
     RecordedPlant,
-    installed_plants,
     load_plant,
+    named_plants,
 )
 from tvist_lab.mujoco_arm import MujocoArm
 from tvist_lab.recordings.mcap_file import read
@@ -62,10 +62,10 @@ def place(tmp_path):
 
 
 def test_an_installed_one_is_found_by_its_name():
-    assert "mujoco" in installed_plants()
+    assert {"mujoco", "combined"} <= set(named_plants())
     made = load_plant("mujoco").make(UR5E, body(setup().payload))
     assert type(made).__name__ == MujocoArm.__name__
-    with pytest.raises(OwnPlantError, match=r"must be FILE\.py:NAME, or one of mujoco"):
+    with pytest.raises(OwnPlantError, match=r"must be FILE\.py:NAME, or one of calibrated, .*mujoco"):
         load_plant("nobody")
 
 

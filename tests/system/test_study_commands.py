@@ -114,6 +114,16 @@ def with_each_error(told, _):
     assert zv["stiffness"].keys() > zv["payload"].keys() > {"+0 %", "+20 %", "-20 %"}
 
 
+def pair_by_pair(told, _):
+    """Each plant has the medians of both, and a verdict; the seed is said to be for tuning."""
+    assert (told["shapers"], told["moves"], told["payload_kg"]) == (["zv", "ei"], 20, [0.0, 3.0])
+    assert [one["name"] for one in told["plants"]] == ["calibrated", "hidden-3"]
+    for one in told["plants"]:
+        assert one["first"]["delay_ms"] < one["second"]["delay_ms"]
+        assert one["verdict"] in {"first", "second", "no difference shown", "too few moves vibrate"}
+    assert "not held out" in told["held_out"]
+
+
 RANDOM = "evaluate --random 2 --seed 5 --payload uniform --clean --shaper auto --no-baselines --save-moves drawn.json"
 MAP = (
     "study map --points 5 --payload 1 --calibration ur5e_modal --shaper zvd --figures . --format svg --columns 1 "
@@ -125,6 +135,11 @@ RUNS = {
         "study robustness --moves 1 --against zv --output out.json --markdown page.md --figures .",
         {"robustness.png"},
         with_each_error,
+    ),
+    "match": (
+        "study match zv ei --moves 20 --plants calibrated --hidden 3 --payload 0 3 --clean --output out.json",
+        set(),
+        pair_by_pair,
     ),
     "paths": (
         "study paths --random 1 --kind arc --shapers zv auto --seed 3 --payload 5 --clean --markdown page.md",

@@ -86,8 +86,13 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Shape servoj, speedj and speedl of programs too, where they begin at rest. Without this option they bypass the
     shaper, since their client usually closes a loop, to which the shaper would add its delay."""
     plant: str | None = None
-    """The arm to move: FILE.py:NAME, which runs that file, or the name of an installed plant, such as mujoco [the
-    simulated flexible arm of the robot file]. NAME takes a RobotDescription and a Payload, and makes a plant."""
+    """The arm to move [the simulated flexible arm of the robot file]: that arm with something that its controller does
+    not know, such as stribeck, hysteresis, torsion, base, backlash, combined, springs-30 or springs+30; FILE.py:NAME,
+    which runs that file; or an installed plant, such as mujoco. NAME takes a RobotDescription and a Payload, and makes
+    a plant."""
+    hidden: Seed | None = None
+    """Simulate an arm that is not quite its file: springs, dampers, loops, rotors, friction and payload are drawn from
+    this seed and told to nobody. With several robots, each further one uses the next."""
     calibration: str | None = None
     """Name of a calibration that comes with the package, or path of a calibration file; none for a robot that is yet to
     be identified [the one that comes with the package for this robot]."""
@@ -163,7 +168,12 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             if member.robot not in starts:
                 starts[member.robot] = replace(self, robot=member.robot).setup()
         return [
-            dataclasses.replace(starts[member.robot], name=member.name, seed=self.seed + index)
+            dataclasses.replace(
+                starts[member.robot],
+                name=member.name,
+                seed=self.seed + index,
+                hidden=None if self.hidden is None else self.hidden + index,
+            )
             for index, member in enumerate(found)
         ]
 
@@ -296,6 +306,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
                 shape_servo=self.shape_servo,
                 plant=None if self.plant is None else load_plant(self.plant),
+                hidden=self.hidden,
             )
             setup = shaped_by(setup, _either(self.shaper, profile.shaper))
             if self.state is not None:

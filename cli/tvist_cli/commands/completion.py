@@ -40,7 +40,7 @@ def _option_values() -> dict[str, _Values]:
     """Return the values of options, by the option's name without dashes."""
     from typing import get_args
 
-    from tvist_controller.sources.own_plants import installed_plants
+    from tvist_controller.sources.own_plants import named_plants
     from tvist_lab.study.menus import UNSHAPED, names
     from tvist_plant.description import robots
     from tvist_server.profiles import ProfileName
@@ -54,7 +54,7 @@ def _option_values() -> dict[str, _Values]:
         "shapers": shaper,
         "sensitivity": _Values(tuple(SHAPERS), "py"),
         "against": _Values((UNSHAPED, *names("bench"))),
-        "plant": _Values(tuple(installed_plants()), "py"),
+        "plant": _Values(tuple(named_plants()), "py"),
         "profile": _Values(get_args(ProfileName)),
     }
 

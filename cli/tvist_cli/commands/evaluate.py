@@ -10,7 +10,7 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import number, out, say, typed
 from tvist_cli.shapers_of import calibration_for, designing, loaded
-from tvist_cli.simulated_arm import disturbed, masses_of, named
+from tvist_cli.simulated_arm import disturbed, limits_of, masses_of, named, plants_of
 from tvist_cli.studying import Figures, Places, check_range, check_seed, gathered, give, show
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from tvist_lab.study.recipes import Recipe
     from tvist_lab.study.work import Job
     from tvist_plant.description import RobotDescription
+    from tvist_plant.variants import Variant
 
 LISTED = 12
 """Largest number of moves that are printed one by one."""
@@ -42,6 +43,8 @@ def evaluate(
     frequency_error: float = 0.0,
     payload_error: float = 0.0,
     stiffness_error: float = 0.0,
+    plant: str | None = None,
+    hidden: int | None = None,
     limits: str = "gentle",
     stroke: tuple[float, float] | None = None,
     streams: bool = False,
@@ -78,6 +81,10 @@ def evaluate(
         payload_error: Percentage by which the declared mass exceeds the carried one.
         stiffness_error: Percentage by which each gear, link and velocity loop of the arm is stiffer or softer, at
             random, than the controller knows.
+        plant: An arm with something that the controller does not know, such as stribeck, hysteresis, torsion, base,
+            backlash, combined, springs-30 or springs+30 [as described].
+        hidden: Seed of a hidden robot: an arm whose springs, dampers, loops, rotors, friction and payload are drawn
+            from it.
         limits: gentle for the paper's limits, 1.5 rad/s, 2 rad/s² and 100 rad/s³; or industrial for 3 rad/s, 8 rad/s²
             and 2000 rad/s³. Moves for which the drives are too weak are left out.
         stroke: Smallest and largest length of random moves, as a share of the way between two configurations [0.3 1].
@@ -92,7 +99,6 @@ def evaluate(
     """
     from tvist_lab.studies.evaluate import feasible, jobs, notes
     from tvist_lab.studies.evaluate import report as summary
-    from tvist_lab.study.case import LIMITS
     from tvist_lab.study.moves import collisions, write_moves
     from tvist_lab.study.recipes import Recipe
     from tvist_plant.description import DescriptionError, load
@@ -101,11 +107,13 @@ def evaluate(
     places.check(save_moves)
     if (moves is None) == (random is None):
         raise Failure("give either --moves FILE or --random N", code=2)
-    _check(seed, modes, frequency_error, limits, payload_error, stiffness_error)
+    _check(seed, modes, frequency_error, payload_error, stiffness_error)
+    of_moves = limits_of(limits)
     if streams and save_moves is not None:
         raise Failure("--save-moves writes moves, but --streams follows streams: leave one out", code=2)
     with told(DescriptionError, code=2):
         description = load(robot)
+    variant = _variant(stiffness_error, plant, hidden, description)
     masses = masses_of(payload, description)
     shaper, own = loaded(shaper)
     known = calibration_for(calibration, shaper, own, modes, description)
@@ -113,25 +121,25 @@ def evaluate(
         chosen, share = _read(moves, seed, masses, description, wrists=wrists, stroke=stroke), None
     else:
         chosen, share = _drawn(random or 0, seed, masses, description, wrists=wrists, stroke=stroke)
-    plant, kept = disturbed(description, disturbances, clean=clean)
+    arm, kept = disturbed(description, disturbances, clean=clean)
     wanted = len(chosen)
     if not streams:
-        chosen = feasible(chosen, description, LIMITS[limits])
+        chosen = feasible(chosen, description, of_moves)
         if not chosen:
             raise Failure("the drives are too weak for all of these moves at these limits", code=2)
     recipe = Recipe(shaper, known, 0.01 * frequency_error, modes, own)
-    mine, others = _methods(recipe, plant, masses, baselines=baselines)
+    mine, others = _methods(recipe, arm, masses, baselines=baselines)
     if streams:  # the end of a stream is not known
         others = [one for one in others if not one.told_target]
     todo = jobs(
-        plant,
+        arm,
         chosen,
         seed,
         mine,
         others,
-        limits=LIMITS[limits],
+        limits=of_moves,
         payload_error=0.01 * payload_error,
-        stiffness_error=0.01 * stiffness_error,
+        arm=variant,
         streams=streams,
     )
     if save_moves is not None:
@@ -149,6 +157,7 @@ def evaluate(
         "streams": streams,
         "payload_error_percent": payload_error,
         "stiffness_error_percent": stiffness_error,
+        "variant": variant.name,
         "free_of_collision": share,
         **summary(judged),
     }
@@ -162,17 +171,27 @@ def evaluate(
 
 
 def _check(
-    seed: int, modes: int, frequency_error: float, limits: str, payload_error: float, stiffness_error: float
+    seed: int, modes: int, frequency_error: float, payload_error: float, stiffness_error: float
 ) -> None:
-    from tvist_lab.study.case import LIMITS
-
     check_seed(seed, bits=63)
     check_range("modes", modes, 1, 6)
     check_range("frequency-error", frequency_error, -90.0, 900.0, " %")
-    if limits not in LIMITS:
-        raise Failure(f"limits is {limits!r}: must be {' or '.join(LIMITS)}", code=2)
     check_range("payload-error", payload_error, -100.0, 900.0, " %")
     check_range("stiffness-error", stiffness_error, 0.0, 90.0, " %")
+
+
+def _variant(
+    stiffness_error: float, plant: str | None, hidden: int | None, description: "RobotDescription"
+) -> "Variant":
+    """The arm as it is, of which the controller knows the description."""
+    from tvist_lab.study.arms import scattered
+
+    if sum((stiffness_error != 0.0, plant is not None, hidden is not None)) > 1:
+        raise Failure("give one of --stiffness-error, --plant and --hidden", code=2)
+    if plant is None and hidden is None:
+        return scattered(0.01 * stiffness_error)
+    found = plants_of([] if plant is None else [plant], [] if hidden is None else [hidden], description)
+    return found[0]
 
 
 def _methods(
@@ -268,7 +287,9 @@ def _print(result: dict[str, Any]) -> None:
         show(f"moves with shaper {result['shaper']}", moves, MOVES)
     ways = {result["shaper"]: result, **result["baselines"]}
     entries = [{"name": name, **way} for name, way in ways.items()]
-    show(f"{result['counted']} moves, arm {result['plant']}", entries, WAYS)
+    told = result["stiffness_error_percent"] or result["variant"] == "calibrated"
+    known = f"arm {result['plant']}" + ("" if told else f", plant {result['variant']}")
+    show(f"{result['counted']} moves, {known}", entries, WAYS)
     median, p5 = (result["reduction_percent_interval"][name] for name in ("median", "p5"))
     if median is not None:
         out.print(

@@ -1,4 +1,4 @@
-"""`tvist shaperbench`: rank shapers, your own included, on ten simulated arms."""
+"""`tvist shaperbench`: rank shapers, your own included, on thirteen simulated arms."""
 
 from datetime import UTC, datetime
 from itertools import chain
@@ -11,14 +11,15 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import out, say, typed
 from tvist_cli.shapers_of import load_given, modal_calibration, on_the_bench
+from tvist_cli.simulated_arm import plants_of
 from tvist_cli.studying import Figures, Places, check_range, check_seed, command, gathered, give, show
 
 if TYPE_CHECKING:
     from tvist_controller.sources.own_shapers import OwnShaper
     from tvist_lab.report import Page
 
-MOVES, QUICK = 100, 3
-"""Number of moves, and that with --quick."""
+QUICK = 3
+"""Number of moves with --quick."""
 
 
 def shaperbench(
@@ -27,6 +28,7 @@ def shaperbench(
     quick: bool = False,
     moves: int | None = None,
     against: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    hidden: Annotated[list[int] | None, Parameter(consume_multiple=True)] = None,
     seed: int = 0,
     calibration: str | None = None,
     output: Path | None = None,
@@ -36,18 +38,20 @@ def shaperbench(
     report: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Rank shapers by how soon ten different arms come to rest, and by the vibration until then.
+    """Rank shapers by how soon thirteen different arms come to rest, and by the vibration until then.
 
     Every shaper gets the same random moves with payloads of 0 to 5 kg, of which the controller assumes 100, 110 and
-    90 %. Ten arms follow its reference; all but one differ from the controller's model. A shaper that uses future
+    90 %. Thirteen arms follow its reference; all but one differ from the controller's model. A shaper that uses future
     samples or does not report its full delay is listed but not ranked.
 
     Args:
         shaper: Python file with a class that has step(q_ref, info) -> q_star, and optionally reset(q) and delay in s;
             or with a function step. Or FILE.py:NAME, as for tvist serve.
         quick: Run only a few moves, with one payload error each.
-        moves: Number of moves [100, or 3 with --quick].
+        moves: Number of moves [60, or 3 with --quick].
         against: Names of the shapers and baselines to run, in addition to waiting; default: all.
+        hidden: Seeds of hidden robots, each of which is one more arm: its springs, dampers, loops, rotors, friction and
+            payload are drawn from its seed.
         seed: Seed of moves, payloads, gear errors and parameter scatter.
         calibration: Name of a calibration that comes with the package, or path of a calibration file; it needs a modal
             model [ur5e_modal].
@@ -61,6 +65,7 @@ def shaperbench(
     from tvist_lab.studies import leaderboard
     from tvist_lab.studies import shaperbench as bench
     from tvist_lab.study.arms import ARMS
+    from tvist_lab.study.held_out import MOVES
 
     places = Places(output=output, markdown=markdown, figures=figures, look=look, report=report)
     places.check()
@@ -71,22 +76,29 @@ def shaperbench(
     against = None if against is None else [name.lower() for name in against]
     mine = None if shaper is None else _mine(shaper)
     description, methods = on_the_bench(known, against, mine)
+    arms = [*ARMS, *plants_of([], hidden, description)]
     drawn = bench.draw(description, count, seed)
     faults = [bench.inspect(one, description, drawn) for one in methods]
     sound = [one for one, fault in zip(methods, faults, strict=True) if fault is None]
-    jobs = bench.jobs(description, sound, drawn, seed, quick=quick)
+    jobs = bench.jobs(description, sound, drawn, seed, quick=quick, arms=arms)
     bends = bench.bends(description, sound, drawn)
     work: Any = chain(bench.play(jobs), map(bench.bend, bends))
     found = gathered(work, len(jobs) + len(bends), "motions")
     rows, bent = chain.from_iterable(found[: len(jobs)]), zip(bends, found[len(jobs) :], strict=True)
-    options = {"shaper": shaper, "against": against, "calibration": calibration, "quick": quick}
+    options = {
+        "shaper": shaper,
+        "against": against,
+        "hidden": hidden,
+        "calibration": calibration,
+        "quick": quick,
+    }
     result = {
         "date": datetime.now(UTC).date().isoformat(),
         "command": command("shaperbench", **options, moves=count, seed=seed),
         "moves": count,
         "seed": seed,
         "payload_errors": list(bench.PAYLOAD_ERRORS),
-        "arms": {arm.name: arm.label for arm in ARMS},
+        "arms": {arm.name: arm.label for arm in arms},
         "calibration": known.name,
         **leaderboard.leaderboard(methods, faults, list(rows), list(bent)),
     }

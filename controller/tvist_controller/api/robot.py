@@ -16,7 +16,7 @@ from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.reporting.reporter import truth_of
 from tvist_controller.reporting.sink import Sink
-from tvist_controller.sources.own_plants import OwnPlant, RecordedPlant
+from tvist_controller.sources.own_plants import OwnPlant, RecordedPlant, load_plant
 
 __all__ = [
     "Beliefs",
@@ -34,5 +34,6 @@ __all__ = [
     "Student",
     "Twin",
     "info_of",
+    "load_plant",
     "truth_of",
 ]

@@ -1,4 +1,4 @@
-"""Plants that are not part of the package: from a file, given as FILE.py:NAME, or from an installed package."""
+"""Plants by name: those of `VARIANTS`, from a file, given as FILE.py:NAME, or from an installed package."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -13,6 +13,7 @@ from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import Plant
 from tvist_plant.user_file import named
+from tvist_plant.variants import VARIANTS, Variant
 
 GROUP = "tvist.plants"
 """Group of the entry points by which installed packages offer plants."""
@@ -28,7 +29,7 @@ class RecordedPlant(Struct, frozen=True):
     """Description of a plant, as a recording contains it."""
 
     place: str
-    """FILE.py:NAME, or the name of an installed plant."""
+    """FILE.py:NAME, or a name of `VARIANTS` or of an installed plant."""
     sha256: str = ""
     """SHA-256 of the file, in hexadecimal; empty if it is installed."""
 
@@ -38,10 +39,10 @@ class OwnPlant:
     """A plant that was found, and is yet to be made."""
 
     place: str
-    """FILE.py:NAME, or the name of an installed plant."""
+    """FILE.py:NAME, or a name of `VARIANTS` or of an installed plant."""
     sha256: str
     """SHA-256 of the file that was run, in hexadecimal; empty if it is installed."""
-    maker: Maker = field(compare=False)
+    maker: Maker | Variant = field(compare=False)
     """Makes the plant."""
 
     @property
@@ -49,16 +50,22 @@ class OwnPlant:
         """Description of the plant for a recording."""
         return RecordedPlant(self.place, self.sha256)
 
-    def make(self, description: RobotDescription, carried: Payload) -> Plant:
+    def make(self, description: RobotDescription, carried: Payload, seed: int = 0) -> Plant:
         """Make the plant for one robot.
 
         Args:
             description: The robot.
             carried: Payload that the arm carries, as far as the server knows.
+            seed: Seed of what a plant of `VARIANTS` draws; others are not told.
 
         Raises:
             OwnPlantError: Making it fails, or what is made is not a plant.
         """
+        if isinstance(self.maker, Variant):
+            try:
+                return self.maker.make(description, carried, seed)
+            except ValueError as error:
+                raise OwnPlantError(f"plant {self.place}: {error}") from error
         try:
             made = self.maker(description, carried)
             if isinstance(made, Plant):
@@ -81,12 +88,14 @@ def load_plant(place: str) -> OwnPlant:
 
     Args:
         place: FILE.py:NAME, where NAME is a class or function that takes a `RobotDescription` and a `Payload` and
-            makes a `Plant`; or the name of an entry point of the group `tvist.plants`.
+            makes a `Plant`; or a name of `VARIANTS`, or of an entry point of the group `tvist.plants`.
 
     Raises:
         OwnPlantError: There is none.
         UserFileError: The file is not text, or is larger than 4 MiB.
     """
+    if place in VARIANTS:
+        return OwnPlant(place, "", VARIANTS[place])
     if is_file(place):
         own = run_file(place, "plant", OwnPlantError, _may_be_one)
         found, sha256 = own.found, own.sha256
@@ -100,9 +109,9 @@ def load_plant(place: str) -> OwnPlant:
     return OwnPlant(place, sha256, found)
 
 
-def installed_plants() -> list[str]:
-    """Names of the plants that installed packages offer."""
-    return sorted({one.name for one in _offered()})
+def named_plants() -> list[str]:
+    """Names of the plants of this package, and of those that installed ones offer."""
+    return [*VARIANTS, *sorted({one.name for one in _offered()})]
 
 
 def _installed(name: str) -> object:
@@ -114,10 +123,7 @@ def _installed(name: str) -> object:
                 if ends(error):
                     raise
                 raise OwnPlantError(f"plant {name}: loading {one.value} fails: {error}") from error
-    known = ", ".join(installed_plants())
-    raise OwnPlantError(
-        f"plant is {name!r}: must be FILE.py:NAME, or one of {known or 'those installed: none'}"
-    )
+    raise OwnPlantError(f"plant is {name!r}: must be FILE.py:NAME, or one of {', '.join(named_plants())}")
 
 
 def _offered() -> tuple[EntryPoint, ...]:

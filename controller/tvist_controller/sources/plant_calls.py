@@ -18,6 +18,7 @@ _MEASURING = ("step", "reset", "measure")
 _OTHERS = (
     "truth", "switch", "stop", "wait", "load", "push", "make_nan", "play", "held", "modes",
 )  # fmt: skip
+_TELLING = ("truth", "play", "held", "modes")
 MOST_KEPT = 10
 """Largest number of exceptions that are kept until they are told."""
 
@@ -58,16 +59,16 @@ class _Called:
                 raise PlantError("the arm has measured what is no number")
 
 
-def called(plant: Plant, joints: int) -> Plant:
+def called(plant: Plant, joints: int, *, untold: bool = False) -> Plant:
     """Return what stands for a plant, with the same abilities, and raises only `PlantError`.
 
     Args:
-        plant: Somebody's own plant.
+        plant: Somebody's own plant, or a hidden one.
         joints: Number of joints in the robot's description.
+        untold: Whether to leave out what a real arm could not tell.
     """
-    members: dict[str, Any] = {
-        name: _method(name) for name in (*_MEASURING, *_OTHERS) if callable(getattr(plant, name, None))
-    }
+    kept = (name for name in (*_MEASURING, *_OTHERS) if not (untold and name in _TELLING))
+    members: dict[str, Any] = {name: _method(name) for name in kept if callable(getattr(plant, name, None))}
     if hasattr(plant, "condition"):
         members["condition"] = property(lambda self: self.ask("condition", lambda: self._plant.condition))
     return cast("Plant", type(type(plant).__name__, (_Called,), members)(plant, joints))

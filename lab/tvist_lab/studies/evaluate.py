@@ -7,8 +7,9 @@ import numpy as np
 
 from tvist_controller.api.line import MotionLimits
 from tvist_lab.recordings import Floats
-from tvist_lab.study.arms import scattered
+from tvist_lab.study.arms import AS_DESCRIBED
 from tvist_lab.study.case import Case, arm_seed
+from tvist_lab.study.held_out import interval, percentiles
 from tvist_lab.study.line import PAPER
 from tvist_lab.study.measures import OF_PEAKS, WORTH
 from tvist_lab.study.method import Method, Waiting
@@ -16,12 +17,11 @@ from tvist_lab.study.moves import Move
 from tvist_lab.study.tables import Shown
 from tvist_lab.study.work import Job, Row
 from tvist_plant.description import RobotDescription
+from tvist_plant.variants import Variant
 from tvist_protocol.calibration import Calibration
 
 WANTED = (*OF_PEAKS, "still_after_unshaped_stop_ms", "quiet_after_unshaped_stop_ms")
 """Measures of each motion."""
-RESAMPLED = 2000
-"""Number of bootstrap samples for an interval."""
 MOVES = (
     Shown("move", "place"), Shown("kg", "payload_kg", 2), Shown("unshaped m/s²", "unshaped_peak_m_s2", 3),
     Shown("shaped m/s²", "shaped_peak_m_s2", 3), Shown("less %", "reduction_percent", 1),
@@ -59,7 +59,7 @@ def jobs(
     *,
     limits: MotionLimits = PAPER,
     payload_error: float = 0.0,
-    stiffness_error: float = 0.0,
+    arm: Variant = AS_DESCRIBED,
     streams: bool = False,
 ) -> list[Job]:
     """Return a job for each move: by the shaper, which others of the same duration are compared with, and by these.
@@ -72,10 +72,10 @@ def jobs(
         others: What is compared with it, besides waiting.
         limits: Limits of the moves.
         payload_error: Error of the declared mass, relative to the carried one [-].
-        stiffness_error: Share by which each gear, link and velocity loop is off [-].
+        arm: What the arm is like, of which the controller knows the description.
         streams: Whether to follow streams from the start of each move instead.
     """
-    every, arms = (shaper, Waiting(), *others), (scattered(stiffness_error),)
+    every, arms = (shaper, Waiting(), *others), (arm,)
     return [
         Job(
             Case(
@@ -153,23 +153,6 @@ def _summary(rows: Rows) -> dict[str, Any]:
         ),
         "never_still": len(rows) - len(late),
         "left_out_largest_peak_m_s2": max(quiet, default=None),
-    }
-
-
-def interval(values: Floats, percentile: float) -> list[float] | None:
-    """95 % bootstrap interval of a percentile; None if there are no values."""
-    if not values.size:
-        return None
-    random = np.random.default_rng(0)
-    drawn = values[random.integers(0, values.size, (RESAMPLED, values.size))]
-    low, high = np.percentile(np.percentile(drawn, percentile, axis=1), [2.5, 97.5])
-    return [float(low), float(high)]
-
-
-def percentiles(values: Sequence[float] | Floats, **shares: float) -> dict[str, float | None]:
-    """Return percentiles by name; None without values."""
-    return {
-        name: float(np.percentile(values, share)) if len(values) else None for name, share in shares.items()
     }
 
 

@@ -8,9 +8,8 @@ import numpy as np
 
 from tvist_lab.markdown_table import markdown_table
 from tvist_lab.recordings import Floats
-from tvist_lab.studies.evaluate import percentiles
 from tvist_lab.studies.shaperbench import PAYLOAD_ERRORS, Bend, fault_of
-from tvist_lab.study.arms import ARMS
+from tvist_lab.study.held_out import median_and_p5, percentiles
 from tvist_lab.study.measures import WORTH
 from tvist_lab.study.method import Method
 from tvist_lab.study.tables import Entry, Shown
@@ -101,11 +100,9 @@ def _entry(pairs: Sequence[Pair], bent: Sequence[float]) -> dict[str, Any]:
             "cost_us",
         )
     )
-    arms = {row["arm"] for row, _ in pairs}
     by_arm = {
-        arm.name: _summary([pair for pair in pairs if pair[0]["arm"] == arm.name])
-        for arm in ARMS
-        if arm.name in arms
+        arm: _summary([pair for pair in pairs if pair[0]["arm"] == arm])
+        for arm in dict.fromkeys(row["arm"] for row, _ in pairs)
     }
     return {
         **_summary(pairs),
@@ -152,7 +149,7 @@ def _summary(pairs: Sequence[Pair]) -> dict[str, Any]:
         "time_until_still_ms": {name: _time(still, share) for name, share in (("median", 50), ("p90", 90))},
         "never_still": int(np.isinf(still).sum()),
         "residual_m_s2": percentiles([row["residual_m_s2"] for row, _ in pairs], median=50, p90=90),
-        "reduction_percent": percentiles(worth, median=50, p5=5),
+        "reduction_percent": median_and_p5(worth),
         "in_motion_ratio": float(np.median([a["in_motion_m_s2"] / b["in_motion_m_s2"] for a, b in pairs])),
     }
 

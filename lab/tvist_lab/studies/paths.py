@@ -10,13 +10,13 @@ from tvist_controller.api.line import RefusalError, body, elastic_feed_forward, 
 from tvist_lab.metrics import in_motion_rms, motions, peak_after_stop
 from tvist_lab.recordings import Floats
 from tvist_lab.runners import Processes, in_order
-from tvist_lab.studies.evaluate import interval, percentiles
 from tvist_lab.studies.pages import page
 from tvist_lab.studies.path_examples import circle_in_words
 from tvist_lab.studies.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, Reference, planned, shaped
 from tvist_lab.studies.random_paths import KINDS, Kind, PathDraw, ToolMove
 from tvist_lab.studies.tool_path import ToolPath
 from tvist_lab.study.case import arm_seed
+from tvist_lab.study.held_out import interval, percentiles
 from tvist_lab.study.line import ControlLine
 from tvist_lab.study.measures import WORTH, kinematics
 from tvist_lab.study.menus import names

@@ -1,19 +1,20 @@
-"""Reduction of vibration by each method on arms that are stiffer or softer, or carry more or less, than declared."""
+"""Reduction of vibration by each method on arms other than calibrated, or that carry more or less than declared."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from tvist_lab.studies.evaluate import percentiles
-from tvist_lab.study.arms import with_springs
+from tvist_lab.study.arms import AS_DESCRIBED, PERTURBED, with_springs
 from tvist_lab.study.case import Case
+from tvist_lab.study.held_out import intervals, median_and_p5
 from tvist_lab.study.measures import QUIET, WORTH
 from tvist_lab.study.method import Method
 from tvist_lab.study.moves import Move
 from tvist_lab.study.tables import Shown
 from tvist_lab.study.work import Job, Row
 from tvist_plant.description import RobotDescription
+from tvist_plant.variants import Variant, hidden_variant, variant
 
 ERRORS: dict[str, tuple[float, ...]] = {
     "stiffness": (0.0, 0.05, -0.05, 0.1, -0.1, 0.2, -0.2, 0.3, -0.3),
@@ -22,46 +23,85 @@ ERRORS: dict[str, tuple[float, ...]] = {
 """Relative errors [-]: by which all springs of the arm are stiffer than calibrated, and by which the declared mass
 exceeds the carried one.
 """
-PERCENTILES = {"median": 50.0, "p5": 5.0}
-"""Percentiles over moves."""
+PLANT = "plant"
+"""Kind of what is wrong with a plant that has a name."""
 WANTED = ("unshaped_peak_m_s2", "shaped_peak_m_s2", "waited_peak_m_s2", "delay_ms")
 """Measures of each motion."""
 FIRST = (Shown("shaper", "name"), Shown("delay ms", "delay_ms", 0))
 """First columns of all tables."""
 
 
+Columns = Mapping[str, Mapping[str, tuple[Variant, float]]]
+"""The columns of each kind of table by their titles: the arm, and the error of the declared mass [-]."""
+
+
+def columns(hidden: Sequence[int] = ()) -> Columns:
+    """Return the columns of all tables, each in the order of the errors.
+
+    Args:
+        hidden: Seeds of hidden robots that are plants, too.
+    """
+
+    def titled(kind: str) -> dict[str, float]:
+        return {f"{100.0 * error:+.0f} %": error for error in sorted(ERRORS[kind])}
+
+    plants = [*map(variant, PERTURBED), *map(hidden_variant, hidden)]
+    return {
+        "stiffness": {
+            title: (with_springs(1.0 + error), 0.0) for title, error in titled("stiffness").items()
+        },
+        "payload": {title: (AS_DESCRIBED, error) for title, error in titled("payload").items()},
+        PLANT: {one.name: (one, 0.0) for one in plants},
+    }
+
+
 def jobs(
-    description: RobotDescription, methods: Sequence[Method], moves: Sequence[Move], seed: int
+    description: RobotDescription,
+    methods: Sequence[Method],
+    moves: Sequence[Move],
+    seed: int,
+    hidden: Sequence[int] = (),
 ) -> list[Job]:
-    """Return all jobs: kind of error by size by move, each by all methods."""
+    """Return all jobs: error of the payload by move, each by all methods on all arms with that error."""
+    arms: dict[float, dict[str, Variant]] = {}
+    for kind in columns(hidden).values():
+        for arm, error in kind.values():
+            arms.setdefault(error, {})[arm.name] = arm
     return [
         Job(
             Case(
                 description,
                 move,
                 seed + number,
-                arms=(with_springs(1.0 + (error if kind == "stiffness" else 0.0)),),
-                payload_error=error if kind == "payload" else 0.0,
-                axes={"kind": kind, "error": error},
+                tuple(those.values()),
+                payload_error=error,
+                axes={"payload_error": error},
             ),
             tuple(methods),
             WANTED,
             as_served=False,
         )
-        for kind, errors in ERRORS.items()
-        for error in errors
+        for error, those in arms.items()
         for number, move in enumerate(moves)
     ]
 
 
-def report(methods: Sequence[Method], rows: Sequence[Row]) -> list[dict[str, Any]]:
+def report(
+    methods: Sequence[Method], rows: Sequence[Row], hidden: Sequence[int] = ()
+) -> list[dict[str, Any]]:
     """Return one entry for each method, ordered by delay; moves without vibration do not count."""
-    entries = [_entry(method, [row for row in rows if row["shaper"] == method.name]) for method in methods]
+    every = columns(hidden)
+    entries = [
+        _entry(method, [row for row in rows if row["shaper"] == method.name], every) for method in methods
+    ]
     return sorted(entries, key=lambda entry: (entry["delay_ms"], entry["name"]))
 
 
-def _entry(method: Method, rows: Sequence[Row]) -> dict[str, Any]:
-    counted = [row for row in rows if row["unshaped_peak_m_s2"] >= WORTH]
+def _entry(method: Method, rows: Sequence[Row], every: Columns) -> dict[str, Any]:
+    cells: dict[tuple[str, float], list[Row]] = {}
+    for row in rows:
+        if row["unshaped_peak_m_s2"] >= WORTH:
+            cells.setdefault((row["arm"], row["payload_error"]), []).append(row)
     return {
         "name": method.name,
         "label": method.label,
@@ -69,30 +109,23 @@ def _entry(method: Method, rows: Sequence[Row]) -> dict[str, Any]:
         "delay_ms": round(float(np.median([row["delay_ms"] for row in rows])), 6),
         **{
             kind: {
-                f"{100.0 * error:+.0f} %": _reductions(
-                    [row for row in counted if (row["kind"], row["error"]) == (kind, error)]
-                )
-                for error in errors
+                title: _reductions(cells.get((arm.name, error), [])) for title, (arm, error) in those.items()
             }
-            for kind, errors in ERRORS.items()
+            for kind, those in every.items()
         },
     }
 
 
 def _reductions(rows: Sequence[Row]) -> dict[str, Any]:
+    # Where waiting alone is enough, there is nothing to gain beyond it.
+    waited = [row for row in rows if row["waited_peak_m_s2"] >= QUIET]
+    less = np.array([_less(row["shaped_peak_m_s2"], row["unshaped_peak_m_s2"]) for row in rows])
     return {
         "moves": len(rows),
-        "reduction_percent": percentiles(
-            [_less(row["shaped_peak_m_s2"], row["unshaped_peak_m_s2"]) for row in rows], **PERCENTILES
-        ),
-        # Where waiting alone is enough, there is nothing to gain beyond it.
-        "beyond_waiting_percent": percentiles(
-            [
-                _less(row["shaped_peak_m_s2"], row["waited_peak_m_s2"])
-                for row in rows
-                if row["waited_peak_m_s2"] >= QUIET
-            ],
-            **PERCENTILES,
+        "reduction_percent": median_and_p5(less),
+        "reduction_percent_interval": intervals(less),
+        "beyond_waiting_percent": median_and_p5(
+            [_less(row["shaped_peak_m_s2"], row["waited_peak_m_s2"]) for row in waited]
         ),
     }
 
@@ -101,27 +134,28 @@ def _less(peak: float, before: float) -> float:
     return 100.0 * (1.0 - peak / before)
 
 
-def tables() -> dict[str, list[Shown]]:
+def tables(hidden: Sequence[int] = ()) -> dict[str, list[Shown]]:
     """Columns of the tables of a page, by their titles."""
     return {
-        f"{kind}: {share}": [
-            *FIRST, *(Shown(error, f"{kind}.{error}.reduction_percent.{share}", 1) for error in _errors(kind)),
+        f"{_heading(kind)}: {share}": [
+            *FIRST, *(Shown(one, f"{kind}.{one}.reduction_percent.{share}", 1) for one in those),
         ]
-        for kind in ERRORS
-        for share in PERCENTILES
+        for kind, those in columns(hidden).items()
+        for share in ("median", "p5")
     }  # fmt: skip
 
 
-def on_terminal(kind: str) -> list[Shown]:
-    """Columns of the table of a kind of error, each with median and 5th percentile."""
-
-    def both(error: str) -> Shown:
-        one, other = (Shown("", f"{kind}.{error}.reduction_percent.{share}", 1) for share in PERCENTILES)
-        return Shown(error, lambda entry: f"{one.text(entry)} / {other.text(entry)}")
-
-    return [*FIRST, *map(both, _errors(kind))]
+def _heading(kind: str) -> str:
+    return "Plants by name" if kind == PLANT else f"Wrong {kind}"
 
 
-def _errors(kind: str) -> list[str]:
-    """Errors of a kind in words, the smallest first."""
-    return [f"{100.0 * error:+.0f} %" for error in sorted(ERRORS[kind])]
+def on_terminal(hidden: Sequence[int] = ()) -> dict[str, list[Shown]]:
+    """Columns of the tables of a terminal, by their titles, each with median and 5th percentile."""
+
+    def both(kind: str, title: str) -> Shown:
+        one, other = (Shown("", f"{kind}.{title}.reduction_percent.{share}", 1) for share in ("median", "p5"))
+        return Shown(title, lambda entry: f"{one.text(entry)} / {other.text(entry)}")
+
+    return {
+        kind: [*FIRST, *(both(kind, title) for title in those)] for kind, those in columns(hidden).items()
+    }

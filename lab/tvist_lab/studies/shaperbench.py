@@ -1,4 +1,4 @@
-"""ShaperBench: all methods on ten arms with the same random moves and wrong payloads, and round corners."""
+"""ShaperBench: all methods on thirteen arms with the same random moves and wrong payloads, and round corners."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,6 +18,7 @@ from tvist_lab.study.shaping import ShaperFaultError
 from tvist_lab.study.work import FAILED, Job, Row, measure_each
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
+from tvist_plant.variants import Variant
 
 CALIBRATION = "ur5e_modal"
 """Calibration of the bench's arm, unless another one is named."""
@@ -101,6 +102,7 @@ def jobs(
     seed: int,
     *,
     quick: bool,
+    arms: Sequence[Variant] = ARMS,
 ) -> list[Job]:
     """Return all jobs: method by move by payload error; in the quick version, one error in turn for each move."""
     return [
@@ -109,7 +111,7 @@ def jobs(
                 description,
                 move,
                 seed + number,
-                ARMS,
+                tuple(arms),
                 payload_error=error,
                 axes={"move": number, "payload_error": error},
             ),

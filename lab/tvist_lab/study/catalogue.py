@@ -56,6 +56,9 @@ _MAKERS: dict[Kind, Callable[[Row, Recipe, RobotDescription, tuple[float, float]
     "filter": lambda row, recipe, *_: Named(
         Recipe(row.of or row.name, recipe.calibration, modes=row.modes), row.name, row.label
     ),
+    "shaped alone": lambda row, recipe, *_: Named(
+        Recipe(row.of, recipe.calibration), row.name, row.label, alone=True
+    ),
     "for target": lambda row, recipe, *_: Constant(recipe, row.name, row.label, row.of, row.modes),
     "for payload": lambda row, recipe, *_: Constant(recipe, row.name, row.label, row.of, for_payload=True),
     "for workspace": _for_workspace,

@@ -8,13 +8,14 @@ from typing import Literal
 
 from tvist_shaping.named import BUILT_IN
 
-Menu = Literal["bench", "baselines", "paths", "bound", "lesson"]
-"""Where a method is made unless others are named: ShaperBench and robustness; `evaluate`, beside the shaper; `paths`;
-the bound; and where the notebooks offer it.
+Menu = Literal["bench", "robustness", "baselines", "paths", "bound", "lesson"]
+"""Where a method is made unless others are named: ShaperBench; robustness; `evaluate`, beside the shaper; `paths`; the
+bound; and where the notebooks offer it.
 """
 Kind = Literal[
-    "filter", "for target", "for payload", "for workspace", "held", "longer", "as long as", "jerk of a period"
-]
+    "filter", "for target", "for payload", "for workspace", "held", "longer", "as long as", "jerk of a period",
+    "shaped alone",
+]  # fmt: skip
 UNSHAPED = "none"
 """Name of waiting on the bench, where it goes through the same line as the others."""
 
@@ -45,30 +46,34 @@ ROWS = (
     Row("double_s_as_auto", "double S as long as auto", ("bench",), "as long as", "auto"),
     Row("zv_frozen_at_end", "ZV for the end pose", ("baselines", "bench"), "for target", "zv"),
     Row(
-        "zv_3_modes_frozen_at_end", "ZV of three modes for the end pose", ("baselines", "bench"), "for target", "zv",
-        3,
+        "zv_3_modes_frozen_at_end", "ZV of three modes for the end pose", ("baselines", "bench", "robustness"),
+        "for target", "zv", 3,
     ),
     Row("mzv_for_payload", "fixed MZV for the declared payload", ("baselines", "bench"), "for payload", "mzv"),
     Row("ei_for_payload", "fixed EI for the declared payload", ("baselines", "bench"), "for payload", "ei"),
-    Row("ei3_for_payload", "fixed EI3 for the declared payload", ("baselines", "bench"), "for payload", "ei3"),
+    Row(
+        "ei3_for_payload", "fixed EI3 for the declared payload", ("baselines", "bench", "robustness"), "for payload",
+        "ei3",
+    ),
     Row("fixed_mzv", "fixed MZV", ("baselines", "bench"), "for workspace", "mzv"),
     Row("fixed_ei2", "fixed EI2", ("baselines", "bench"), "for workspace", "ei2"),
     Row("fixed_ei3", "fixed EI3", ("baselines", "bench"), "for workspace", "ei3"),
-    Row("zv", "TVIST-ZV, lowest mode", ("bench", "paths", "bound", "lesson")),
+    Row("zv", "TVIST-ZV, lowest mode", ("bench", "robustness", "paths", "bound", "lesson")),
     Row("zv_3_modes", "TVIST-ZV, three modes", ("bench",), of="zv", modes=3),
     Row("mzv", "TVIST-MZV, lowest mode", ("paths", "lesson")),
     Row("zvd", "TVIST-ZVD, lowest mode", ("bench", "paths", "lesson")),
     Row("ei", "TVIST-EI, lowest mode", ("bench", "paths", "lesson")),
     Row("ei2", "TVIST-EI2, lowest mode", ("lesson",)),
     Row("ei3", "TVIST-EI3, lowest mode", ("lesson",)),
-    Row("auto", "constant mean delay, auto", ("bench", "paths", "bound")),
-    Row("auto-target", "constant mean delay, given the end of each move", ("bench", "paths", "bound")),
+    Row("auto", "constant mean delay, auto", ("bench", "robustness", "paths", "bound")),
+    Row("auto-target", "constant mean delay, given the end of each move", ("bench", "robustness", "paths", "bound")),
     Row("short", "constant mean delay, short", ("bench", "paths")),
-    Row("planned", "planned to leave no vibration", ("bound",)),
-    Row("elastic", "smoothing, elastic feed-forward", ("bench", "bound")),
-    Row("elastic-16", "smoothing of 16 ms, elastic feed-forward", ("bench", "bound")),
+    Row("planned", "planned to leave no vibration", ("bench", "robustness", "bound")),
+    Row("smoothing", "smoothing of elastic alone", ("bench", "robustness"), "shaped alone", "elastic"),
+    Row("elastic", "smoothing, elastic feed-forward", ("bench", "robustness", "bound")),
+    Row("elastic-16", "smoothing of 16 ms, elastic feed-forward", ("bench", "robustness", "bound")),
     Row("elastic-position", "smoothing, elastic feed-forward without torques", ("bench",)),
-    Row("elastic-auto", "auto, smoothing, elastic feed-forward", ("bench",)),
+    Row("elastic-auto", "auto, smoothing, elastic feed-forward", ("bench", "robustness")),
     Row("product", "constant mean delay, product of three ZV", ("bench",), "held", modes=3),
     Row(UNSHAPED, "waiting, unshaped"),
     # These are variants of the shapers above, which no menu needs beside them.

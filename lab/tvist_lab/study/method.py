@@ -17,7 +17,7 @@ from tvist_shaping.base import Filter
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter
-from tvist_shaping.named import AIMED
+from tvist_shaping.named import AIMED, PLANNED
 from tvist_shaping.steady import ProductDesign, SteadyFilter
 
 
@@ -104,11 +104,18 @@ class Named(Stepping):
     recipe: Recipe
     name: str
     label: str = ""
+    alone: bool = False
+    """Whether the drives do without the elastic feed-forward that the filter is made for."""
 
     @property
     def told_target(self) -> bool:
-        """Whether the filter uses the target, which one of them does."""
-        return self.recipe.shaper == AIMED
+        """Whether the filter, or the motion that is planned instead of it, uses the target."""
+        return self.recipe.shaper in {AIMED, PLANNED}
+
+    @property
+    def shapes(self) -> bool:
+        """Whether it shapes any reference; a move that is planned to leave no vibration is no reference's."""
+        return self.recipe.shaper != PLANNED
 
     def stepper(self, task: Task) -> Running:
         """Return the filter, reset and given the target."""
@@ -116,16 +123,16 @@ class Named(Stepping):
 
     def elastic(self, task: Task) -> ElasticFeedForward | None:
         """Return what the filter needs."""
-        return self.recipe.elastic(task.description, self.recipe.make(task.description, task.move.mass))
+        tvist = self.recipe.make(task.description, task.move.mass)
+        return None if self.alone else self.recipe.elastic(task.description, tvist)
 
     def shaped(self, task: Task) -> Shaped:
         """Shape the reference, or a motion that is planned for the filter as a robot plans it."""
-        if not task.as_served or task.stream:
+        if task.stream or (self.shapes and not task.as_served):
             return super().shaped(task)
         tvist, own = own_move(self.recipe, task.description, task.move, task.limits)
-        return replace(
-            shape(Running(tvist), own, watched=False), elastic=self.recipe.elastic(task.description, tvist)
-        )
+        elastic = None if self.alone else self.recipe.elastic(task.description, tvist)
+        return replace(shape(Running(tvist), own, watched=False), elastic=elastic)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from tvist_lab.markdown_table import markdown_table
+from tvist_lab.study.held_out import said
 from tvist_lab.study.tables import in_markdown
 
 
@@ -22,4 +23,7 @@ def page(name: str, result: dict[str, Any], command: str, **more: object) -> str
         lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.globals |= {"g": "{:g}".format, "in_markdown": in_markdown, "markdown_table": markdown_table}
-    return environment.get_template(f"{name}.md.j2").render({**result, **more, "command": command})
+    held_out = said(result["seed"]) if "seed" in result else ""
+    return environment.get_template(f"{name}.md.j2").render(
+        {"held_out": held_out, **result, **more, "command": command}
+    )

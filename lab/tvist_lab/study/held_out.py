@@ -1,0 +1,75 @@
+"""Which moves a shaper is tuned on and which it is judged on, how many a figure needs, and how sure it is."""
+
+from collections.abc import Callable, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from tvist_lab.recordings import Floats
+
+TUNING = range(100)
+"""Seeds of moves and arms that a shaper may be tuned on; no published table uses one. On which of them the shapers were
+tuned that are older than this rule (2026-11-26) was not written down.
+"""
+JUDGING = MappingProxyType(
+    {
+        "elastic": 20261123,
+        "elastic with wrong beliefs": 20261124,
+        "shaperbench": 20261125,
+        "robustness": 20261123,
+    }
+)
+"""Seeds of published tables: nothing is tuned on them."""
+MOVES = 60
+"""Number of moves for each cell of a published table, and by default."""
+LEAST = 20
+"""Least number of moves for a 5th percentile, which of fewer is hardly more than the worst move, and for a verdict."""
+RESAMPLED = 2000
+"""Number of bootstrap samples for an interval."""
+
+
+def said(seed: int) -> str:
+    """Return what a page says of its seed."""
+    tuned = f"seeds {TUNING.start} to {TUNING.stop - 1}"
+    if seed in TUNING:
+        return f"Seed {seed} is one of those that shapers may be tuned on, {tuned}: these moves are not held out."
+    return f"Nothing is tuned on seed {seed}: shapers may be tuned on {tuned}."
+
+
+def percentiles(values: Sequence[float] | Floats, **shares: float) -> dict[str, float | None]:
+    """Return percentiles by name; None without values."""
+    return {
+        name: float(np.percentile(values, share)) if len(values) else None for name, share in shares.items()
+    }
+
+
+def median_and_p5(values: Sequence[float] | Floats) -> dict[str, float | None]:
+    """Return both percentiles; None without values, and no p5 of fewer than `LEAST`."""
+    found = percentiles(values, median=50.0, p5=5.0)
+    return found if len(values) >= LEAST else found | {"p5": None}
+
+
+def intervals(values: Floats) -> dict[str, list[float] | None]:
+    """95 % bootstrap intervals of both, None where `median_and_p5` has none."""
+    enough = len(values) >= LEAST
+    return {"median": interval(values, 50.0), "p5": interval(values, 5.0) if enough else None}
+
+
+def interval(values: Floats, percentile: float) -> list[float] | None:
+    """95 % bootstrap interval of a percentile; None if there are no values."""
+    return bootstrap(values, lambda drawn: np.percentile(drawn, percentile, axis=1))
+
+
+def bootstrap(values: Floats, statistic: Callable[[Floats], Floats]) -> list[float] | None:
+    """95 % interval of a statistic by resampling rows (percentile bootstrap); None if there are none.
+
+    Args:
+        values: Numbers, or rows that belong together, shape (T, ...).
+        statistic: Returns the statistic of each sample, shape (S,), from samples of shape (S, T, ...).
+    """
+    if not values.size:
+        return None
+    random = np.random.default_rng(0)
+    drawn = values[random.integers(0, len(values), (RESAMPLED, len(values)))]
+    low, high = np.percentile(statistic(drawn), [2.5, 97.5])
+    return [float(low), float(high)]

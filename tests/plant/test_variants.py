@@ -1,0 +1,90 @@
+"""Plants by name are what their names say, for the arm, for what it carries, and for any number of joints."""
+
+import numpy as np
+import pytest
+
+from tvist_plant.description import Payload, load
+from tvist_plant.hidden import hidden, hidden_payload
+from tvist_plant.variants import BACKLASH, TORSION, VARIANTS, variant
+
+from .arms import chain, hold
+
+
+@pytest.mark.parametrize("name", [*VARIANTS, "hidden-3"])
+def test_every_plant_moves_and_differs_from_the_described_arm(ur5e, name):
+    """Each holds its pose, and feels a push otherwise than the described arm does."""
+    felt = []
+    for one in (variant(name), variant("calibrated")):
+        arm = one.make(ur5e, ur5e.payload, 4)
+        command = hold(ur5e, ur5e.poses["Q3"])
+        assert np.abs(arm.reset(command, seed=1).q - command.q).max() < 0.02
+        arm.push(np.array([40.0, 40.0, 0.0, 0.0, 0.0, 0.0]))
+        felt.append(np.array([arm.step(command).q for _ in range(100)]))
+    assert bool(np.abs(felt[0] - felt[1]).max() > 1e-7) == (name != "calibrated")
+
+
+def test_names_stand_for_the_numbers_of_their_labels(ur5e):
+    """Friction, springs, torsion and backlash are those that tables of perturbations quote."""
+    stribeck = variant("stribeck").make(ur5e, ur5e.payload, 0)
+    assert stribeck.description.drives.friction_width == pytest.approx(0.3 * ur5e.drives.friction_width)
+    assert stribeck._imperfections.breakaway == 1.5
+    for name, factor in (("springs-30", 0.7), ("springs+30", 1.3)):
+        arm = variant(name).make(ur5e, ur5e.payload, 0).description
+        np.testing.assert_allclose(arm.drives.gear_stiffness, factor * np.array(ur5e.drives.gear_stiffness))
+        np.testing.assert_allclose(
+            arm.link_flexibility.stiffness, factor * np.array(ur5e.link_flexibility.stiffness)
+        )
+        assert arm.drives.velocity_gain == ur5e.drives.velocity_gain
+    assert variant("torsion").make(ur5e, ur5e.payload, 0)._imperfections.torsion == TORSION
+    np.testing.assert_array_equal(variant("backlash").make(ur5e, ur5e.payload, 0)._law.backlash, BACKLASH)
+    combined = variant("combined").make(ur5e, ur5e.payload, 7)
+    ratio = np.array(combined.description.drives.gear_stiffness) / ur5e.drives.gear_stiffness
+    np.testing.assert_allclose(np.abs(ratio - 1.0), 0.15)
+    assert combined.description.drives.velocity_gain == ur5e.drives.velocity_gain
+    assert (np.degrees(combined._imperfections.tilt), combined._imperfections.torsion) == pytest.approx(
+        (1.0, TORSION)
+    )
+
+
+@pytest.mark.parametrize("name", ["combined", "hidden-8"])
+def test_what_is_carried_is_never_what_was_said(ur5e, name):
+    """At the start, at a reset and in motion the arm carries the other payload, and tells the one it was told."""
+    told, lighter = ur5e.payload, Payload(mass=2.0, com=(0.0, 0.0, 0.05))
+    arm, truly = variant(name).make(ur5e, told, 0), variant(name).carries
+    command = hold(ur5e, ur5e.poses["Q1"])
+
+    def carried():
+        model = arm._flexible.model
+        return sum(body.mass for body in model.inertias) - sum(arm.description.links.mass)
+
+    assert carried() == pytest.approx(truly(told).mass)
+    assert abs(truly(told).mass / told.mass - 1.0) > 0.01
+    arm.reset(command, payload=lighter)
+    assert (arm.payload, carried()) == (lighter, pytest.approx(truly(lighter).mass))
+    arm.load(told)
+    assert (arm.payload, carried()) == (told, pytest.approx(truly(told).mass))
+    arm.reset(command, payload=Payload())
+    assert carried() == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_hidden_plant_is_the_hidden_robot_of_its_seed_whatever_the_seed_of_the_case(ur5e):
+    """Its name has the only seed that counts."""
+    for seed in (0, 9):
+        arm = variant("hidden-21").make(ur5e, ur5e.payload, seed)
+        assert arm.description == hidden(ur5e, 21)
+        assert arm._carries(ur5e.payload) == hidden_payload(ur5e.payload, 21)
+
+
+def test_other_arms_have_backlash_like_the_joints_of_a_ur5e():
+    """Seven joints, and a chain of three, get a width for each joint; an arm with rigid links cannot twist."""
+    for joints in (3, 7):
+        arm = chain(joints)
+        assert len(variant("backlash").make(arm, arm.payload, 0)._law.backlash) == joints
+    with pytest.raises(ValueError, match="torsion is 20000 N m/rad, but no link"):
+        variant("torsion").make(load("one-joint"), Payload(), 0)
+
+
+@pytest.mark.parametrize("name", ["stribek", "hidden", "hidden-", "hidden--1", "hidden-1e3", "hidden-²", ""])
+def test_an_unknown_plant_is_refused_with_the_names_there_are(name):
+    with pytest.raises(ValueError, match=r"must be hidden-SEED or one of calibrated, coulomb"):
+        variant(name)
