@@ -19,6 +19,11 @@ QUANTITIES = {
     "rotor_inertia": ("rotor inertia", "kg m²"),
     "damping_time": ("damping over stiffness", "s"),
     "bending_stiffness": ("bending stiffness", "N m/rad"),
+    "coulomb_friction": ("Coulomb friction", "N m"),
+    "breakaway": ("friction at breakaway over that", "–"),
+    "stribeck_speed": ("speed of its decline", "rad/s"),
+    "friction_width": ("width of its change of sign", "rad/s"),
+    "viscous_friction": ("viscous friction", "N m s/rad"),
 }
 
 

@@ -16,6 +16,10 @@ from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
 
 Floats = npt.NDArray[np.float64]
+FRICTION: tuple[Quantity, ...] = (
+    "coulomb_friction", "breakaway", "stribeck_speed", "friction_width", "viscous_friction",
+)  # fmt: skip
+"""Quantities of a joint's friction, in the order of `friction_law`."""
 MODES = 4
 """Default number of estimated modes."""
 
@@ -88,6 +92,17 @@ def drivetrain(
     damping[flexible.flexes] *= np.repeat([times[link] for link in links], 2)
     rows = (stiffness, rotor_inertia, velocity_gain, position_gain, damping)
     return Drivetrain(*(tuple(row.tolist()) for row in rows))
+
+
+def friction_law(parameters: Sequence[ModalParameter], description: RobotDescription) -> Floats | None:
+    """Return the friction of each joint, rows F_c, F_s/F_c, v_s, w and F_v, shape (5, n); None if it is not known.
+
+    Raises:
+        EstimatorError: It is known of some joints only.
+    """
+    if all(parameter.quantity not in FRICTION for parameter in parameters):
+        return None
+    return np.array([_values(parameters, quantity, range(description.joints)) for quantity in FRICTION])
 
 
 def _values(

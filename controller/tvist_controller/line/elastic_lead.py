@@ -10,6 +10,8 @@ J_j and J_f are the flange's translation Jacobians with respect to joints and be
 postures, where joints would have to turn far to move the flange a little (Nakamura and Hanafusa, 1986).
 """
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -105,6 +107,20 @@ def follow(wanted: Floats, led: Floats, room: Floats, period: float) -> bool:
 
 
 @compiled_for_ticks
+def friction_at(law: Floats, j: int, speed: float) -> float:
+    """Return the friction of joint j at a speed: [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v [N m].
+
+    Args:
+        law: F_c [N m], F_s/F_c [-], v_s [rad/s], w [rad/s] and F_v [N m s/rad] of each joint, shape (5, n).
+        j: The joint.
+        speed: v [rad/s].
+    """
+    slow = speed / law[2, j]
+    coulomb = law[0, j] * (1.0 + (law[1, j] - 1.0) * math.exp(-slow * slow))
+    return coulomb * math.tanh(speed / law[3, j]) + law[4, j] * speed
+
+
+@compiled_for_ticks
 def motor_reference(
     q: Floats,
     qd: Floats,
@@ -116,6 +132,7 @@ def motor_reference(
     linear: bool,
     torques: bool,
     period: float,
+    law: Floats,
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Return what the drives get for the tick between the newest lead and the one before the last.
 
@@ -130,6 +147,7 @@ def motor_reference(
         linear: Whether friction is linear.
         torques: Whether the torques count with the lead.
         period: Tick [s].
+        law: Identified friction, see `friction_at`, which then counts instead; shape (0, 0) if there is none.
 
     Returns:
         Positions [rad], velocities [rad/s] and torques [N m] of the motors, and accelerations of the lead [rad/s^2],
@@ -142,7 +160,10 @@ def motor_reference(
         motor_qd[j] = qd[j] + (led[0, j] - led[2, j]) / (2.0 * period)
         acceleration[j] = (led[0, j] - 2.0 * led[1, j] + led[2, j]) / (period * period)
         speed = motor_qd[j] if torques else qd[j]
-        motor_torque[j] = torque[j] + friction[j] * (speed if linear else np.tanh(speed / width))
+        if law.shape[0] > 0:
+            motor_torque[j] = torque[j] + friction_at(law, j, speed)
+        else:
+            motor_torque[j] = torque[j] + friction[j] * (speed if linear else np.tanh(speed / width))
         if torques:
             motor_torque[j] += rotor[j] * acceleration[j]
     return motor_q, motor_qd, motor_torque, acceleration

@@ -13,6 +13,7 @@ from tvist_controller.api.line import modal_estimator, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.design import choose
 from tvist_lab.identification.fit import spread
+from tvist_lab.identification.friction import identify_friction
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.modal_calibration import TOLD, ModeErrors, calibrate
 from tvist_lab.identification.modal_plan import ModalPlan, check, free_configurations
@@ -85,8 +86,11 @@ async def identify_modal(
     arm = ArmModes(description, payloads)
     candidates = free_configurations(description, payloads, CANDIDATES, plan)
     try:
+        friction = await identify_friction(robot, control, description, candidates)
         ringings, rejected = await _measure(robot, control, arm, candidates, plan, progress)
-        calibration = calibrate(arm, ringings, info, plan, rejected, name=name, command=command)
+        calibration = calibrate(
+            arm, ringings, info, plan, rejected, name=name, command=command, friction=friction
+        )
         errors = await _against_truth(robot, control, calibration, description, plan, info)
     finally:
         if plan.payloads:

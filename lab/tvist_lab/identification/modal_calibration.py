@@ -23,7 +23,14 @@ from tvist_lab.identification.ring_downs import Ringing
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.workspace import identified, ranges
 from tvist_plant.description import RobotDescription
-from tvist_protocol.calibration import Calibration, ModalModel, Provenance, RingDownFit, Spread
+from tvist_protocol.calibration import (
+    Calibration,
+    ModalModel,
+    ModalParameter,
+    Provenance,
+    RingDownFit,
+    Spread,
+)
 from tvist_protocol.info import Info
 from tvist_shaping.estimators.drivetrain import Drivetrain
 
@@ -62,8 +69,9 @@ def calibrate(
     *,
     name: str,
     command: str,
+    friction: tuple[ModalParameter, ...] = (),
 ) -> Calibration:
-    """Fit, check and create a calibration.
+    """Fit, check and create a calibration of springs and drives, to which the identified friction is added.
 
     Raises:
         IdentificationError: The ring-downs contradict each other.
@@ -77,7 +85,7 @@ def calibrate(
     noise = float(np.sqrt(np.mean([r.noise**2 for r in ringings])))
     f_d_min, zeta_max = mode_range(arm.description, fit.drivetrain)
     model = ModalModel(
-        parameters=arm.parameters(fit.logarithms, fit.deviations),
+        parameters=(*arm.parameters(fit.logarithms, fit.deviations), *friction),
         f_d_min=f_d_min,
         zeta_max=zeta_max,
         payloads=arm.payloads,

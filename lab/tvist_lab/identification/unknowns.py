@@ -118,20 +118,31 @@ class ArmModes:
         """
         values = {number: float(np.exp(log)) for number, log in zip(self.sought, logarithms, strict=True)}
         errors = dict(zip(self.sought, deviations.tolist(), strict=True)) if deviations is not None else {}
-        found = []
-        for number, unknown in enumerate(self.unknowns):
-            value, error = values.get(number, unknown.guess), errors.get(number, 0.0)
-            status: Status = "assumed"
-            if number in values:
-                status = "identified" if error < NARROWER * unknown.deviation else "not identifiable"
-            found.append(
-                ModalParameter(
-                    quantity=unknown.quantity,
-                    joints=unknown.joints,
-                    value=value,
-                    deviation=error,
-                    interval=(value * float(np.exp(-SURE * error)), value * float(np.exp(SURE * error))),
-                    status=status,
-                )
-            )
-        return tuple(found)
+        return tuple(
+            parameter(unknown, values[number], errors.get(number, 0.0))
+            if number in values
+            else parameter(unknown)
+            for number, unknown in enumerate(self.unknowns)
+        )
+
+
+def parameter(unknown: Unknown, value: float | None = None, deviation: float = 0.0) -> ModalParameter:
+    """Convert a parameter to the form of a calibration.
+
+    Args:
+        unknown: What was known of it.
+        value: Its value [SI]; None for the guess, which then is assumed.
+        deviation: Standard deviation of its logarithm [-].
+    """
+    status: Status = "assumed"
+    if value is not None:
+        status = "identified" if deviation < NARROWER * unknown.deviation else "not identifiable"
+    value = unknown.guess if value is None else value
+    return ModalParameter(
+        quantity=unknown.quantity,
+        joints=unknown.joints,
+        value=value,
+        deviation=deviation,
+        interval=(value * float(np.exp(-SURE * deviation)), value * float(np.exp(SURE * deviation))),
+        status=status,
+    )
