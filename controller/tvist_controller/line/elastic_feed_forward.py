@@ -29,7 +29,7 @@ class ElasticFeedForward:
         model: The arm's springs.
         period: Tick [s].
         torques: Whether torques count with the lead; otherwise only positions and velocities do.
-        law: Identified friction, rows as in `elastic_lead.friction_at`, shape (5, n). None for a share of the Coulomb
+        law: Identified friction, see `friction.LAWS`, shape (5, n). None for a share of the Coulomb
             friction in the description.
     """
 

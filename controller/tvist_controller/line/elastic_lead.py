@@ -10,13 +10,12 @@ J_j and J_f are the flange's translation Jacobians with respect to joints and be
 postures, where joints would have to turn far to move the flange a little (Nakamura and Hanafusa, 1986).
 """
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.friction import friction_at
 from tvist_controller.quiet.elimination import eliminate
 
 Integers = npt.NDArray[np.int64]
@@ -104,20 +103,6 @@ def follow(wanted: Floats, led: Floats, room: Floats, period: float) -> bool:
         led[2, j], led[1, j] = before, now
         led[0, j] = 2.0 * now - before + period * period * acceleration
     return limited
-
-
-@compiled_for_ticks
-def friction_at(law: Floats, j: int, speed: float) -> float:
-    """Return the friction of joint j at a speed: [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v [N m].
-
-    Args:
-        law: F_c [N m], F_s/F_c [-], v_s [rad/s], w [rad/s] and F_v [N m s/rad] of each joint, shape (5, n).
-        j: The joint.
-        speed: v [rad/s].
-    """
-    slow = speed / law[2, j]
-    coulomb = law[0, j] * (1.0 + (law[1, j] - 1.0) * math.exp(-slow * slow))
-    return coulomb * math.tanh(speed / law[3, j]) + law[4, j] * speed
 
 
 @compiled_for_ticks

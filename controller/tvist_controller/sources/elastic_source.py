@@ -28,7 +28,7 @@ def elastic_feed_forward(
     if tvist.feed_forward == "rigid":
         return None
     model = elastic_model(description, calibration)
-    law = None if calibration.modal is None else friction_law(calibration.modal.parameters, description)
+    law = friction_law(calibration.modal.parameters, description) if calibration.modal is not None else None
     torques = tvist.feed_forward == "elastic"
     return ElasticFeedForward(description, model, tvist.period, torques=torques, law=law)
 
