@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, nnls
 
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
@@ -40,8 +40,8 @@ BLOCK = 10
 """Number of ticks over which speeds and torques are averaged."""
 SETTLING = 2
 """Number of blocks left out at both ends, where friction holds what the arm did before."""
-AROUND = 15
-"""Number of blocks from which the noise around a block is determined, since it grows with speed."""
+GROWTH = (0, 1, 4)
+"""Powers of the speed by which the noise grows: the gears' ripple shakes the arm the more, the faster it turns."""
 LEAST_NOISE = 0.003
 """Smallest assumed noise, as a share of the joint's friction [-]."""
 ROUNDS = 4
@@ -138,8 +138,8 @@ def friction(logarithms: Floats, speed: Floats) -> Floats:
 def fit_friction(unknown: Sequence[Unknown], speed: Floats, torque: Floats) -> tuple[ModalParameter, ...]:
     """Fit the friction of one joint.
 
-    The ripple of the gears makes the noise; it grows with speed, so that each block has its own weight. What remains
-    of it is correlated from block to block, which widens the intervals.
+    The ripple of the gears makes the noise, which grows with speed, so that each block has its own weight. It is
+    correlated from block to block, which widens the intervals.
 
     Args:
         unknown: Its parameters before the measurement, in the order of `friction`.
@@ -150,6 +150,7 @@ def fit_friction(unknown: Sequence[Unknown], speed: Floats, torque: Floats) -> t
     deviation = np.array([one.deviation for one in unknown])
     low = np.full(len(guess), -np.inf)
     low[1] = np.log(LEAST_BREAKAWAY) - 1e-9
+    growing = (np.abs(speed) / np.abs(speed).max())[:, None] ** GROWTH
     least = LEAST_NOISE * max(float(np.abs(torque).max()), 1e-6)
     noise, found, left = np.full(len(speed), max(float(torque.std()), least)), guess, torque
     for _ in range(ROUNDS):
@@ -160,13 +161,10 @@ def fit_friction(unknown: Sequence[Unknown], speed: Floats, torque: Floats) -> t
 
         fit = least_squares(residual, found, bounds=(low, np.inf), x_scale=0.1)
         found, left = fit.x, friction(fit.x, speed) - torque
-        mean = np.convolve(left**2, np.ones(AROUND), "same") / np.convolve(
-            np.ones(len(left)), np.ones(AROUND), "same"
-        )
-        noise = np.maximum(np.sqrt(mean), least)
+        noise = np.maximum(growing @ nnls(growing, np.abs(left))[0] * np.sqrt(0.5 * np.pi), least)
     jacobian = fit.jac[: len(speed)]
     white = left / noise
-    wider = widening(white) ** 2 * max(float(np.mean(white**2)), 1.0)
+    wider = widening(white, len(guess)) ** 2 * max(float(np.mean(white**2)), 1.0)
     knowledge = jacobian.T @ jacobian / wider + np.diag(deviation**-2)
     errors = np.sqrt(np.diag(np.linalg.inv(knowledge)))
     return tuple(map(parameter, unknown, np.exp(found).tolist(), errors.tolist()))

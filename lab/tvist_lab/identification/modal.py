@@ -21,7 +21,7 @@ from tvist_lab.identification.ring_downs import Jog, Ringing, listen, or_none
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats, RecordingError
 from tvist_plant.description import RobotDescription
-from tvist_protocol.calibration import Calibration
+from tvist_protocol.calibration import Calibration, ModalParameter
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
@@ -48,6 +48,8 @@ class ModalIdentification:
     """Errors against the truth for configurations and payloads that were not measured, the lowest mode first; None if
     the robot does not publish it.
     """
+    no_friction: str = ""
+    """Why the calibration has no friction; empty if it has."""
 
 
 async def identify_modal(
@@ -60,7 +62,7 @@ async def identify_modal(
     command: str,
     progress: Progress,
 ) -> ModalIdentification:
-    """Identify springs and drives as a client.
+    """Identify springs, drives and, where there is room for it, friction as a client.
 
     Args:
         robot: The robot, on a network or in process.
@@ -86,7 +88,12 @@ async def identify_modal(
     arm = ArmModes(description, payloads)
     candidates = free_configurations(description, payloads, CANDIDATES, plan)
     try:
-        friction = await identify_friction(robot, control, description, candidates)
+        friction: tuple[ModalParameter, ...] = ()
+        no_friction = ""
+        try:
+            friction = await identify_friction(robot, control, description, candidates)
+        except IdentificationError as error:  # springs can be measured all the same
+            no_friction = str(error)
         ringings, rejected = await _measure(robot, control, arm, candidates, plan, progress)
         calibration = calibrate(
             arm, ringings, info, plan, rejected, name=name, command=command, friction=friction
@@ -96,7 +103,7 @@ async def identify_modal(
         if plan.payloads:
             with contextlib.suppress(ClientError, RefusedError):
                 await _carry(control, info.payload)
-    return ModalIdentification(calibration, tuple(ringings), errors)
+    return ModalIdentification(calibration, tuple(ringings), errors, no_friction)
 
 
 async def _measure(

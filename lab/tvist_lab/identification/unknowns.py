@@ -1,12 +1,15 @@
 """Unknown parameters of an arm's springs and drives before a measurement, with typical values."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec.structs import replace
 
 from tvist_controller.api.line import body, drivetrain, mass_matrix
 from tvist_lab.recordings import Floats
+from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import FlexibleModel, flexible_model
 from tvist_plant.similar import WRIST, Scale
@@ -18,6 +21,14 @@ LARGE = 3
 """Number of joints with large drives, counted from the base, of an arm of up to six; each has its own parameters."""
 UNSURE = 0.7
 """Standard deviation of a guess's logarithm: within a factor of four with 95 % probability [-]."""
+ROTOR = 0.2
+"""The same of the rotors' inertia, which is nearly proportional to the torque of a kind of drive [-]."""
+LINK_MASS = 0.03
+"""Standard deviation of each link's mass from the description, relative [-]."""
+PAYLOAD_MASS = 0.04
+"""Standard deviation of the payload's mass from the declared one, relative to the rated payload [-]."""
+SCATTER = 0.12
+"""Standard deviation by which each joint of a group that shares a parameter may differ from it, relative [-]."""
 NARROWER = 0.5
 """A parameter is identified if measurements reduce its deviation below this share of the guess's [-]."""
 SURE = 1.959963984540054
@@ -41,7 +52,7 @@ def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
     """Return the parameters of an arm's linear model: one per large joint, and one for all joints of the wrist.
 
     The guesses are those for an arm of about 5 kg payload, scaled as `Scale` scales springs and drives. The rotors'
-    inertia is assumed, since in the visible frequencies it has nearly the same effect as more link inertia.
+    inertia has nearly the same effect on the visible frequencies as more link inertia, so its guess is a close one.
     """
     joints = range(description.joints)
     large = max(LARGE, description.joints - WRIST)
@@ -57,7 +68,7 @@ def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
         found += [
             Unknown("gear_stiffness", group, stiffness * torque),
             Unknown("velocity_gain", group, gain * torque * scale.time),
-            Unknown("rotor_inertia", group, rotor * torque * scale.length, 0.0),
+            Unknown("rotor_inertia", group, rotor * torque * scale.length, ROTOR),
         ]
     found += [
         Unknown("position_gain", tuple(joints), 12.0 / scale.time),
@@ -105,6 +116,11 @@ class ArmModes:
         """M(q), shape (L, L)."""
         return self._masses[payload](q).copy()
 
+    def heavier(self, q: Floats, payload: int) -> list[Floats]:
+        """M(q) with each link in turn, and at last the payload, heavier by a standard deviation, each (L, L)."""
+        models = (flexible_model(*one) for one in heavier(self.description, body(self.payloads[payload])))
+        return [mass_matrix(model)(q).copy() for model in models]
+
     def drivetrain(self, logarithms: Floats) -> Drivetrain:
         """Return springs and drives for the parameters' logarithms, shape (P,)."""
         return drivetrain(self.parameters(logarithms), self.description, self._flexible[0])
@@ -126,6 +142,24 @@ class ArmModes:
         )
 
 
+def heavier(description: RobotDescription, carried: Body) -> list[tuple[RobotDescription, Body]]:
+    """Descriptions and payloads with one mass that is larger by a standard deviation."""
+    links, found = description.links, []
+    for link in range(description.joints):
+        factor = np.ones(description.joints)
+        factor[link] += LINK_MASS
+        mass = tuple((factor * links.mass).tolist())
+        inertia = tuple((factor[:, None] * links.inertia).tolist())
+        found.append(
+            (
+                replace(description, links=replace(links, mass=mass, inertia=tuple(map(tuple, inertia)))),
+                carried,
+            )
+        )
+    more = PAYLOAD_MASS * description.limits.payload
+    return [*found, (description, replace(carried, mass=carried.mass + more))]
+
+
 def parameter(unknown: Unknown, value: float | None = None, deviation: float = 0.0) -> ModalParameter:
     """Convert a parameter to the form of a calibration.
 
@@ -135,6 +169,8 @@ def parameter(unknown: Unknown, value: float | None = None, deviation: float = 0
         deviation: Standard deviation of its logarithm [-].
     """
     status: Status = "assumed"
+    if len(unknown.joints) > 1 and value is not None:
+        deviation = math.hypot(deviation, SCATTER)
     if value is not None:
         status = "identified" if deviation < NARROWER * unknown.deviation else "not identifiable"
     value = unknown.guess if value is None else value
