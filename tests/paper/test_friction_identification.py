@@ -125,5 +125,5 @@ def test_friction_of_some_joints_or_beyond_the_torque_is_refused():
     with pytest.raises(EstimatorError, match="said once for each"):
         friction_law(parameters[:-1], ROBOT)
     large = [replace(one, value=100.0) if one.quantity == "coulomb_friction" else one for one in parameters]
-    with pytest.raises(EstimatorError, match="coulomb_friction of joint 0 is .* at most the 150 N m"):
+    with pytest.raises(EstimatorError, match=r"coulomb_friction of joint 0 is .* at most the 150 N m"):
         friction_law(large, ROBOT)

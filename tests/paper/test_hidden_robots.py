@@ -64,7 +64,7 @@ def identified(arm, mass):
     """Weigh the payload, declare it, and identify springs and friction; with the robot time that it takes [s]."""
 
     async def run():
-        plant = OwnPlant("test", "", lambda description, carried: FlexibleArm(arm, carried))
+        plant = OwnPlant("test", "", lambda _, carried: FlexibleArm(arm, carried))
         setup = changed(free_setup(calibration="none", truth=False), plant=plant)
         async with robot_in_process(setup) as robot, robot.control("test") as control:
             disc = paper_payload(ROBOT, mass)
