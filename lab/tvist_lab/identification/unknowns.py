@@ -52,23 +52,25 @@ def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
     """Return the parameters of an arm's linear model: one per large joint, and one for all joints of the wrist.
 
     The guesses are those for an arm of about 5 kg payload, scaled as `Scale` scales springs and drives. The rotors'
-    inertia has nearly the same effect on the visible frequencies as more link inertia, so its guess is a close one.
+    inertia has nearly the same effect on the visible frequencies as more link inertia, so its guess is a close one:
+    the description's, as in the drives' feed-forward.
     """
     joints = range(description.joints)
     large = max(LARGE, description.joints - WRIST)
     scale = Scale(description.kinematics, description.limits.torque)
-    groups: list[tuple[tuple[int, ...], float, float, float]] = [
-        ((joint,), 24_000.0, 800.0, 1.0) for joint in joints[:large]
+    groups: list[tuple[tuple[int, ...], float, float]] = [
+        ((joint,), 24_000.0, 800.0) for joint in joints[:large]
     ]
     if joints[large:]:
-        groups.append((tuple(joints[large:]), 8_000.0, 300.0, 0.2))
+        groups.append((tuple(joints[large:]), 8_000.0, 300.0))
     found = []
-    for group, stiffness, gain, rotor in groups:
+    for group, stiffness, gain in groups:
         torque = scale.torque[group[0]]
+        rotor = float(np.mean([description.drives.rotor_inertia[joint] for joint in group]))
         found += [
             Unknown("gear_stiffness", group, stiffness * torque),
             Unknown("velocity_gain", group, gain * torque * scale.time),
-            Unknown("rotor_inertia", group, rotor * torque * scale.length, ROTOR),
+            Unknown("rotor_inertia", group, rotor, ROTOR),
         ]
     found += [
         Unknown("position_gain", tuple(joints), 12.0 / scale.time),
@@ -91,7 +93,7 @@ class ArmModes:
     """Modes of an arm as functions of its unknown parameters, with each of several payloads.
 
     Args:
-        description: The robot; only kinematics, masses and the set of bending links are used.
+        description: The robot; only kinematics, masses, rotors and the set of bending links are used.
         payloads: Carried payloads.
     """
 
