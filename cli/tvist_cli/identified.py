@@ -1,5 +1,6 @@
 """Print the results of `tvist identify` as tables or as JSON."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,13 @@ QUANTITIES = {
     "rotor_inertia": ("rotor inertia", "kg m²"),
     "damping_time": ("damping over stiffness", "s"),
     "bending_stiffness": ("bending stiffness", "N m/rad"),
+}
+FRICTION = {
+    "coulomb_friction": "Coulomb N m",
+    "breakaway": "breakaway over it",
+    "stribeck_speed": "declines over mrad/s",
+    "friction_width": "changes sign over mrad/s",
+    "viscous_friction": "viscous N m s/rad",
 }
 
 
@@ -99,6 +107,7 @@ def report_modal(done: "ModalIdentification", output: Path, options: str, *, jso
                 "modes": [_errors(number, *pair) for number, pair in enumerate(judged, 1)],
                 "cross_validated": [_errors(number, *pair) for number, pair in enumerate(crossed, 1)],
                 "parameters": model.parameters,
+                "no_friction": done.no_friction,
             }
         )
         return
@@ -110,8 +119,11 @@ def report_modal(done: "ModalIdentification", output: Path, options: str, *, jso
     table(
         "springs and drives",
         ("parameter", "joints", "value", "95 % from", "to", "unit", ""),
-        [_parameter(parameter) for parameter in model.parameters],
+        [_parameter(parameter) for parameter in model.parameters if parameter.quantity in QUANTITIES],
     )
+    rows = _friction([parameter for parameter in model.parameters if parameter.quantity in FRICTION])
+    if rows:
+        table("friction, 95 % from – to", ("joint", *FRICTION.values()), rows)
     table(
         f"deviation of the modes from {against}",
         ("mode", "f_d median %", "p90 %", "ζ median %", "p90 %"),
@@ -123,13 +135,15 @@ def report_modal(done: "ModalIdentification", output: Path, options: str, *, jso
             ("mode", "f_d median %", "p90 %", "ζ median %", "p90 %"),
             [_row(str(number), *pair) for number, pair in enumerate(crossed, 1)],
         )
-    lost = [p for p in model.parameters if p.status == "not identifiable"]
+    lost = [p for p in model.parameters if p.status == "not identifiable" and p.quantity in QUANTITIES]
     if lost:
         names = ", ".join(f"{QUANTITIES[p.quantity][0]} of {_joints(p)}" for p in lost)
         out.print(
             f"Not identifiable from these ring-downs: {names}. The vibration hardly depends on it; the initial guess "
             "is kept."
         )
+    if done.no_friction:
+        out.print(f"Without friction: {done.no_friction}.")
     out.print(f"written to {output}; use it with: tvist serve --calibration {output}{options}")
 
 
@@ -208,6 +222,17 @@ def _parameter(parameter: "ModalParameter") -> tuple[str, ...]:
     sure = ("", "") if parameter.status == "assumed" else (low, high)
     said = "" if parameter.status == "identified" else parameter.status
     return (name, _joints(parameter), f"{parameter.value:.4g}", *sure, unit, said)
+
+
+def _friction(parameters: "Sequence[ModalParameter]") -> list[tuple[str, ...]]:
+    """Rows of the table of friction; a dash where it was not identifiable."""
+    rows: dict[int, dict[str, str]] = {}
+    for parameter in parameters:
+        unit = 1e3 if FRICTION[parameter.quantity].endswith("mrad/s") else 1.0
+        low, high = (f"{unit * end:.3g}" for end in parameter.interval)
+        known = f"{low} – {high}" if parameter.status == "identified" else "–"
+        rows.setdefault(parameter.joints[0], {})[parameter.quantity] = known
+    return [(str(joint + 1), *(row[quantity] for quantity in FRICTION)) for joint, row in rows.items()]
 
 
 def _joints(parameter: "ModalParameter") -> str:

@@ -90,7 +90,7 @@ class Controller(WholeRobot):
         self.cycle = ControlCycle(
             setup.description, first.tvist, elastic=first.elastic, q=np.array(setup.q, dtype=float),
             declared=body(setup.payload), carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
-            compensate_sag=setup.compensate_sag,
+            compensate_sag=setup.compensate_sag, law=first.law,
         )  # fmt: skip
         if setup.truth:
             truth_of(self.cycle.line.plant)  # raises now, not at the first tick, if the plant has no truth

@@ -52,10 +52,12 @@ class Spread(_Part, frozen=True, kw_only=True):
 
 
 Quantity = Literal[
-    "gear_stiffness", "velocity_gain", "position_gain", "rotor_inertia", "damping_time", "bending_stiffness"
-]
+    "gear_stiffness", "velocity_gain", "position_gain", "rotor_inertia", "damping_time", "bending_stiffness",
+    "coulomb_friction", "breakaway", "stribeck_speed", "friction_width", "viscous_friction",
+]  # fmt: skip
 """K_g [N m/rad], K_d [N m s/rad], K_p [1/s], B [kg m²] of a joint and damping over stiffness of its gear [s];
-stiffness of a link that bends [N m/rad]."""
+stiffness of a link that bends [N m/rad]; and a joint's friction [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v:
+F_c [N m], F_s/F_c [-], v_s [rad/s], w [rad/s], F_v [N m s/rad]."""
 Status = Literal["identified", "not identifiable", "assumed"]
 """Whether the measurements determined a parameter, left it at its initial guess, or were not used for it."""
 Parameter = Annotated[float, Meta(gt=0, le=1e9)]
@@ -94,9 +96,9 @@ class RingDownFit(_Part, frozen=True, kw_only=True):
 class ModalModel(_Part, frozen=True, kw_only=True):
     """Stiffnesses and drive gains, which give the modes together with the arm's mass matrix for any payload."""
 
-    parameters: Annotated[tuple[ModalParameter, ...], Meta(min_length=1, max_length=50)]
+    parameters: Annotated[tuple[ModalParameter, ...], Meta(min_length=1, max_length=100)]
     """Each quantity once for every joint, and `bending_stiffness` for every link that bends, whose damping over
-    stiffness is that of the joint before it."""
+    stiffness is that of the joint before it. The five of friction may be missing: then it is not known."""
     f_d_min: Frequency
     """Lowest damped frequency over the workspace, up to the rated payload [Hz]."""
     zeta_max: DampingRatio

@@ -128,7 +128,15 @@ def test_what_comes_before_the_skipped_time_does_not_count(ring):
     assert fit_ring_down(alpha, PERIOD).f_d == pytest.approx(9.0, rel=1e-3)
 
 
-def draws(count, **options):
+def coloured(random, correlation, shape):
+    """Noise of a first-order autoregression with a variance of 1."""
+    noise = random.standard_normal(shape)
+    for row in range(1, len(noise)):
+        noise[row] = correlation * noise[row - 1] + np.sqrt(1.0 - correlation**2) * noise[row]
+    return noise
+
+
+def draws(count, correlation=0.0, **options):
     """Fits of damped sines of random frequency, damping, direction and phase in noise, and the truth."""
     found = []
     for seed in range(count):
@@ -138,7 +146,7 @@ def draws(count, **options):
         axis = random.normal(size=3)
         decay = np.exp(-2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta**2) * time)
         wave = decay * np.cos(2.0 * np.pi * f_d * time + random.uniform(0.0, 6.28))
-        alpha = np.outer(wave, axis / np.linalg.norm(axis)) + 0.03 * random.standard_normal((500, 3))
+        alpha = np.outer(wave, axis / np.linalg.norm(axis)) + 0.03 * coloured(random, correlation, (500, 3))
         found.append((fit_ring_down(alpha, PERIOD, **options), f_d, zeta))
     return found
 
@@ -162,6 +170,24 @@ def test_the_intervals_contain_the_truth_as_often_as_they_say(count, least, most
     assert np.median(zeta_errors) < 0.10
     assert least <= f_covered <= most
     assert least <= zeta_covered <= most
+
+
+@pytest.mark.parametrize("correlation", [0.5, 0.9])
+@pytest.mark.parametrize(("count", "least"), [(40, 0.85), pytest.param(300, 0.90, marks=pytest.mark.nightly)])
+def test_so_do_those_of_a_filtered_sensor_and_few_modes_are_made_of_its_noise(
+    count, least, correlation, measured
+):
+    fits = [draw for draw in draws(count, correlation, **ANALYSED) if draw[0].ok]
+    assert len(fits) > 0.8 * count
+    f_covered = np.mean([fit.f_d_interval[0] <= f_d <= fit.f_d_interval[1] for fit, f_d, _ in fits])
+    zeta_covered = np.mean([fit.zeta_interval[0] <= zeta <= fit.zeta_interval[1] for fit, _, zeta in fits])
+    several = np.mean([fit.modes > 1 for fit, _, _ in fits])
+    measured(
+        "coverage of f_d, zeta; more than one mode", f"{f_covered:.3f}, {zeta_covered:.3f}; {several:.3f}"
+    )
+    assert least <= f_covered <= 1.0
+    assert least <= zeta_covered <= 1.0
+    assert several < 0.3  # eight of ten, if the colour does not count
 
 
 def test_missing_samples_do_not_spoil_a_fit(ring):

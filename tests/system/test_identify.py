@@ -46,7 +46,7 @@ def test_people_get_tables_of_springs_and_of_errors(tmp_path):
     ended = tvist(
         "identify", "--model", "modal", "--ring-downs", 4, "--payloads", "5", cwd=tmp_path
     ).assert_done()
-    for words in ("gear stiffness", "assumed", "95 %", "true modes", "calibration.json"):
+    for words in ("gear stiffness", "breakaway", "95 %", "true modes", "calibration.json"):
         assert words in ended.out
 
 

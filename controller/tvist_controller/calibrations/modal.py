@@ -16,6 +16,10 @@ from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
 
 Floats = npt.NDArray[np.float64]
+FRICTION: tuple[Quantity, ...] = (
+    "coulomb_friction", "breakaway", "stribeck_speed", "friction_width", "viscous_friction",
+)  # fmt: skip
+"""Quantities of a joint's friction, in the order of `friction_law`."""
 MODES = 4
 """Default number of estimated modes."""
 
@@ -88,6 +92,25 @@ def drivetrain(
     damping[flexible.flexes] *= np.repeat([times[link] for link in links], 2)
     rows = (stiffness, rotor_inertia, velocity_gain, position_gain, damping)
     return Drivetrain(*(tuple(row.tolist()) for row in rows))
+
+
+def friction_law(parameters: Sequence[ModalParameter], description: RobotDescription) -> Floats | None:
+    """Return the friction of each joint, rows F_c, F_s/F_c, v_s, w and F_v, shape (5, n); None if it is not known.
+
+    Raises:
+        EstimatorError: It is known of some joints only, or is larger than the torque that drives have.
+    """
+    if all(parameter.quantity not in FRICTION for parameter in parameters):
+        return None
+    law = np.array([_values(parameters, quantity, range(description.joints)) for quantity in FRICTION])
+    most = law[0] * np.maximum(law[1], 1.0) + law[4] * np.array(description.limits.velocity)
+    for joint, (torque, limit) in enumerate(zip(most.tolist(), description.limits.torque, strict=True)):
+        if torque > limit:
+            at_most = (
+                f"at most the {limit:g} N m of its drive, with breakaway and viscous_friction at full speed"
+            )
+            raise EstimatorError(f"coulomb_friction of joint {joint}", round(torque, 3), at_most)
+    return law
 
 
 def _values(

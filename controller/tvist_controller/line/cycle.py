@@ -32,6 +32,7 @@ class ControlCycle:
         plant: Plant to control; None for the flexible arm of the description.
         elastic: Elastic feed-forward to use with the filter; None for that of the paper's controller.
         compensate_sag: Whether the drives lead by the twist of the gears under gravity.
+        law: Identified friction to feed forward, see `friction.LAWS`; None for a share of the description's.
 
     Raises:
         ValueError: The plant cannot start there, or its measurement has the wrong shape.
@@ -49,12 +50,14 @@ class ControlCycle:
         plant: Plant | None = None,
         elastic: ElasticFeedForward | None = None,
         compensate_sag: bool = False,
+        law: Floats | None = None,
     ) -> None:
         self.description = description
         arm = FlexibleArm(description, carried) if plant is None else plant
         self.line = Boxes.of(description, tvist, q, declared, arm, compensate_sag=compensate_sag)
         """The boxes after the trajectory generator."""
         self.line.drives.use(elastic)
+        self.line.drives.compensate(law)
         self.trajectory: Trajectory = Rest(q)
         """Trajectory generator."""
         self.mode = LineMode.REST

@@ -40,6 +40,7 @@ class DriveFeedForward:
 
     def __init__(self, description: RobotDescription, period: float, *, compensate_sag: bool = False) -> None:
         self._joints = JointControllers(description, period, compensate_sag=compensate_sag)
+        self._law: Floats | None = None
         self.rows = self._joints.rows
         """Parameters and state of the paper's joint controllers, see `joint_controllers`."""
         self.wanted: ElasticFeedForward | None = None
@@ -59,8 +60,17 @@ class DriveFeedForward:
         """Use elastic feed-forward or, for None, that of the paper's controller, after a transition."""
         self.wanted = elastic
 
+    def compensate(self, law: Floats | None) -> None:
+        """Feed identified friction forward from the next rest on, since its torque may be another one.
+
+        Args:
+            law: See `friction.LAWS`, shape (5, n); None for a share of the friction in the description.
+        """
+        self._law = law
+
     def rest(self) -> None:
         """Complete a transition at once if the motors do not lead either, since the reference rests: both are equal."""
+        self._joints.compensate(self._law)
         if self._elastic is self.wanted and self._share == self._full:
             return
         if self._elastic is None or self._share == 0 or self._elastic.settled:
@@ -73,6 +83,7 @@ class DriveFeedForward:
         Args:
             gravity: Torque that balances gravity there, shape (n,) [N m].
         """
+        self._joints.compensate(self._law)
         self._joints.reset(gravity)
         self._begin()
         self._share = self._full

@@ -31,10 +31,18 @@ class ElasticFeedForward:
         model: The arm's springs.
         period: Tick [s].
         torques: Whether torques count with the lead; otherwise only positions and velocities do.
+        law: Identified friction, see `friction.LAWS`, shape (5, n). None for a share of the Coulomb
+            friction in the description.
     """
 
     def __init__(
-        self, description: RobotDescription, model: ElasticModel, period: float, *, torques: bool = True
+        self,
+        description: RobotDescription,
+        model: ElasticModel,
+        period: float,
+        *,
+        torques: bool = True,
+        law: Floats | None = None,
     ) -> None:
         drives, limits = description.drives, np.array(description.limits.torque)
         self.delay = period
@@ -44,7 +52,11 @@ class ElasticFeedForward:
         self._damping = model.damping_time / period
         self._rotor = np.array(drives.rotor_inertia)
         friction = np.array(drives.coulomb_friction)
-        self._most, self._least = TORQUE_SHARE * limits - friction, LEAST_ROOM * limits
+        self._law = np.zeros((0, 0)) if law is None else law
+        largest = (
+            friction if law is None else law[0] * law[1] + law[4] * np.array(description.limits.velocity)
+        )
+        self._most, self._least = TORQUE_SHARE * limits - largest, LEAST_ROOM * limits
         self._linear, self._width = drives.linear_friction, drives.friction_width
         self._friction = friction / self._width if self._linear else drives.friction_feedforward * friction
         self._wanted, self._led = np.zeros((2, 3, description.joints))
@@ -104,7 +116,8 @@ class ElasticFeedForward:
         self._late = (target, needed, sag)
         self.limited = motor_command(
             late.q, late.qd, late.qdd, its_torque, self._wanted, self._led, self._ticks, self._most, self._least,
-            self._rotor, self._friction, self._width, self._linear, self._torques, self._period, command, qdd,
+            self._rotor, self._friction, self._width, self._linear, self._torques, self._period, self._law,
+            command, qdd,
         )  # fmt: skip
         self.qdd, self._ticks = qdd, self._ticks + 1
         q, qd, motor_torque = command

@@ -6,14 +6,18 @@ import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.line.friction import LAWS, friction_at
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 
-ROTOR, COMPLIANCE, YIELDING, COULOMB, VISCOUS, WIDTH, PER_SECOND, WINDUP, ROWS = range(9)
+ROTOR, COMPLIANCE, YIELDING, COULOMB, VISCOUS, WIDTH, PER_SECOND, WINDUP, LAW = range(9)
 """Rows of the parameters of each joint: rotor inertia B [kg m^2], c_w/K_g [rad/(N m)], 1/K_g if the sag is compensated
 [rad/(N m)], Coulomb [N m] and viscous friction [N m s/rad], speed over which the former changes its sign [rad/s], 1/h
-[1/s]; the wind-up of the last tick [rad]; and their number.
+[1/s]; the wind-up of the last tick [rad]; and the first row of the identified friction, see `friction_law`, which
+counts instead of the friction before it. Its F_c is zero if none was identified.
 """
+ROWS = LAW + LAWS
+"""Number of rows."""
 
 
 @compiled_for_ticks
@@ -27,16 +31,19 @@ def command_drives(
         rates: q̇* [rad/s] and q̈* [rad/s^2], shape (2, n).
         torque: τ* of the rigid arm, shape (n,) [N m].
         gravity: The part of the torque that balances gravity, shape (n,) [N m].
-        joints: Parameters of each joint, shape (8, n); the last row, the wind-up, is changed.
+        joints: Parameters of each joint, shape (13, n); one row, the wind-up, is changed.
         command: Position [rad], velocity [rad/s] and feed-forward torque [N m], shape (3, n).
     """
     for j in range(q.shape[0]):
         windup = joints[COMPLIANCE, j] * (torque[j] - gravity[j]) + joints[YIELDING, j] * gravity[j]
         speed = (windup - joints[WINDUP, j]) * joints[PER_SECOND, j]
         joints[WINDUP, j] = windup
-        friction = joints[VISCOUS, j] * rates[0, j]
-        if joints[COULOMB, j] > 0.0:
-            friction += joints[COULOMB, j] * math.tanh(rates[0, j] / joints[WIDTH, j])
+        if joints[LAW, j] > 0.0:
+            friction = friction_at(joints[LAW:], j, rates[0, j] + speed)
+        else:
+            friction = joints[VISCOUS, j] * rates[0, j]
+            if joints[COULOMB, j] > 0.0:
+                friction += joints[COULOMB, j] * math.tanh(rates[0, j] / joints[WIDTH, j])
         command[0, j] = q[j] + windup
         command[1, j] = rates[0, j] + speed
         command[2, j] = torque[j] + joints[ROTOR, j] * rates[1, j] + friction
@@ -46,7 +53,7 @@ class JointControllers:
     """Feed-forward for the drives; their feedback control runs in the drives themselves.
 
     - Torque: τ_ff = τ* + B q̈* + friction; the rotors' inertia and a share of Coulomb friction are added to the
-      torque of the rigid arm.
+      torque of the rigid arm. Friction that was identified counts in full, at the speed of the motors.
     - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g. The motor leads by a share c_w of that, so that the
       link is closer to its reference.
     - Sag: the twist by gravity itself, g/K_g, is left, as on the paper's robot, or the motor leads by all of it, so
@@ -62,7 +69,7 @@ class JointControllers:
         drives, n = description.drives, description.joints
         friction, stiffness = np.array(drives.coulomb_friction), np.array(drives.gear_stiffness)
         self.rows = rows = np.zeros((ROWS, n))
-        """Parameters of each joint and its wind-up, in the order of `JointRow`, shape (8, n)."""
+        """Parameters of each joint and its wind-up, in the order of `ROTOR` and so on, shape (13, n)."""
         rows[ROTOR] = drives.rotor_inertia
         rows[COMPLIANCE] = np.array(drives.windup_feedforward) / stiffness
         if compensate_sag:
@@ -73,6 +80,10 @@ class JointControllers:
             rows[COULOMB] = drives.friction_feedforward * friction
         rows[WIDTH], rows[PER_SECOND] = drives.friction_feedforward_width, 1.0 / period
         self._sags = compensate_sag
+
+    def compensate(self, law: Floats | None) -> None:
+        """Feed identified friction forward, see `friction_law`; None for a share of the description's friction."""
+        self.rows[LAW:] = 0.0 if law is None else law
 
     def reset(self, gravity: Floats) -> None:
         """Restart at rest.

@@ -40,7 +40,7 @@ def to_drives(
         chain: Links of the rigid arm with its declared payload, shape (n+1, 22).
         gravity: Gravitational acceleration [m/s^2].
         bodies: Scratch, shape (n+1, 28).
-        joints: Parameters of the joint controllers, shape (8, n); their wind-up is changed.
+        joints: Parameters of the joint controllers, shape (13, n); their wind-up is changed.
         signals: Result, shape (9, n), see `SIGNALS`.
     """
     rates, torque, static = signals[QD:TORQUE], signals[TORQUE], signals[STATIC]

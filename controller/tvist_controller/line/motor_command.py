@@ -4,6 +4,7 @@ import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.friction import friction_at
 
 RECOVERY = 120.0
 """Rate at which the lead returns to the formula after its acceleration was limited, critically damped [1/s]."""
@@ -56,6 +57,7 @@ def motor_command(
     linear: bool,
     with_torques: bool,
     period: float,
+    law: Floats,
     command: Floats,
     acceleration: Floats,
 ) -> bool:
@@ -77,6 +79,7 @@ def motor_command(
         linear: Whether friction is linear.
         with_torques: Whether the torques count with the lead.
         period: Tick [s].
+        law: Identified friction, see `friction_at`, which then counts instead; shape (0, 0) if there is none.
         command: Result: positions [rad], velocities [rad/s] and torques [N m] of the motors, shape (3, n).
         acceleration: Result: that of the motors, shape (n,) [rad/s^2].
 
@@ -98,7 +101,10 @@ def motor_command(
         command[0, j] = q[j] + led[1, j]
         command[1, j] = qd[j] + (led[0, j] - led[2, j]) / (2.0 * period)
         speed = command[1, j] if with_torques else qd[j]
-        command[2, j] = torque[j] + friction[j] * (speed if linear else np.tanh(speed / width))
+        if law.shape[0] > 0:
+            command[2, j] = torque[j] + friction_at(law, j, speed)
+        else:
+            command[2, j] = torque[j] + friction[j] * (speed if linear else np.tanh(speed / width))
         if with_torques:
             command[2, j] += rotor[j] * rise
         acceleration[j] = qdd[j] + rise

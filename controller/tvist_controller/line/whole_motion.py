@@ -63,15 +63,22 @@ class DrivenLine:
         passes: Filter that returns its input.
         start: Joint angles, shape (n,) [rad].
         declared: Declared payload.
+        law: Identified friction to feed forward, see `ControlCycle`.
     """
 
     def __init__(
-        self, description: RobotDescription, passes: Filter, start: Floats, declared: Payload
+        self,
+        description: RobotDescription,
+        passes: Filter,
+        start: Floats,
+        declared: Payload,
+        law: Floats | None = None,
     ) -> None:
         self._drives = Still(description.joints)
         self._cycle = ControlCycle(
-            description, passes, q=start, declared=declared, carried=declared, seed=0, plant=self._drives
-        )
+            description, passes, q=start, declared=declared, carried=declared, seed=0, plant=self._drives,
+            law=law,
+        )  # fmt: skip
 
     def drive(
         self,

@@ -45,6 +45,7 @@ class Filters:
         """Shape with a filter from now on."""
         before, idle = self.source, self._idle
         self.source, tvist = chosen.source, chosen.tvist
+        self._cycle.line.drives.compensate(chosen.law)
         self._cycle.use(tvist, chosen.elastic)
         self._motion.motions.keep_rate()
         self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")

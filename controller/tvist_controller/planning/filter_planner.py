@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.planning.basis import FilterBasis
 from tvist_controller.planning.choices import choose_filter, choose_source, make_estimator, wanted_modes
@@ -33,6 +34,8 @@ class PlannedFilter:
     """The filter."""
     elastic: ElasticFeedForward | None
     """Elastic feed-forward for the drives; None if the filter does without."""
+    law: Floats | None = None
+    """Identified friction of the joints, see `friction.LAWS`; None if it is not known."""
 
 
 class FilterPlanner:
@@ -134,14 +137,18 @@ class FilterPlanner:
         return found
 
     def _with_feed_forward(self, source: ModeSource, tvist: Filter, where: str) -> PlannedFilter:
-        """Add the feed-forward that a filter needs, with the springs of its source or else of the robot's calibration.
+        """Add friction and the feed-forward that a filter needs, of its source or else of the robot's calibration.
 
         Raises:
-            RefusalError: The springs are not known.
+            RefusalError: The springs are not known, or the friction is wrong.
         """
-        if tvist.feed_forward == "rigid":
-            return PlannedFilter(source, tvist, None)
         known = source if source.knows_payload else self._modal
+        try:
+            law = None if known is None else known.friction
+        except EstimatorError as error:
+            raise RefusalError("out_of_range", where, str(error)) from error
+        if tvist.feed_forward == "rigid":
+            return PlannedFilter(source, tvist, None, law)
         if known is None or known.calibration is None:
             why = f"{tvist.name} needs the arm's springs: identify them with tvist identify --model modal"
             raise RefusalError("out_of_range", where, why)
@@ -149,4 +156,4 @@ class FilterPlanner:
             elastic = elastic_feed_forward(tvist, self._setup.description, known.calibration)
         except EstimatorError as error:
             raise RefusalError("out_of_range", where, f"{tvist.name}: {error}") from error
-        return PlannedFilter(source, tvist, elastic)
+        return PlannedFilter(source, tvist, elastic, law)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tvist_controller.calibrations.modal import drivetrain
+from tvist_controller.calibrations.modal import drivetrain, friction_law
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.elastic_model import ElasticModel
 from tvist_plant.description import Payload, RobotDescription
@@ -28,7 +28,9 @@ def elastic_feed_forward(
     if tvist.feed_forward == "rigid":
         return None
     model = elastic_model(description, calibration)
-    return ElasticFeedForward(description, model, tvist.period, torques=tvist.feed_forward == "elastic")
+    law = friction_law(calibration.modal.parameters, description) if calibration.modal is not None else None
+    torques = tvist.feed_forward == "elastic"
+    return ElasticFeedForward(description, model, tvist.period, torques=torques, law=law)
 
 
 def elastic_model(description: RobotDescription, calibration: Calibration) -> ElasticModel:

@@ -13,6 +13,7 @@ from tvist_controller.api.line import modal_estimator, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.design import choose
 from tvist_lab.identification.fit import spread
+from tvist_lab.identification.friction import identify_friction
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.modal_calibration import TOLD, ModeErrors, calibrate
 from tvist_lab.identification.modal_plan import ModalPlan, check, free_configurations
@@ -20,7 +21,7 @@ from tvist_lab.identification.ring_downs import Jog, Ringing, listen, or_none
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats, RecordingError
 from tvist_plant.description import RobotDescription
-from tvist_protocol.calibration import Calibration
+from tvist_protocol.calibration import Calibration, ModalParameter
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
@@ -47,6 +48,8 @@ class ModalIdentification:
     """Errors against the truth for configurations and payloads that were not measured, the lowest mode first; None if
     the robot does not publish it.
     """
+    no_friction: str = ""
+    """Why the calibration has no friction; empty if it has."""
 
 
 async def identify_modal(
@@ -59,7 +62,7 @@ async def identify_modal(
     command: str,
     progress: Progress,
 ) -> ModalIdentification:
-    """Identify springs and drives as a client.
+    """Identify springs, drives and, where there is room for it, friction as a client.
 
     Args:
         robot: The robot, on a network or in process.
@@ -85,14 +88,22 @@ async def identify_modal(
     arm = ArmModes(description, payloads)
     candidates = free_configurations(description, payloads, CANDIDATES, plan)
     try:
+        friction: tuple[ModalParameter, ...] = ()
+        no_friction = ""
+        try:
+            friction = await identify_friction(robot, control, description, candidates)
+        except IdentificationError as error:  # springs can be measured all the same
+            no_friction = str(error)
         ringings, rejected = await _measure(robot, control, arm, candidates, plan, progress)
-        calibration = calibrate(arm, ringings, info, plan, rejected, name=name, command=command)
+        calibration = calibrate(
+            arm, ringings, info, plan, rejected, name=name, command=command, friction=friction
+        )
         errors = await _against_truth(robot, control, calibration, description, plan, info)
     finally:
         if plan.payloads:
             with contextlib.suppress(ClientError, RefusedError):
                 await _carry(control, info.payload)
-    return ModalIdentification(calibration, tuple(ringings), errors)
+    return ModalIdentification(calibration, tuple(ringings), errors, no_friction)
 
 
 async def _measure(

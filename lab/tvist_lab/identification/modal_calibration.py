@@ -16,14 +16,23 @@ from tvist_lab.identification.modal_fit import (
     describe,
     fit_from_many,
     fit_modal,
+    of_masses,
     own_poles,
 )
 from tvist_lab.identification.modal_plan import LEAST, ModalPlan
 from tvist_lab.identification.ring_downs import Ringing
 from tvist_lab.identification.unknowns import ArmModes
+from tvist_lab.recordings import Floats
 from tvist_lab.workspace import identified, ranges
 from tvist_plant.description import RobotDescription
-from tvist_protocol.calibration import Calibration, ModalModel, Provenance, RingDownFit, Spread
+from tvist_protocol.calibration import (
+    Calibration,
+    ModalModel,
+    ModalParameter,
+    Provenance,
+    RingDownFit,
+    Spread,
+)
 from tvist_protocol.info import Info
 from tvist_shaping.estimators.drivetrain import Drivetrain
 
@@ -62,22 +71,24 @@ def calibrate(
     *,
     name: str,
     command: str,
+    friction: tuple[ModalParameter, ...] = (),
 ) -> Calibration:
-    """Fit, check and create a calibration.
+    """Fit, check and create a calibration of springs and drives, to which the identified friction is added.
 
     Raises:
         IdentificationError: The ring-downs contradict each other.
     """
     _check_contradictions(arm, ringings, fit_modal(arm, ringings))
     fit = fit_from_many(arm, ringings)
-    unseen = _cross_validate(arm, ringings, fit)
+    unseen, moved = _cross_validate(arm, ringings, fit)
+    deviations = np.hypot(np.maximum(fit.deviations, moved), of_masses(arm, ringings, fit))
     first = np.array(
         [np.ravel(describe(fit.drivetrain.poles(arm.mass(r.q, r.payload))[0][:1])) for r in ringings]
     )
     noise = float(np.sqrt(np.mean([r.noise**2 for r in ringings])))
     f_d_min, zeta_max = mode_range(arm.description, fit.drivetrain)
     model = ModalModel(
-        parameters=arm.parameters(fit.logarithms, fit.deviations),
+        parameters=(*arm.parameters(fit.logarithms, deviations), *friction),
         f_d_min=f_d_min,
         zeta_max=zeta_max,
         payloads=arm.payloads,
@@ -155,12 +166,21 @@ def _own(arm: ArmModes, ringing: Ringing, fit: ModalFit) -> OwnPoles:
     return own_poles(arm, ringing, fit.drivetrain.poles(arm.mass(ringing.q, ringing.payload))[0][:MODES])
 
 
-def _cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> list[ModeErrors | None]:
-    """Errors of each mode from fits without a configuration, if its own ring-down is accurate enough."""
+def _cross_validate(
+    arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit
+) -> tuple[list[ModeErrors | None], Floats]:
+    """Fit without each configuration in turn.
+
+    Returns:
+        Errors of each mode, from configurations whose own ring-down is accurate enough; and the standard deviations of
+        the parameters' logarithms by the jackknife, shape (P,), which sees what the model leaves out as well as noise.
+    """
+    logarithms = []
     pairs: list[list[tuple[float, float, float, float]]] = [[] for _ in range(TOLD)]
     for place in {r.q.tobytes() for r in ringings}:
         others = [r for r in ringings if r.q.tobytes() != place]
         unseen = fit_modal(arm, others, fit.logarithms)
+        logarithms.append(unseen.logarithms)
         for ringing in (r for r in ringings if r.q.tobytes() == place):
             f_d, zeta = describe(unseen.drivetrain.poles(arm.mass(ringing.q, ringing.payload))[0][:MODES])
             own = _own(arm, ringing, unseen)
@@ -174,7 +194,7 @@ def _cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -
             continue
         f_d, own_f_d, zeta, own_zeta = np.array(pair).T
         errors.append(ModeErrors(spread(f_d, own_f_d), spread(zeta, own_zeta)))
-    return errors
+    return errors, np.sqrt((len(logarithms) - 1) * np.var(logarithms, axis=0))
 
 
 def mode_range(description: RobotDescription, drivetrain: Drivetrain) -> tuple[float, float]:

@@ -66,6 +66,11 @@ class _Signal:
         orthonormal, _ = np.linalg.qr(np.column_stack([ringing.real, ringing.imag, self._always]))
         return np.asarray((self.force - orthonormal @ (orthonormal.T @ self.force)).ravel() / self.noise)
 
+    def heavier(self, drivetrain: Drivetrain, masses: Sequence[Floats]) -> Floats:
+        """Difference that other mass matrices make to `left`, one column each, shape (samples, number)."""
+        here = self.left(drivetrain.poles(self.mass)[0][:MODES])
+        return np.column_stack([self.left(drivetrain.poles(mass)[0][:MODES]) - here for mass in masses])
+
     def change(self, drivetrains: Sequence[Drivetrain], poles: Complex, shapes: Complex) -> Floats:
         """Derivative of `left` with respect to each parameter, from a step in each, shape (samples, P)."""
         here = self.left(poles)
@@ -141,6 +146,24 @@ def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
     apart = np.array([fit.logarithms - best.logarithms for fit in fits])
     between = np.max(likely[:, None] * apart**2, axis=0)
     return replace(best, deviations=np.sqrt(best.deviations**2 + between))
+
+
+def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floats:
+    """Standard deviations of the parameters' logarithms that wrong masses cause, shape (P,).
+
+    Masses are not fitted: they would be found no better than they are known. How far each one, wrong by its deviation,
+    moves the parameters is found to first order.
+    """
+    signals = [_Signal(arm.mass(r.q, r.payload), r.force, r.noise) for r in ringings]
+    changes = np.vstack([sensitivity(arm, signal, fit.logarithms) for signal in signals])
+    heavier = np.vstack(
+        [
+            signal.heavier(fit.drivetrain, arm.heavier(r.q, r.payload))
+            for signal, r in zip(signals, ringings, strict=True)
+        ]
+    )
+    moved = np.linalg.solve(changes.T @ changes + np.diag(arm.deviation**-2), changes.T @ heavier)
+    return np.asarray(np.sqrt(np.sum(moved**2, axis=1)))
 
 
 def sensitivity(arm: ArmModes, signal: _Signal, logarithms: Floats) -> Floats:

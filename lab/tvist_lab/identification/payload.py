@@ -21,6 +21,7 @@ from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.ring_downs import or_none, reach
+from tvist_lab.identification.unknowns import heavier
 from tvist_lab.recordings import Floats, Recording
 from tvist_lab.workspace import ranges, workspace
 from tvist_plant.description import Payload as Body
@@ -107,7 +108,7 @@ async def identify_payload(
     _check(info, description, poses)
     arm = _Regressor(description)
     period = 1.0 / info.rate_hz
-    rows, torques, rested = [], [], 0
+    rows, torques, rested_at, rested = [], [], list[Floats](), 0
     for q in arm.choose(_free(description, info.payload, seed), 3 * poses):
         if rested == poses:
             break
@@ -118,12 +119,15 @@ async def identify_payload(
         progress()
         at, torque = held
         rows.append(arm.static(at))
+        rested_at.append(at)
         torques.append(torque - arm.torque(at, np.zeros_like(at), np.zeros_like(at)))
     if rested < LEAST:
         raise IdentificationError(
             f"only {rested} of {poses} poses could be reached, {LEAST} are needed: give the arm more room"
         )
-    found, deviations = arm.solve(np.vstack(rows), np.concatenate(torques))
+    matrix = np.vstack(rows)
+    found, deviations = arm.solve(matrix, np.concatenate(torques))
+    deviations = np.hypot(deviations, arm.of_masses(matrix, rested_at))
     in_motion, in_motion_deviation = arm.move(await _swing(robot, control, q, period))
     progress()
     mass = max(float(found[0]), 0.0)
@@ -172,6 +176,7 @@ class _Regressor:
         self._data = self._bare.createData()
         places = ((0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
         self._models = [rigid_model(description, Body(mass=1.0, com=(x, y, z))) for x, y, z in places]
+        self._heavier = [rigid_model(*one) for one in heavier(description, Body())[:-1]]
         friction = np.array(description.drives.coulomb_friction)
         self._friction = np.maximum(friction, 0.01 * np.array(description.limits.torque))
         self._width = description.drives.friction_width
@@ -211,6 +216,21 @@ class _Regressor:
         weight = np.tile(1.0 / self._friction, len(torques) // len(self._friction))
         return _least_squares(rows * weight[:, None], torques * weight)
 
+    def of_masses(self, rows: Floats, poses: Sequence[Floats]) -> Floats:
+        """Standard deviations of (m, m c) that wrong masses of the links cause, see `LINK_MASS`, shape (4,).
+
+        Args:
+            rows: Y of all poses, shape (n k, 4).
+            poses: The k poses, each of shape (n,) [rad].
+        """
+        weight = np.tile(1.0 / self._friction, len(poses))
+        solved = np.linalg.pinv(rows * weight[:, None])
+        moved = [
+            solved @ (weight * np.concatenate([_torque(model, q) - _torque(self._bare, q) for q in poses]))
+            for model in self._heavier
+        ]
+        return np.asarray(np.sqrt(np.sum(np.square(moved), axis=0)))
+
     def move(self, recording: Recording) -> tuple[float, float]:
         """Estimate the mass from a motion [kg], with its standard deviation.
 
@@ -245,6 +265,11 @@ def _least_squares(matrix: Floats, right: Floats) -> tuple[Floats, Floats]:
     freedom = max(len(right) - matrix.shape[1], 1)
     variance = max(float(np.sum((right - matrix @ found) ** 2)) / freedom, LEAST_ERROR**2)
     return np.asarray(found), np.asarray(np.sqrt(np.diag(np.linalg.pinv(matrix.T @ matrix)) * variance))
+
+
+def _torque(model: pin.Model, q: Floats) -> Floats:
+    """Torques that hold an arm, shape (n,) [N m]."""
+    return np.array(pin.computeGeneralizedGravity(model, model.createData(), q))
 
 
 def _free(description: RobotDescription, declared: Payload, seed: int) -> list[Floats]:

@@ -1,12 +1,15 @@
 """Unknown parameters of an arm's springs and drives before a measurement, with typical values."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec.structs import replace
 
 from tvist_controller.api.line import body, drivetrain, mass_matrix
 from tvist_lab.recordings import Floats
+from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import FlexibleModel, flexible_model
 from tvist_plant.similar import WRIST, Scale
@@ -18,6 +21,14 @@ LARGE = 3
 """Number of joints with large drives, counted from the base, of an arm of up to six; each has its own parameters."""
 UNSURE = 0.7
 """Standard deviation of a guess's logarithm: within a factor of four with 95 % probability [-]."""
+ROTOR = 0.2
+"""The same of the rotors' inertia, which is nearly proportional to the torque of a kind of drive [-]."""
+LINK_MASS = 0.03
+"""Standard deviation of each link's mass from the description, relative [-]."""
+PAYLOAD_MASS = 0.04
+"""Standard deviation of the payload's mass from the declared one, relative to the rated payload [-]."""
+SCATTER = 0.12
+"""Standard deviation by which each joint of a group that shares a parameter may differ from it, relative [-]."""
 NARROWER = 0.5
 """A parameter is identified if measurements reduce its deviation below this share of the guess's [-]."""
 SURE = 1.959963984540054
@@ -41,23 +52,25 @@ def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
     """Return the parameters of an arm's linear model: one per large joint, and one for all joints of the wrist.
 
     The guesses are those for an arm of about 5 kg payload, scaled as `Scale` scales springs and drives. The rotors'
-    inertia is assumed, since in the visible frequencies it has nearly the same effect as more link inertia.
+    inertia has nearly the same effect on the visible frequencies as more link inertia, so its guess is a close one:
+    the description's, as in the drives' feed-forward.
     """
     joints = range(description.joints)
     large = max(LARGE, description.joints - WRIST)
     scale = Scale(description.kinematics, description.limits.torque)
-    groups: list[tuple[tuple[int, ...], float, float, float]] = [
-        ((joint,), 24_000.0, 800.0, 1.0) for joint in joints[:large]
+    groups: list[tuple[tuple[int, ...], float, float]] = [
+        ((joint,), 24_000.0, 800.0) for joint in joints[:large]
     ]
     if joints[large:]:
-        groups.append((tuple(joints[large:]), 8_000.0, 300.0, 0.2))
+        groups.append((tuple(joints[large:]), 8_000.0, 300.0))
     found = []
-    for group, stiffness, gain, rotor in groups:
+    for group, stiffness, gain in groups:
         torque = scale.torque[group[0]]
+        rotor = float(np.mean([description.drives.rotor_inertia[joint] for joint in group]))
         found += [
             Unknown("gear_stiffness", group, stiffness * torque),
             Unknown("velocity_gain", group, gain * torque * scale.time),
-            Unknown("rotor_inertia", group, rotor * torque * scale.length, 0.0),
+            Unknown("rotor_inertia", group, rotor, ROTOR),
         ]
     found += [
         Unknown("position_gain", tuple(joints), 12.0 / scale.time),
@@ -80,7 +93,7 @@ class ArmModes:
     """Modes of an arm as functions of its unknown parameters, with each of several payloads.
 
     Args:
-        description: The robot; only kinematics, masses and the set of bending links are used.
+        description: The robot; only kinematics, masses, rotors and the set of bending links are used.
         payloads: Carried payloads.
     """
 
@@ -105,6 +118,11 @@ class ArmModes:
         """M(q), shape (L, L)."""
         return self._masses[payload](q).copy()
 
+    def heavier(self, q: Floats, payload: int) -> list[Floats]:
+        """M(q) with each link in turn, and at last the payload, heavier by a standard deviation, each (L, L)."""
+        models = (flexible_model(*one) for one in heavier(self.description, body(self.payloads[payload])))
+        return [mass_matrix(model)(q).copy() for model in models]
+
     def drivetrain(self, logarithms: Floats) -> Drivetrain:
         """Return springs and drives for the parameters' logarithms, shape (P,)."""
         return drivetrain(self.parameters(logarithms), self.description, self._flexible[0])
@@ -118,20 +136,51 @@ class ArmModes:
         """
         values = {number: float(np.exp(log)) for number, log in zip(self.sought, logarithms, strict=True)}
         errors = dict(zip(self.sought, deviations.tolist(), strict=True)) if deviations is not None else {}
-        found = []
-        for number, unknown in enumerate(self.unknowns):
-            value, error = values.get(number, unknown.guess), errors.get(number, 0.0)
-            status: Status = "assumed"
-            if number in values:
-                status = "identified" if error < NARROWER * unknown.deviation else "not identifiable"
-            found.append(
-                ModalParameter(
-                    quantity=unknown.quantity,
-                    joints=unknown.joints,
-                    value=value,
-                    deviation=error,
-                    interval=(value * float(np.exp(-SURE * error)), value * float(np.exp(SURE * error))),
-                    status=status,
-                )
+        return tuple(
+            parameter(unknown, values[number], errors.get(number, 0.0))
+            if number in values
+            else parameter(unknown)
+            for number, unknown in enumerate(self.unknowns)
+        )
+
+
+def heavier(description: RobotDescription, carried: Body) -> list[tuple[RobotDescription, Body]]:
+    """Descriptions and payloads with one mass that is larger by a standard deviation."""
+    links, found = description.links, []
+    for link in range(description.joints):
+        factor = np.ones(description.joints)
+        factor[link] += LINK_MASS
+        mass = tuple((factor * links.mass).tolist())
+        inertia = tuple((factor[:, None] * links.inertia).tolist())
+        found.append(
+            (
+                replace(description, links=replace(links, mass=mass, inertia=tuple(map(tuple, inertia)))),
+                carried,
             )
-        return tuple(found)
+        )
+    more = PAYLOAD_MASS * description.limits.payload
+    return [*found, (description, replace(carried, mass=carried.mass + more))]
+
+
+def parameter(unknown: Unknown, value: float | None = None, deviation: float = 0.0) -> ModalParameter:
+    """Convert a parameter to the form of a calibration.
+
+    Args:
+        unknown: What was known of it.
+        value: Its value [SI]; None for the guess, which then is assumed.
+        deviation: Standard deviation of its logarithm [-].
+    """
+    status: Status = "assumed"
+    if len(unknown.joints) > 1 and value is not None:
+        deviation = math.hypot(deviation, SCATTER)
+    if value is not None:
+        status = "identified" if deviation < NARROWER * unknown.deviation else "not identifiable"
+    value = unknown.guess if value is None else value
+    return ModalParameter(
+        quantity=unknown.quantity,
+        joints=unknown.joints,
+        value=value,
+        deviation=deviation,
+        interval=(value * float(np.exp(-SURE * deviation)), value * float(np.exp(SURE * deviation))),
+        status=status,
+    )

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import least_squares
 
+from tvist_lab.metrics.coloured import widening
 from tvist_lab.recordings import Floats
 
 FREQUENCIES = (3.0, 45.0)
@@ -241,7 +242,9 @@ class Ring:
         added = 2 + 2 * self.alpha.shape[1]
         before, after = (float(np.sum(self.unexplained(p) ** 2)) + 1e-300 for p in (fewer, more))
         wanted = added * math.log(samples) if self.evidence is None else self.evidence
-        return bool(samples * math.log(before / after) > wanted)
+        # What is left of coloured noise looks like a mode where its spectrum is high.
+        noise = float(self._coloured(self.unexplained(more), more[-2:-1])[0])
+        return bool(samples * math.log(before / after) > wanted * noise)
 
     def modes_at(self, parameters: Floats) -> tuple[list[Mode], Floats]:
         """Modes with their amplitudes and standard errors, and what they leave of the signal, shape (T, 3)."""
@@ -279,8 +282,9 @@ class Ring:
         """Return the standard errors of each mode's f_d and ζ, from the Jacobian without the amplitudes' share.
 
         A residual that is correlated in time, as of a filtered sensor or a mode that was not fitted, has a larger error
-        than white noise. The larger one counts of what the residual's spectrum says at each mode's frequency, and of
-        what its correlation does (Newey and West, Econometrica 55, 1987, Bartlett's weights).
+        than white noise. The largest one counts of what the residual's spectrum says at each mode's frequency, of
+        what the correlation of successive samples does, and of what that over many lags does (Newey and West,
+        Econometrica 55, 1987, Bartlett's weights).
         """
         jacobian = self._jacobian(parameters)
         freedom = max(left.size - parameters.size - linear, 1)
@@ -288,7 +292,7 @@ class Ring:
         if not np.linalg.cond(information) < 1e14:
             return np.full(parameters.size, np.inf)
         inverse = np.linalg.inv(information)
-        coloured = np.repeat(self.colour(left, parameters[::2]), 2)
+        coloured = np.repeat(self._coloured(left, parameters[::2]), 2)
         white = np.diag(inverse) * float(left @ left) / freedom * coloured
         correlated = np.diag(inverse @ self._score_covariance(jacobian, left) @ inverse) * left.size / freedom
         return np.asarray(np.sqrt(np.maximum(white, correlated)))
@@ -303,6 +307,11 @@ class Ring:
         turns = np.exp(-2j * np.pi * np.outer(frequencies * self.period, np.arange(1, COLOURS + 1)))
         innovation = (lags[0] - float(filtered @ lags[1:])) / lags[0]
         return np.asarray(np.maximum(innovation / np.abs(1.0 - turns @ filtered) ** 2, 1.0))
+
+    def _coloured(self, left: Floats, frequencies: Floats) -> Floats:
+        """The same, and at least what the correlation of successive samples says, which no missing mode hides."""
+        slow = widening(left.reshape(self.alpha.shape)) ** 2
+        return np.maximum(self.colour(left, frequencies), slow)
 
     def _score_covariance(self, jacobian: Floats, left: Floats) -> Floats:
         """Covariance of the residual's share in the direction of each parameter, shape (P, P)."""

@@ -107,11 +107,14 @@ class ControlLine:
         description: The controller's model of the arm.
         start: Joint angles at which the arm rests, shape (n,) [rad].
         declared: Declared payload.
+        law: Identified friction of the joints, which the drives are fed forward; None if it is not known.
     """
 
-    def __init__(self, description: RobotDescription, start: Floats, declared: Payload) -> None:
+    def __init__(
+        self, description: RobotDescription, start: Floats, declared: Payload, law: Floats | None = None
+    ) -> None:
         self._start = start
-        self._line = DrivenLine(description, Unchanged(description.joints), start, declared)
+        self._line = DrivenLine(description, Unchanged(description.joints), start, declared, law)
 
     def follow(
         self,

@@ -152,6 +152,21 @@ class Recipe:
         except EstimatorError as error:
             raise RecipeError(f"shaper {self.shaper}: {error}") from error
 
+    def friction(self, description: RobotDescription) -> Floats | None:
+        """Return the friction that the drives are fed forward, see `ModeSource.friction`.
+
+        Raises:
+            RecipeError: The calibration has it for some joints only, or more than the drives have torque.
+        """
+        try:
+            return (
+                None
+                if self.calibration is None
+                else ModeSource("modal", description, self.calibration).friction
+            )
+        except EstimatorError as error:
+            raise RecipeError(f"shaper {self.shaper}: {error}") from error
+
     def estimator(self, description: RobotDescription, mass: float, modes: int) -> Estimator:
         """Create the estimator that provides the filter's modes.
 

@@ -60,7 +60,12 @@ class Bench:
             case.description, case.declared, case.reference(), case.limits, job.as_served, case.stream
         )
         """What the first method gets."""
-        self._line = ControlLine(case.description, np.array(case.move.start), self._body(case.declared.mass))
+        # A robot has one calibration: the friction in it is fed forward whatever shapes, and unshaped as well.
+        recipes = (getattr(method, "recipe", None) for method in job.methods)
+        law = next((recipe.friction(case.description) for recipe in recipes if recipe is not None), None)
+        self._line = ControlLine(
+            case.description, np.array(case.move.start), self._body(case.declared.mass), law
+        )
         self._plain: dict[str, Motion] = {}
 
     @cached_property

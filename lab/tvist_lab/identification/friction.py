@@ -1,0 +1,170 @@
+"""Identification of each joint's friction from its speed and torque in a slow motion there and back.
+
+The way back is the way there reversed in time. Weight and inertia need the same torque on both, and friction the
+opposite one, so half the difference is friction alone, whatever the masses are:
+
+    (τ_there(t) - τ_back(T - t)) / 2 = F(v),    F(v) = [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v
+
+(Stribeck's curve; Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30, 1994). At both ends of the way all
+joints pass slowly through the speeds near zero, where an arm decides how it comes to rest.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import numpy as np
+from scipy.optimize import least_squares, nnls
+
+from tvist_client.arm import Arm
+from tvist_client.robot import Robot
+from tvist_controller.api.line import MotionLimits
+from tvist_lab.collect import collect
+from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.ring_downs import or_none, reach
+from tvist_lab.identification.unknowns import Unknown, parameter
+from tvist_lab.metrics import motions
+from tvist_lab.metrics.coloured import widening
+from tvist_lab.recordings import Floats, Recording
+from tvist_plant.description import RobotDescription
+from tvist_protocol.calibration import ModalParameter
+
+LENGTH = 0.45
+"""Length of the way, of every joint [rad]."""
+LIMITS = MotionLimits(velocity=0.3, acceleration=0.2, jerk=100.0)
+"""Limits of the motion: slow enough for many samples near standstill, quick enough to tell viscous friction."""
+REST = 0.3
+"""Rest before the way there and back [s]."""
+PLACES = 8
+"""Number of configurations tried for a free way."""
+BLOCK = 10
+"""Number of ticks over which speeds and torques are averaged."""
+SETTLING = 2
+"""Number of blocks left out at both ends, where friction holds what the arm did before."""
+GROWTH = (0, 1, 4)
+"""Powers of the speed by which the noise grows: the gears' ripple shakes the arm the more, the faster it turns."""
+LEAST_NOISE = 0.003
+"""Smallest assumed noise, as a share of the joint's friction [-]."""
+ROUNDS = 4
+"""Number of fits, each with the noise that the one before has left."""
+LEAST_BREAKAWAY = 1.0
+"""Friction is never lower at breakaway than in motion [-]."""
+
+
+def unknown_friction(description: RobotDescription) -> tuple[tuple[Unknown, ...], ...]:
+    """Return the parameters of each joint's friction before a measurement."""
+    return tuple(
+        (
+            Unknown("coulomb_friction", (joint,), 0.04 * torque, 1.0),
+            Unknown("breakaway", (joint,), 1.2, 0.3),
+            Unknown("stribeck_speed", (joint,), 0.05, 0.7),
+            Unknown("friction_width", (joint,), 0.05, 1.0),
+            Unknown("viscous_friction", (joint,), 0.02 * torque, 1.0),
+        )
+        for joint, torque in enumerate(description.limits.torque)
+    )
+
+
+async def identify_friction(
+    robot: Robot, control: Arm, description: RobotDescription, places: Sequence[Floats]
+) -> tuple[ModalParameter, ...]:
+    """Move all joints slowly there and back, and fit each one's friction.
+
+    Args:
+        robot: The robot; its shaper must be `none`.
+        control: The arm under control.
+        description: The arm, of which only the torque limits are used, for the first guess.
+        places: Configurations in the middle of the way to try, each of shape (n,) [rad].
+
+    Raises:
+        IdentificationError: There is no free way about any of them.
+    """
+    recording = await _sweep(robot, control, places)
+    speed, torque = there_and_back(recording)
+    return tuple(
+        parameter
+        for joint, unknown in enumerate(unknown_friction(description))
+        for parameter in fit_friction(unknown, speed[:, joint], torque[:, joint])
+    )
+
+
+async def _sweep(robot: Robot, control: Arm, places: Sequence[Floats]) -> Recording:
+    """Record the way there and back, about the first place where it is free."""
+    period = 1.0 / (await robot.info()).rate_hz
+    for middle in places[:PLACES]:
+        for side in (0.5 * LENGTH, -0.5 * LENGTH):
+            if await or_none(_reached(control, middle - side)) is None:
+                continue
+            with collect(robot) as collected:
+                await robot.advance(round(REST / period))
+                if await or_none(control.move_j(middle + side, **asdict(LIMITS))) is None:
+                    continue
+                await robot.advance(round(REST / period))
+                await control.move_j(middle - side, **asdict(LIMITS))
+                await robot.advance(BLOCK)
+            return collected.recording()
+    raise IdentificationError(
+        f"there is no room for a way of {LENGTH:g} rad of all joints, which friction is measured on: give the arm more"
+    )
+
+
+async def _reached(control: Arm, q: Floats) -> bool:
+    await reach(control, q)
+    return True
+
+
+def there_and_back(recording: Recording) -> tuple[Floats, Floats]:
+    """Return speeds [rad/s] and friction torques [N m] of a way there and back, as means of blocks, shape (k, n)."""
+    there, back = motions(recording)[-2:]
+    length = min(there.shaped_stop - there.start, back.shaped_stop - back.start)
+
+    def odd(name: str) -> Floats:
+        column = recording[name]
+        one = column[there.start : there.start + length]
+        other = column[back.start : back.start + length][::-1]
+        blocks = length // BLOCK
+        mean = (0.5 * (one - other))[: blocks * BLOCK].reshape(blocks, BLOCK, -1).mean(axis=1)
+        return np.asarray(mean[SETTLING:-SETTLING])
+
+    return odd("actual_qd"), odd("actual_moment")
+
+
+def friction(logarithms: Floats, speed: Floats) -> Floats:
+    """F(v) for the logarithms of F_c, F_s/F_c, v_s, w and F_v, in the shape of v [N m]."""
+    coulomb, breakaway, stribeck, width, viscous = np.exp(logarithms)
+    shape = 1.0 + (breakaway - 1.0) * np.exp(-((speed / stribeck) ** 2))
+    return np.asarray(coulomb * shape * np.tanh(speed / width) + viscous * speed)
+
+
+def fit_friction(unknown: Sequence[Unknown], speed: Floats, torque: Floats) -> tuple[ModalParameter, ...]:
+    """Fit the friction of one joint.
+
+    The ripple of the gears makes the noise, which grows with speed, so that each block has its own weight. It is
+    correlated from block to block, which widens the intervals.
+
+    Args:
+        unknown: Its parameters before the measurement, in the order of `friction`.
+        speed: Speeds, shape (k,) [rad/s].
+        torque: Friction torques, shape (k,) [N m].
+    """
+    guess = np.log([one.guess for one in unknown])
+    deviation = np.array([one.deviation for one in unknown])
+    low = np.full(len(guess), -np.inf)
+    low[1] = np.log(LEAST_BREAKAWAY) - 1e-9
+    growing = (np.abs(speed) / np.abs(speed).max())[:, None] ** GROWTH
+    least = LEAST_NOISE * max(float(np.abs(torque).max()), 1e-6)
+    noise, found, left = np.full(len(speed), max(float(torque.std()), least)), guess, torque
+    for _ in range(ROUNDS):
+
+        def residual(logarithms: Floats, noise: Floats = noise) -> Floats:
+            short = (friction(logarithms, speed) - torque) / noise
+            return np.concatenate([short, (logarithms - guess) / deviation])
+
+        fit = least_squares(residual, found, bounds=(low, np.inf), x_scale=0.1)
+        found, left = fit.x, friction(fit.x, speed) - torque
+        noise = np.maximum(growing @ nnls(growing, np.abs(left))[0] * np.sqrt(0.5 * np.pi), least)
+    jacobian = fit.jac[: len(speed)]
+    white = left / noise
+    wider = widening(white, len(guess)) ** 2 * max(float(np.mean(white**2)), 1.0)
+    knowledge = jacobian.T @ jacobian / wider + np.diag(deviation**-2)
+    errors = np.sqrt(np.diag(np.linalg.inv(knowledge)))
+    return tuple(map(parameter, unknown, np.exp(found).tolist(), errors.tolist()))

@@ -1,0 +1,26 @@
+"""Noise that is correlated in time, and by how much it makes estimates worse than white noise of the same size."""
+
+import numpy as np
+
+from tvist_lab.recordings import Floats
+
+MOST = 0.97
+"""Largest correlation that is assumed: beyond it, a residual is a drift [-]."""
+
+
+def widening(residual: Floats, fitted: int = 0) -> float:
+    """Factor of standard errors for a residual's colour, sqrt((1 + r)/(1 - r)), at least 1.
+
+    r is the correlation of successive samples, as of a first-order autoregression, which has the same at all lags.
+
+    Args:
+        residual: Residual of a fit in the order of time, shape (T,) or (T, axes).
+        fitted: Number of slow functions of time that were fitted, each of which takes (1 + 3 r)/T from the correlation
+            that is found (Marriott and Pope, Biometrika 41, 1954, for the mean).
+    """
+    energy = float(np.sum(residual**2))
+    if energy <= 0.0:
+        return 1.0
+    r = float(np.sum(residual[1:] * residual[:-1])) / energy
+    r = min(max(r + fitted * (1.0 + 3.0 * r) / len(residual), 0.0), MOST)
+    return float(np.sqrt((1.0 + r) / (1.0 - r)))
