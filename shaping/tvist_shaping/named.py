@@ -6,7 +6,9 @@ from difflib import get_close_matches
 from types import MappingProxyType
 from typing import TypeAlias
 
-from tvist_shaping.aimed import AimedFilter, PlannedFilter
+import numpy as np
+
+from tvist_shaping.aimed import AimedFilter, PlannedFilter, TargetDesign
 from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.catalogue import SHAPERS
 from tvist_shaping.errors import DesignError, UnknownShaperError
@@ -17,6 +19,7 @@ from tvist_shaping.fir_shaper import FirShaper
 from tvist_shaping.shaper import Shaper
 from tvist_shaping.smoothing import SmoothedDesign, SmoothingFilter, running_means
 from tvist_shaping.steady import Design, ShortDesign, SteadyFilter
+from tvist_shaping.taps import mean_delay
 
 AnyShaper: TypeAlias = Shaper | FirShaper
 """Types that a user's own shaper may have."""
@@ -26,9 +29,13 @@ SLOW = 5.5
 """Lower bound of an arm's frequencies [Hz] below which the designs with constant mean delay become longer: their times
 grow as the longest period.
 """
+LIGHT = 0.040
+"""Mean delay of zero-vibration shapers for the two lowest modes at q = 0 [s] above which they grow as well: the less an
+arm is damped, the later its weights have to be.
+"""
 
 
-def _brief(mean_delay: float, residual: float, third: float, name: str, slower: float) -> Design:
+def _brief(mean_delay: float, residual: float, third: float, name: str, slower: float) -> ShortDesign:
     wanted = FirDesign(
         residual=(residual, residual, third, 0.2), shortest=0.05 * slower, longest=0.15 * slower
     )
@@ -44,7 +51,7 @@ def _short(slower: float) -> Design:
 
 
 def _auto_target(slower: float) -> Design:
-    return _brief(0.026, 0.035, 0.06, AIMED, slower)
+    return TargetDesign(_brief(0.026, 0.035, 0.06, AIMED, slower), slower)
 
 
 def _elastic_auto(slower: float) -> Design:
@@ -52,7 +59,7 @@ def _elastic_auto(slower: float) -> Design:
 
 
 def _planned(slower: float) -> Design:
-    return _brief(0.026, 0.035, 0.06, PLANNED, slower)
+    return TargetDesign(_brief(0.026, 0.035, 0.06, PLANNED, slower), slower)
 
 
 AIMED, PLANNED, ELASTIC_AUTO = "auto-target", "planned", "elastic-auto"
@@ -80,7 +87,7 @@ OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
     {
         "auto": "four modes with any payload, at a constant mean delay: keeps the limits",
         "short": "like auto: shorter, leaves slightly more",
-        AIMED: "like auto, for motions with a known end: shorter",
+        AIMED: "zv for the three lowest modes at a motion's known end; like auto for other motions",
         PLANNED: "moves to a known target are planned to leave no vibration; like auto-target for other motions",
         "elastic": "smoothing alone, and feed-forward of the arm's elasticity: half the delay of auto",
         "elastic-position": "like elastic, for drives that take positions and velocities, but no torques",
@@ -179,7 +186,8 @@ class Registry:
             return SmoothingFilter(name, weights, estimator, joints=joints, feed_forward=feed_forward)
         if name in DESIGNS:
             kind = _KINDS.get(name, SteadyFilter)
-            slower = max(1.0, SLOW / estimator.f_d_min)
+            f_d, zeta = (values[:2] for values in estimator.settle(np.zeros(joints)))
+            slower = max(1.0, SLOW / estimator.f_d_min, mean_delay(f_d, zeta) / LIGHT)
             return kind(DESIGNS[name](slower), estimator, joints=joints, feed_forward=feed_forward)
         shaper = self.own[name] if name in self.own else SHAPERS[name]
         if isinstance(shaper, FirShaper):

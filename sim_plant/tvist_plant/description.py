@@ -92,7 +92,7 @@ def _check_imperfections(description: RobotDescription, source: str | Path) -> N
     try:
         made = Imperfections.of(description)
     except msgspec.ValidationError as error:
-        said, at, path = str(error).partition(" - at `$")
+        said, _, path = str(error).partition(" - at `$")
         inner = path.rstrip("`")
         told = in_words(msgspec.ValidationError(f"{said} - at `$.imperfections{inner}`"), table)
         raise RobotFileError(f"robot file {source}: {told}") from error
