@@ -7,7 +7,6 @@ import numpy.typing as npt
 
 from tvist_shaping._types import Floats
 from tvist_shaping.steady import Design, ShortDesign, SteadyFilter
-from tvist_shaping.taps import mean_delay, product_taps
 
 AT_TARGET = 3
 """Number of modes, from the lowest on, that have a zero-vibration shaper in a motion with a known end."""
@@ -52,9 +51,21 @@ class TargetDesign(Design):
         return self._design.go_on(f_d, zeta, seconds, taps[: self._design.taps])
 
     def at_target(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Compute the taps for the modes at the end of a motion; arguments and result as in `Design.start`."""
-        f_d, zeta = f_d[:AT_TARGET], zeta[:AT_TARGET]
-        return product_taps(f_d, zeta, mean_delay(f_d, zeta), self.period, taps)
+        """Compute the taps for the modes at the end of a motion; arguments and result as in `Design.start`.
+
+        Impulses between two ticks are shared by both, so that no tap is negative and all limits are kept exactly.
+        """
+        sizes, ticks = np.ones(1), np.zeros(1)
+        for f, z in zip(f_d[:AT_TARGET], zeta[:AT_TARGET], strict=True):
+            later = math.exp(-math.pi * z / math.sqrt(1.0 - z * z))
+            sizes = np.outer(sizes, [1.0 / (1.0 + later), later / (1.0 + later)]).ravel()
+            ticks = np.add.outer(ticks, [0.0, 0.5 / (f * self.period)]).ravel()
+        within = np.minimum(ticks, self.taps - 2.0)
+        first = within.astype(np.int64)
+        taps[:] = 0.0
+        np.add.at(taps, first, sizes * (1.0 - within + first))
+        np.add.at(taps, first + 1, sizes * (within - first))
+        return bool(np.array_equal(within, ticks))
 
 
 class AimedFilter(SteadyFilter):
