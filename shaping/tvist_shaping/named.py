@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from tvist_shaping._types import Floats
 from tvist_shaping.aimed import AimedFilter, PlannedFilter, TargetDesign
 from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.catalogue import SHAPERS
@@ -19,7 +20,6 @@ from tvist_shaping.fir_shaper import FirShaper
 from tvist_shaping.shaper import Shaper
 from tvist_shaping.smoothing import SmoothedDesign, SmoothingFilter, running_means
 from tvist_shaping.steady import Design, ShortDesign, SteadyFilter
-from tvist_shaping.taps import mean_delay
 
 AnyShaper: TypeAlias = Shaper | FirShaper
 """Types that a user's own shaper may have."""
@@ -33,6 +33,12 @@ LIGHT = 0.040
 """Mean delay of zero-vibration shapers for the two lowest modes at q = 0 [s] above which they grow as well: the less an
 arm is damped, the later its weights have to be.
 """
+
+
+def _mean_delay(f_d: Floats, zeta: Floats) -> float:
+    """Mean delay of zero-vibration shapers for the two lowest modes [s]."""
+    later = np.exp(-np.pi * zeta[:2] / np.sqrt(1.0 - zeta[:2] ** 2))
+    return float(np.sum(later / (1.0 + later) / (2.0 * f_d[:2])))
 
 
 def _brief(mean_delay: float, residual: float, third: float, name: str, slower: float) -> ShortDesign:
@@ -95,6 +101,15 @@ OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
     }
 )
 """What distinguishes the filters that are no shapers of the catalogue, by name."""
+USES: Mapping[str, str] = MappingProxyType(
+    {
+        "elastic-auto": "the least vibration, also with an inexact model",
+        "elastic": "the least delay, with a calibration that fits",
+        AIMED: "moves to a known target, by drives that take no torques",
+        "auto": "streams and whatever has no known end, by drives that take no torques",
+    }
+)
+"""For what each of these is the one to take, by measurement: docs/how-to/evaluate-a-shaper.md has the figures."""
 
 PERIOD = 0.002
 """Tick of every filter that is created by name [s]."""
@@ -186,8 +201,9 @@ class Registry:
             return SmoothingFilter(name, weights, estimator, joints=joints, feed_forward=feed_forward)
         if name in DESIGNS:
             kind = _KINDS.get(name, SteadyFilter)
-            f_d, zeta = (values[:2] for values in estimator.settle(np.zeros(joints)))
-            slower = max(1.0, SLOW / estimator.f_d_min, mean_delay(f_d, zeta) / LIGHT)
+            slower = max(
+                1.0, SLOW / estimator.f_d_min, _mean_delay(*estimator.settle(np.zeros(joints))) / LIGHT
+            )
             return kind(DESIGNS[name](slower), estimator, joints=joints, feed_forward=feed_forward)
         shaper = self.own[name] if name in self.own else SHAPERS[name]
         if isinstance(shaper, FirShaper):
