@@ -76,7 +76,6 @@ class AimedFilter(SteadyFilter):
     behaves like a `SteadyFilter`.
     """
 
-    design: TargetDesign
     spared = 0.0
     _aimed = False
 
