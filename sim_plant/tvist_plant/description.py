@@ -86,7 +86,7 @@ def _check_imperfections(description: RobotDescription, source: str | Path) -> N
     Raises:
         RobotFileError: A key is unknown, or a value wrong; the message names the file and the key.
     """
-    from tvist_plant.imperfections import Imperfections  # which is made of descriptions itself
+    from tvist_plant.imperfections import Imperfections  # pinocchio is slow to import
 
     table = {"imperfections": description.imperfections}
     try:

@@ -21,8 +21,8 @@ import msgspec
 import numpy as np
 import pinocchio as pin
 
-from tvist_plant.description import RobotDescription
 from tvist_plant.model import FLANGE, FlexibleModel, Floats
+from tvist_plant.robot_tables import RobotDescription
 
 
 @dataclass(frozen=True)
