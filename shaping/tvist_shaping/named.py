@@ -6,7 +6,10 @@ from difflib import get_close_matches
 from types import MappingProxyType
 from typing import TypeAlias
 
-from tvist_shaping.aimed import AimedFilter, PlannedFilter
+import numpy as np
+
+from tvist_shaping._types import Floats
+from tvist_shaping.aimed import AimedFilter, PlannedFilter, TargetDesign
 from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.catalogue import SHAPERS
 from tvist_shaping.errors import DesignError, UnknownShaperError
@@ -26,9 +29,19 @@ SLOW = 5.5
 """Lower bound of an arm's frequencies [Hz] below which the designs with constant mean delay become longer: their times
 grow as the longest period.
 """
+LIGHT = 0.040
+"""Mean delay of zero-vibration shapers for the two lowest modes at q = 0 [s] above which they grow as well: the less an
+arm is damped, the later its weights have to be.
+"""
 
 
-def _brief(mean_delay: float, residual: float, third: float, name: str, slower: float) -> Design:
+def _mean_delay(f_d: Floats, zeta: Floats) -> float:
+    """Mean delay of zero-vibration shapers for the two lowest modes [s]."""
+    later = np.exp(-np.pi * zeta[:2] / np.sqrt(1.0 - zeta[:2] ** 2))
+    return float(np.sum(later / (1.0 + later) / (2.0 * f_d[:2])))
+
+
+def _brief(mean_delay: float, residual: float, third: float, name: str, slower: float) -> ShortDesign:
     wanted = FirDesign(
         residual=(residual, residual, third, 0.2), shortest=0.05 * slower, longest=0.15 * slower
     )
@@ -44,7 +57,7 @@ def _short(slower: float) -> Design:
 
 
 def _auto_target(slower: float) -> Design:
-    return _brief(0.026, 0.035, 0.06, AIMED, slower)
+    return TargetDesign(_brief(0.026, 0.035, 0.06, AIMED, slower), slower)
 
 
 def _elastic_auto(slower: float) -> Design:
@@ -52,7 +65,7 @@ def _elastic_auto(slower: float) -> Design:
 
 
 def _planned(slower: float) -> Design:
-    return _brief(0.026, 0.035, 0.06, PLANNED, slower)
+    return TargetDesign(_brief(0.026, 0.035, 0.06, PLANNED, slower), slower)
 
 
 AIMED, PLANNED, ELASTIC_AUTO = "auto-target", "planned", "elastic-auto"
@@ -87,7 +100,7 @@ OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
     {
         "auto": "four modes with any payload, at a constant mean delay: keeps the limits",
         "short": "like auto: shorter, leaves slightly more",
-        AIMED: "like auto, for motions with a known end: shorter",
+        AIMED: "zv for the three lowest modes at a motion's known end; like auto for other motions",
         PLANNED: "moves to a known target are planned to leave no vibration; like auto-target for other motions",
         "elastic": "smoothing alone, and feed-forward of the arm's elasticity: half the delay of auto; elastic-16 "
         "smooths over 16 ms, from 8 to 60, instead of 40",
@@ -96,6 +109,15 @@ OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
     }
 )
 """What distinguishes the filters that are no shapers of the catalogue, by name."""
+USES: Mapping[str, str] = MappingProxyType(
+    {
+        "elastic-auto": "the least vibration, also with an inexact model",
+        "elastic": "the least delay, with a calibration that fits",
+        AIMED: "moves to a known target, by drives that take no torques",
+        "auto": "streams and whatever has no known end, by drives that take no torques",
+    }
+)
+"""For what each of these is the one to take, by measurement: docs/how-to/evaluate-a-shaper.md has the figures."""
 
 PERIOD = 0.002
 """Tick of every filter that is created by name [s]."""
@@ -189,7 +211,9 @@ class Registry:
             return SmoothingFilter(name, weights, estimator, joints=joints, feed_forward=feed_forward)
         if name in DESIGNS:
             kind = _KINDS.get(name, SteadyFilter)
-            slower = max(1.0, SLOW / estimator.f_d_min)
+            slower = max(
+                1.0, SLOW / estimator.f_d_min, _mean_delay(*estimator.settle(np.zeros(joints))) / LIGHT
+            )
             return kind(DESIGNS[name](slower), estimator, joints=joints, feed_forward=feed_forward)
         shaper = self.own[name] if name in self.own else SHAPERS[name]
         if isinstance(shaper, FirShaper):

@@ -69,6 +69,10 @@ class Design(ABC):
             Whether the taps are as required; False if a delay was clipped.
         """
 
+    def at_target(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
+        """Compute the taps for the modes at the known end of a motion, for its whole length: by default, as `start`."""
+        return self.start(f_d, zeta, taps)
+
     def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:  # noqa: ARG002  unless overridden
         """See `Filter.mean_delay_of`."""
         return None

@@ -76,4 +76,31 @@ def load(robot: str | Path) -> RobotDescription:
     except msgspec.ValidationError as error:
         raise RobotFileError(f"robot file {robot}: {in_words(error, content)}") from error
     check(description, robot)
+    _check_imperfections(description, robot)
     return description
+
+
+def _check_imperfections(description: RobotDescription, source: str | Path) -> None:
+    """Check the table of imperfections by converting it.
+
+    Raises:
+        RobotFileError: A key is unknown, or a value wrong; the message names the file and the key.
+    """
+    from tvist_plant.imperfections import Imperfections  # pinocchio is slow to import
+
+    table = {"imperfections": description.imperfections}
+    try:
+        made = Imperfections.of(description)
+    except msgspec.ValidationError as error:
+        said, _, path = str(error).partition(" - at `$")
+        inner = path.rstrip("`")
+        told = in_words(msgspec.ValidationError(f"{said} - at `$.imperfections{inner}`"), table)
+        raise RobotFileError(f"robot file {source}: {told}") from error
+    known = msgspec.to_builtins(made)
+    for key, value in description.imperfections.items():
+        inner = known.get(key)
+        more = value.keys() - inner.keys() if isinstance(value, dict) and isinstance(inner, dict) else set()
+        for name in [key] * (key not in known) + [f"{key}.{one}" for one in sorted(more)]:
+            raise RobotFileError(
+                f"robot file {source}: imperfections.{name:.200} is not a key of a robot file"
+            )

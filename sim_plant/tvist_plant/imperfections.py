@@ -18,13 +18,14 @@ controller about: the world, in which the truth is given, is upright, and the ar
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
+import msgspec
 import numpy as np
 import pinocchio as pin
 
-from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, FlexibleModel, Floats, flexible_model
+from tvist_plant.robot_tables import Payload, RobotDescription
 
 TOUCH = 1e-6
 """Torque below which a gear at rest lies between the flanks of its backlash [N m]."""
@@ -68,6 +69,8 @@ class Imperfections:
     """F_s divided by F_c, at least 1 [-]."""
     stribeck_speed: float = 0.05
     """v_s, above 0 [rad/s]."""
+    rotor: float = 1.0
+    """Rotor inertia divided by the description's, above 0: no feed-forward knows of what it has more [-]."""
     hysteresis: float = 0.0
     """r: additional relative stiffness of a gear when its twist reverses, at least 0 [-]."""
     hysteresis_torque: float = 0.02
@@ -89,6 +92,7 @@ class Imperfections:
         """Check the values."""
         _check("breakaway", self.breakaway, 1.0, math.inf)
         _check("stribeck_speed", self.stribeck_speed, 0.0, math.inf, above=True)
+        _check("rotor", self.rotor, 0.0, math.inf, above=True)
         _check("hysteresis", self.hysteresis, 0.0, math.inf)
         _check("hysteresis_torque", self.hysteresis_torque, 0.0, math.inf, above=True)
         _check("soft", self.soft, 0.0, 1.0, above=True)
@@ -98,6 +102,20 @@ class Imperfections:
         for joint, width in enumerate(self.backlash):
             _check(f"backlash[{joint}]", width, 0.0, math.inf)
         _check("tilt", self.tilt, -STEEPEST, STEEPEST)
+
+    @classmethod
+    def of(cls, description: RobotDescription, more: "Imperfections | None" = None) -> "Imperfections":
+        """Return those of a robot file, with further ones that win where they differ from the defaults.
+
+        Raises:
+            msgspec.ValidationError: The file's are invalid, which its check finds first.
+        """
+        own = msgspec.convert(description.imperfections, cls)
+        if more is None:
+            return own
+        none, names = cls(), [one.name for one in fields(cls)]
+        given = {name: getattr(more, name) for name in names if getattr(more, name) != getattr(none, name)}
+        return replace(own, **given)
 
 
 @dataclass(frozen=True)

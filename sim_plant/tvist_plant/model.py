@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from tvist_plant.description import Payload, RobotDescription, Tensor
+from tvist_plant.robot_tables import Payload, RobotDescription, Tensor
 from tvist_plant.urdf_elements import rotation as rotation_of
 
 FLANGE = "flange"

@@ -152,7 +152,7 @@ def _check_provenance(description: RobotDescription, source: str | Path) -> None
     for key, origin in description.provenance.items():
         value: object = description
         for part in key.split("."):
-            value = getattr(value, part, None)
+            value = value.get(part) if isinstance(value, dict) else getattr(value, part, None)
         if value is None or key.startswith("_"):
             raise RobotFileError(f"robot file {source}: provenance.{key}: there is no such table or key")
         kind, colon, words = origin.partition(":")

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta, Struct
@@ -211,6 +211,8 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
     drives: Drives
     link_flexibility: LinkFlexibility = LinkFlexibility()
     sensors: Sensors = Sensors()
+    imperfections: dict[str, Any] = {}
+    """Fields of `imperfections.Imperfections`, which the simulated arm has and no controller knows."""
     collision: Collision = Collision()
     meshes: tuple[Mesh, ...] = ()
     poses: dict[str, tuple[Number, ...]] = {}

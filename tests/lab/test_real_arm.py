@@ -1,11 +1,11 @@
-"""A real UR5 that rings: nine seconds of a published recording, see `data/NOTICE`."""
+"""A real UR5 that rings: twenty seconds of a published recording, see `data/NOTICE`."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tvist_lab.metrics import Measured
+from tvist_lab.metrics import Measured, NotMeasurableError, predicted
 from tvist_lab.recordings import read
 
 RECORDED = Path(__file__).parent / "data" / "ur5_that_rings.csv.gz"
@@ -50,3 +50,18 @@ def test_its_modes_are_listed_the_strongest_first():
     for result in Measured.of(read(RECORDED)).results:
         assert 1 <= len(result.modes) <= 3
         assert result.modes[0]["f_d_hz"] == result.f_d_hz
+
+
+def test_two_modes_of_other_repetitions_predict_that_a_fifth_of_a_real_arms_ringing_is_left(measured):
+    """Each stop by the modes of the other one at its pose; what one mode leaves is twice that."""
+    found = Measured.of(read(RECORDED.with_name("ur5_that_stops_again.csv.gz")))
+    one, two = np.array([[each.left_percent for each in predicted(found, place)] for place in range(4)]).T
+    measured("one mode leaves [%]", np.median(one))
+    measured("two modes leave [%]", np.median(two))
+    assert np.all((one > 22.0) & (one < 50.0))
+    assert np.median(two) <= 20.0
+
+
+def test_a_stop_without_repetition_is_not_predicted():
+    with pytest.raises(NotMeasurableError, match="no repetition of this motion"):
+        predicted(Measured.of(read(RECORDED)), 0)

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import out, progress, table, typed, words
+from tvist_cli.output import out, progress, say, table, typed, words
 from tvist_cli.studying import Places, check_range, check_seed, give, show
 
 if TYPE_CHECKING:
@@ -69,18 +69,23 @@ def _measured(
         return []
     calibration = next((one for one in map(load, known["calibrations"]) if one.modal is not None), None)
     factors = [1.0, *([1.0 - 0.01 * vary, 1.0 + 0.01 * vary] if vary else [])]
-    with told(IdentificationError), progress(len(factors) * moves, f"moves of {name}") as bar:
-        return [
-            measure(
-                description,
-                calibration if factor == 1.0 else None,
-                stiffness=factor,
-                moves=moves,
-                seed=seed,
-                progress=lambda made: bar(made, None),
-            )
-            for factor in factors
-        ]
+    found = []
+    with progress(len(factors) * moves, f"moves of {name}") as bar:
+        for factor in factors:
+            try:
+                found.append(
+                    measure(
+                        description,
+                        calibration if factor == 1.0 else None,
+                        stiffness=factor,
+                        moves=moves,
+                        seed=seed,
+                        progress=lambda made: bar(made, None),
+                    )
+                )
+            except IdentificationError as error:
+                say(f"{name} with springs times {factor:g} is left out: {error}")
+    return found
 
 
 def _print(listed: list[dict[str, Any]], *, in_full: bool) -> None:

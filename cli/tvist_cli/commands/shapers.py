@@ -66,7 +66,7 @@ def shapers(
         print_sensitivity(sensitivity, zeta, errors, places, json=json)
         return
     from tvist_shaping import BUILT_IN, SHAPERS, Registry, ShapingError
-    from tvist_shaping.named import OF_SEVERAL_MODES
+    from tvist_shaping.named import OF_SEVERAL_MODES, USES
 
     with told(ShapingError, code=2):
         SHAPERS["none"].function(f_d, zeta)
@@ -76,6 +76,7 @@ def shapers(
         {
             "name": name,
             "description": description,
+            "use": USES.get(name),
             "modes": BUILT_IN.modes_of(name),
             "feed_forward": BUILT_IN.feed_forward_of(name),
         }
@@ -126,6 +127,8 @@ def _list(entries: list[dict[str, Any]]) -> None:
     width = max(len(one["name"]) for one in entries)
     for one in entries:
         out.print(f"{one['name']:{width}}  {one['description']}", markup=False)
+        if use := one.get("use"):
+            out.print(f"{'':{width}}  take it for {use}", markup=False)
 
 
 def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:

@@ -18,8 +18,12 @@ STEPS = 5000
 """Largest number of steps for which each is a tick; longer motions have longer steps."""
 LONGER = 0.3
 """Largest time by which a motion is made longer [s]."""
-SPREAD = ((0.0, 0.8), (0.03, 0.42), (-0.03, 0.42))
-"""Errors of all frequencies that are expected, and their weights, whose squares sum to 1 [-]."""
+SPREAD = ((0.0, 0.8), (0.1, 0.42), (-0.1, 0.42))
+"""Errors of all frequencies that are expected, and their weights, whose squares sum to 1 [-].
+
+Against 3 %, 10 % make a move of the UR5e 10 ms longer, and reduce its vibration by 91 % instead of 77 % (median) if its
+springs are 30 % softer than known.
+"""
 ROUNDS = 1
 """Number of times that the model is linearised about the motion that was found."""
 REACHED = 1e-4

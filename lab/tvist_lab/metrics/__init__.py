@@ -15,6 +15,7 @@ from tvist_lab.metrics.comparison import ComparedMotion, Comparison, compare
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.pairing import Pair, pairs
+from tvist_lab.metrics.predicted import Predicted, predicted
 from tvist_lab.metrics.residual import Residual, residual
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
 from tvist_lab.metrics.settling import Settling, attained_position, distance, settling
@@ -40,6 +41,7 @@ __all__ = [
     "MotionRows",
     "NotMeasurableError",
     "Pair",
+    "Predicted",
     "Residual",
     "RingDown",
     "Runs",
@@ -62,6 +64,7 @@ __all__ = [
     "peak_acceleration",
     "peak_after_stop",
     "peak_velocity",
+    "predicted",
     "residual",
     "rigid_acceleration",
     "settling",

@@ -9,7 +9,7 @@ from tvist_cli.output import out, print_json, progress, say, table
 
 if TYPE_CHECKING:
     from tvist_lab.figures import FigureFiles
-    from tvist_lab.metrics import MotionRows
+    from tvist_lab.metrics import Measured, MotionRows, Predicted
     from tvist_lab.recordings import Recording
 
 
@@ -19,6 +19,7 @@ def analyze(
     figures: Path | None = None,
     look: FigureOptions = AS_USUAL,
     columns: str | None = None,
+    predict: bool = False,
     json: bool = False,
 ) -> None:
     """Measure each motion of a recording or a robot's log, and print the columns of the paper's Table 2.
@@ -32,10 +33,11 @@ def analyze(
         look: How to write the figures.
         columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
             after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
+        predict: Predict from repetitions of the same motion what zv for one and for two modes would leave of each.
         json: Print one JSON object.
     """
     look.check(figures)
-    from tvist_lab.metrics import COLUMNS, grouped_notes, measure, motion_cells, motions
+    from tvist_lab.metrics import COLUMNS, Measured, grouped_notes, measure, motion_cells, motions
     from tvist_lab.recordings import RecordingError, read
     from tvist_lab.words import counted
 
@@ -51,12 +53,15 @@ def analyze(
         say(f"{file}: {note}")
     if figures is not None:
         _draw(recording, found, look.into(figures))
+    forecasts = _forecasts(Measured(recording, found, results)) if predict else []
     if json:
+        predicted = {"predicted": [[one._asdict() for one in each] for each in forecasts]} if predict else {}
         print_json(
             {
                 "file": str(file),
                 "motions": [result.as_dict() for result in results],
                 "notes": list(recording.notes),
+                **predicted,
             }
         )
         return
@@ -69,6 +74,28 @@ def analyze(
     table(f"{file}: {counted(len(results), 'motion')}{since}", tuple(COLUMNS), rows)
     for note in grouped_notes(results):
         out.print(note, markup=False)
+    if predict:
+        heads = ("motion", "modes Hz", "leaves % rms", "of the peak %")
+        cells = [
+            (str(place), ", ".join(f"{f_d:.1f}" for f_d in one.f_d_hz), f"{one.left_percent:.0f}",
+             f"{one.peak_percent:.0f}")
+            for place, each in enumerate(forecasts, 1) for one in each
+        ]  # fmt: skip
+        table("what zv would leave, by repetitions", heads, cells)
+
+
+def _forecasts(measured: "Measured") -> "list[tuple[Predicted, ...]]":
+    """Predict what shapers would leave of each motion; empty, with a line on stderr, where that cannot be told."""
+    from tvist_lab.metrics import NotMeasurableError, predicted
+
+    found: list[tuple[Predicted, ...]] = []
+    for place in range(len(measured.motions)):
+        try:
+            found.append(predicted(measured, place))
+        except NotMeasurableError as error:
+            say(f"motion {place + 1}: no prediction: {error}")
+            found.append(())
+    return found
 
 
 def _draw(recording: "Recording", found: "list[MotionRows]", files: "FigureFiles") -> None:
