@@ -121,7 +121,9 @@ class Controller(WholeRobot):
         self.programs = ProgramPlayer(self._access(guidance), safety)
         self._told_program = self.programs.progress
         self.filters = Filters(self.motion, first.source, setup.payload, self._emit)
-        self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
+        self._payload = DeclaredPayload(
+            setup.payload, self.motion, self.filters, self._emit, follows=setup.adapt == "payload"
+        )
         parts = (
             self._authority, MotionCommands(self.motion, safety, self.programs),
             GuidedCommands(guidance, self.programs), self.filters, self._payload, self.peripherals,
@@ -310,6 +312,7 @@ class Controller(WholeRobot):
             self.motion.motions.wanted_speed,
             self.programs,
             self.forces.wrench() if wrench else None,
+            None if self._payload.assumed == self.declared else self._payload.assumed,
         )
 
     def changed_io(self) -> Io | None:
@@ -391,15 +394,17 @@ class Controller(WholeRobot):
 
     def learn(self, lesson: Lesson) -> None:
         """Take a lesson at rest, which changes how it moves from now on."""
-        self._assume(lesson.payload, lesson.why)
+        self._assume(lesson.payload, lesson.why, beyond=lesson.beyond)
+        self.peripherals.changed = True
 
     def forget(self, call: Call[Forget]) -> None:  # noqa: ARG002  there is one thing to forget
         """Assume what was declared again."""
         if self._payload.assumed != self.declared:
             self._assume(self.declared, f"the declared {self.declared.mass:g} kg are assumed again")
 
-    def _assume(self, payload: Payload, why: str) -> None:
-        self._payload.learn(payload, self._planner.filters.with_payload(payload, self.filters.basis), why)
+    def _assume(self, payload: Payload, why: str, *, beyond: bool = False) -> None:
+        tvist = self._planner.filters.with_payload(payload, self.filters.basis)
+        self._payload.learn(payload, tvist, why, beyond=beyond)
 
     # ------------------------------------------------------------------ commands that concern the whole robot
 

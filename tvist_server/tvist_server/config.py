@@ -9,7 +9,7 @@ from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from tvist_controller.cell.description import Cell, as_declared
-from tvist_controller.setup import Setup, check_rating, paper_payload
+from tvist_controller.setup import Adapt, Setup, check_rating, paper_payload
 from tvist_controller.sources.own_plants import load_plant
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
@@ -88,6 +88,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     plant: str | None = None
     """The arm to move: FILE.py:NAME, which runs that file, or the name of an installed plant, such as mujoco [the
     simulated flexible arm of the robot file]. NAME takes a RobotDescription and a Payload, and makes a plant."""
+    adapt: Adapt | None = None
+    """payload: after each motion the robot finds from its torques what it carries, and moves as an arm that carries it,
+    instead of what is declared; tvist forget undoes that [nothing]."""
     calibration: str | None = None
     """Name of a calibration that comes with the package, or path of a calibration file; none for a robot that is yet to
     be identified [the one that comes with the package for this robot]."""
@@ -295,6 +298,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 truth=self.truth,
                 compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
                 shape_servo=self.shape_servo,
+                adapt=self.adapt,
                 plant=None if self.plant is None else load_plant(self.plant),
             )
             setup = shaped_by(setup, _either(self.shaper, profile.shaper))

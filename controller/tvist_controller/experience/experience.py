@@ -1,6 +1,6 @@
 """Records the motions of a robot, has them studied, and keeps the lessons until the arm rests."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from tvist_controller.experience.lesson import Later, Student, Work
 from tvist_controller.experience.motion_record import Beliefs, MotionRecorder
@@ -26,7 +26,7 @@ class Experience:
     def __init__(self, joints: int, students: Sequence[Student], later: Later = at_once) -> None:
         self._recorder = MotionRecorder(joints)
         self._students, self._later = students, later
-        self._under_way: list[tuple[Callable[[], bool], list[Lesson]]] = []
+        self._under_way: list[tuple[Beliefs, Callable[[], bool], list[Lesson]]] = []
         self._raised: list[Exception] = []
 
     def watch(self, sample: Sample, beliefs: Callable[[], Beliefs], *, held: bool) -> None:
@@ -57,16 +57,16 @@ class Experience:
                 if lesson is not None:
                     learnt.append(lesson)
 
-            self._under_way.append((self._later(study), learnt))
+            self._under_way.append((motion.beliefs, self._later(study), learnt))
 
-    def lessons(self) -> Sequence[Lesson]:
-        """Return the lessons of all finished studies, once; to be asked while the arm rests."""
-        if not self._under_way:
-            return ()
-        found: list[Lesson] = []
-        while self._under_way and self._under_way[0][0]():
-            found += self._under_way.pop(0)[1]
-        return found
+    def lessons(self) -> Iterator[tuple[Beliefs, Lesson]]:
+        """Yield the lessons of all finished studies, once, each with what was believed during its motion.
+
+        To be asked while the arm rests.
+        """
+        while self._under_way and self._under_way[0][1]():
+            beliefs, _, learnt = self._under_way.pop(0)
+            yield from ((beliefs, lesson) for lesson in learnt)
 
     def raised(self) -> Sequence[Exception]:
         """Return what studies have raised, once."""

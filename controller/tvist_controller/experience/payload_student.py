@@ -14,12 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from tvist_controller._compiled import compiled
 from tvist_controller.experience.motion_record import MotionRecord
 from tvist_controller.line.differentiator import Floats
 from tvist_plant.chain import BODY, SCRATCH, chain_of, torques
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
-from tvist_plant.model import FLANGE, carries_weight, rigid_model
+from tvist_plant.model import FLANGE, rigid_model
 from tvist_plant.plant import GRAVITY, PERIOD
 from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.values import Payload
@@ -49,15 +50,15 @@ CENTRE = 0.05
 """Deviation of an unknown payload's centre of mass from the robot file's, along each axis [m]."""
 FARTHEST = 0.3
 """Largest distance of a centre of mass from the flange along each axis that is believed [m]."""
-DECLARED = (0.05, 0.01)
+DECLARED = (0.1, 0.01)
 """Deviation of what is declared, in mass [kg] and centre of mass [m]."""
-DRIFT = (0.1, 0.01)
+DRIFT = (0.15, 0.01)
 """The same of what may have become of it since the last motion."""
 LIGHT = 0.25
 """Mass below which nothing is said of the centre of mass [kg]."""
 DEAD = 0.25
 """Smallest change of mass that is taught [kg]."""
-SURE = 3.5
+SURE = 2.5
 """Number of standard deviations by which a payload has changed for sure [-]."""
 VAGUE = 0.35
 """Deviation of the mass above which a motion teaches nothing [kg]."""
@@ -80,6 +81,13 @@ class Estimate:
         return float(np.sqrt(self.covariance[0, 0]))
 
 
+@compiled
+def along(chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Floats, out: Floats) -> None:
+    """Compute the torques of a chain in N states, each of shape (N, n); see `tvist_plant.chain.torques`."""
+    for row in range(len(q)):
+        torques(chain, q[row], qd[row], qdd[row], GRAVITY, scratch, out[row])
+
+
 class PayloadStudent:
     """Follows the payload from motion to motion; see `tvist_controller.experience.lesson.Student`.
 
@@ -87,18 +95,10 @@ class PayloadStudent:
     does; else the payload has changed, and what was known is void.
 
     Args:
-        description: The robot.
-
-    Raises:
-        ValueError: No joint of the robot carries weight.
+        description: The robot, of which a joint carries weight.
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        if not carries_weight(description):
-            raise ValueError(
-                f"adapt is payload, but no joint of a {description.robot.model} carries weight, so its torques say too "
-                "little of it: declare it"
-            )
         self._arm = _Arm(description)
         self._own, self._rated = description.payload, description.limits.payload
         self._known: Estimate | None = None
@@ -247,8 +247,7 @@ class _Arm:
         chain, out = self._chain.copy(), np.empty_like(q)
         chain[:, BODY:] = 0.0
         chain[link, BODY:] = body
-        for row in range(len(q)):
-            torques(chain, q[row], qd[row], qdd[row], GRAVITY, self._scratch, out[row])
+        along(chain, q, qd, qdd, self._scratch, out)
         return out
 
 
