@@ -121,7 +121,7 @@ class PayloadStudent:
         now = Estimate(known.x, known.covariance + _independent(known.x, *DRIFT).covariance)
         changed = abs(alone.x[0] - known.x[0]) > SURE * np.hypot(alone.deviation, now.deviation)
         found = alone if changed else equations.solve(now)
-        if found is None:
+        if found is None or found.x[0] < -SURE * found.deviation - DEAD:  # something holds the arm up
             return None
         self._known = found
         return self._lesson(believed, found)
