@@ -18,13 +18,12 @@ class Experience:
     """What a robot makes of its motions.
 
     Args:
-        joints: Number of joints.
         students: Who studies each motion, in this order.
         later: Has a study made beside the ticks.
     """
 
-    def __init__(self, joints: int, students: Sequence[Student], later: Later = at_once) -> None:
-        self._recorder = MotionRecorder(joints)
+    def __init__(self, students: Sequence[Student], later: Later = at_once) -> None:
+        self._recorder = MotionRecorder()
         self._students, self._later = students, later
         self._under_way: list[tuple[Beliefs, Callable[[], bool], list[Lesson]]] = []
         self._raised: list[Exception] = []
@@ -50,7 +49,7 @@ class Experience:
 
             def study(student: Student = student, learnt: list[Lesson] = learnt) -> None:
                 try:
-                    lesson = student.study(motion)
+                    lesson = student.study(motion.record)
                 except Exception as error:  # noqa: BLE001  a robot goes on without the lesson, and says so
                     self._raised.append(error)
                     return

@@ -20,4 +20,4 @@ def experience_of(
     """
     own = [PayloadStudent(setup.description)] if setup.adapt == "payload" else []
     everyone = [*own, *students]
-    return Experience(setup.description.joints, everyone, later) if everyone else None
+    return Experience(everyone, later) if everyone else None
