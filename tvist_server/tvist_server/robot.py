@@ -7,7 +7,6 @@ from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.dispatch.planner import Planner
-from tvist_controller.experience.experience import at_once
 from tvist_controller.experience.lesson import Student
 from tvist_controller.experience.own_students import experience_of
 from tvist_controller.host import Host
@@ -96,8 +95,13 @@ class ServedRobot:
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
         """Gateway for the sockets of programs."""
         self._studies = Studies() if self._realtime and (students or setup.adapt) else None
-        later = at_once if self._studies is None else self._studies.later
-        experience = experience_of(setup, students, later)
+        if self._studies is None:
+            experience = experience_of(setup, students)
+        else:
+            planner = Planner(setup)  # used by the studies' thread alone
+            experience = experience_of(
+                setup, students, self._studies.later, lambda lesson, on: planner.for_lesson(lesson, on.basis)
+            )
         self._host = Host(
             self.controller, *sinks, black_box, self._publisher, ports=self.sockets, experience=experience
         )

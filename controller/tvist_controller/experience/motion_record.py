@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +30,8 @@ class Beliefs:
     """Calibration of the filter's modes; None for constant modes."""
     shaper: str
     """Name of the filter."""
+    basis: Any = None
+    """State that plans for lessons depend on; what it is matters to those who make them alone."""
 
 
 @dataclass(frozen=True)

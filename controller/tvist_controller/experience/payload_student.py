@@ -46,19 +46,21 @@ FRICTION = ("friction", "friction's width", "viscous friction", "standing")
 """What of it is friction."""
 NOISE = (0.08, 0.001)
 """Noise of a mean, as a share of the joint's Coulomb friction, plus one of its torque limit [-]."""
+STICKING = 0.3
+"""Share of the Coulomb friction that is noise where a joint moves so slowly that its sign is not sure [-]."""
 CENTRE = 0.05
 """Deviation of an unknown payload's centre of mass from the robot file's, along each axis [m]."""
 FARTHEST = 0.3
 """Largest distance of a centre of mass from the flange along each axis that is believed [m]."""
 DECLARED = (0.1, 0.01)
 """Deviation of what is declared, in mass [kg] and centre of mass [m]."""
-DRIFT = (0.15, 0.01)
+DRIFT = (0.2, 0.01)
 """The same of what may have become of it since the last motion."""
 LIGHT = 0.25
 """Mass below which nothing is said of the centre of mass [kg]."""
 DEAD = 0.25
 """Smallest change of mass that is taught [kg]."""
-SURE = 2.5
+SURE = 2.0
 """Number of standard deviations by which a payload has changed for sure [-]."""
 VAGUE = 0.35
 """Deviation of the mass above which a motion teaches nothing [kg]."""
@@ -227,7 +229,8 @@ class _Arm:
         own["rotor"] = self._rotors * qdd
         columns = [column for values in own.values() for column in _each(values)] + links
         others = [UNKNOWN[name] for name in [*own, "link", "sensor"] for _ in links]
-        weight = np.ones_like(measured) / self._noise
+        slow = np.zeros_like(qd) if self._linear else np.exp(-np.square(qd / self._width))
+        weight = 1.0 / np.hypot(self._noise, STICKING * self._friction * slow)
         weight[[0, -1]] = 0.0  # their accelerations are differences to one side
         rows = np.stack([per_kg, *(side / 0.01 for side in sides), *columns], axis=-1)
         bare = np.sum(links, axis=0) + own["rotor"] + own["friction"]

@@ -79,6 +79,11 @@ class DeclaredPayload:
         self.payload = payload
         self._assume(payload, tvist, max(round(call.command.transition_time / PERIOD), SLEW))
 
+    def forget(self, tvist: Filter | None) -> None:
+        """Assume the declared payload again; `tvist` is the filter for it."""
+        self._motion.ahead.check_payload(body(self.payload), tvist)
+        self.learn(self.payload, tvist, f"the declared {self.payload.mass:g} kg are assumed again")
+
     def learn(self, payload: Payload, tvist: Filter | None, why: str, *, beyond: bool = False) -> None:
         """Assume a payload, found or declared, in dynamics and modes only.
 
@@ -96,8 +101,9 @@ class DeclaredPayload:
     def _assume(self, payload: Payload, tvist: Filter | None, ticks: int, *, beyond: bool = False) -> None:
         self.assumed, carried = payload, body(payload)
         self._motion.cycle.line.dynamics.declare(carried, ticks)
-        self._filters.declare(payload, tvist)
-        self._monitor.declare(carried, found=payload is not self.payload, told=beyond)
+        found = payload is not self.payload
+        self._filters.declare(payload, tvist, found=found)
+        self._monitor.declare(carried, found=found, told=beyond)
         self._held = False
 
     rows: ClassVar[tuple[Row, ...]] = (
