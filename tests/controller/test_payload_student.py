@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from tests.controller.test_experience import Q1, Q2, ROBOT, Served
 
 from tvist_controller.calibrations import load
+from tvist_controller.experience.experience import Taught
 from tvist_controller.experience.motion_record import Beliefs, MotionRecord
 from tvist_controller.experience.payload_student import DEAD, PayloadStudent
 from tvist_controller.safety import payload_monitor
@@ -147,7 +148,7 @@ def test_what_is_declared_anew_counts_and_a_lesson_from_before_is_void():
     late.move(Q2)
     lesson = student.study(slow.motions[0])
     experience = late.host._host._experience
-    experience._under_way.append((slow.motions[0].beliefs, lambda: True, [lesson]))
+    experience._under_way.append((lambda: True, [Taught(slow.motions[0].beliefs, lesson, None)]))
     late.ask(SetPayload(token=late.token, mass=anew.mass, com=anew.com, inertia=anew.inertia))
     late.tick(5)
     assert late.assumed == anew
