@@ -21,7 +21,7 @@ def judged(cases, how, first):
 
 def test_one_motion_tells_a_payload_and_an_unchanged_one_is_left_alone():
     judged(4, CASES["friction"], first=100)
-    assert [unchanged(seed, 8, masses=0.03)[0] for seed in range(100, 104)] == [0] * 4
+    assert [unchanged(seed, 2, masses=0.03)[0] for seed in range(100, 104)] == [0] * 4
 
 
 @pytest.mark.nightly
@@ -37,6 +37,6 @@ def test_one_motion_brings_nine_in_ten_within_two_points_of_the_known_payload(na
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", CASES)
 def test_of_thousands_of_unchanged_motions_none_in_a_thousand_teaches(name):
-    told, found = zip(*(unchanged(SEED + seed, 30, **CASES[name]) for seed in range(60)), strict=True)
+    told, found = zip(*(unchanged(SEED + seed, 5, **CASES[name]) for seed in range(60)), strict=True)
     assert sum(told) <= 1
     assert np.abs(np.concatenate(found)).max() < LARGEST_OFF
