@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncIterator, Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from tvist_client.errors import (
     AnswerTimeoutError,
@@ -21,6 +21,7 @@ from tvist_client.terminals import Terminals
 from tvist_client.transports.base import Transport
 from tvist_client.values import JointRange, floats, number, pose_of, whole
 from tvist_protocol.commands import (
+    Forget,
     HandOver,
     KeepAlive,
     Pause,
@@ -253,6 +254,13 @@ class Arm(Moves, Guiding, Terminals, Simulation):
         await self.robot.request(
             SetPayload(token=self.token, mass=believed.mass, com=believed.com, inertia=believed.inertia)
         )
+
+    async def forget(self, what: Literal["payload"]) -> None:
+        """Undo what the robot has learnt from its motions: the payload that it assumes instead of the declared one.
+
+        A robot served with `--adapt payload` finds it anew in its next motions.
+        """
+        await self.robot.request(Forget(token=self.token, what=what))
 
     async def set_tcp(self, offset: Iterable[float]) -> None:
         """Set the tool centre point.

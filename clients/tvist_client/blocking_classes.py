@@ -5,7 +5,7 @@ Made by `python -m tools.blocking` from the classes of the client with `await`: 
 
 import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from tvist_client import arm, motion, robot, servo, stepper
 from tvist_client.blocking_stream import Stream
@@ -284,6 +284,13 @@ class Arm:
             inertia: xx xy xz yy yz zz about the centre of mass, flange axes [kg m²].
         """
         self._portal.call(lambda: self._arm.set_payload(mass, com, inertia))
+
+    def forget(self, what: Literal["payload"]) -> None:
+        """Undo what the robot has learnt from its motions: the payload that it assumes instead of the declared one.
+
+        A robot served with `--adapt payload` finds it anew in its next motions.
+        """
+        self._portal.call(lambda: self._arm.forget(what))
 
     def set_tcp(self, offset: Iterable[float]) -> None:
         """Set the tool centre point.

@@ -121,7 +121,9 @@ class Controller(WholeRobot):
         self.programs = ProgramPlayer(self._access(guidance), safety)
         self._told_program = self.programs.progress
         self.filters = Filters(self.motion, first.source, setup.payload, self._emit)
-        self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
+        self._payload = DeclaredPayload(
+            setup.payload, self.motion, self.filters, self._emit, follows=setup.adapt == "payload"
+        )
         parts = (
             self._authority, MotionCommands(self.motion, safety, self.programs),
             GuidedCommands(guidance, self.programs), self.filters, self._payload, self.peripherals,
@@ -310,6 +312,7 @@ class Controller(WholeRobot):
             self.motion.motions.wanted_speed,
             self.programs,
             self.forces.wrench() if wrench else None,
+            None if self._payload.assumed == self.declared else self._payload.assumed,
         )
 
     def changed_io(self) -> Io | None:
@@ -387,19 +390,29 @@ class Controller(WholeRobot):
     def beliefs(self) -> Beliefs:
         """Return what it takes the arm for."""
         basis = self.filters.basis
-        return Beliefs(self._payload.assumed, basis.source.calibration, basis.name)
+        return Beliefs(self._payload.assumed, basis.source.calibration, basis.name, basis)
 
-    def learn(self, lesson: Lesson) -> None:
-        """Take a lesson at rest, which changes how it moves from now on."""
-        self._assume(lesson.payload, lesson.why)
+    def learn(self, lesson: Lesson, plan: Plan | None = None) -> None:
+        """Take a lesson at rest, which changes how it moves from now on.
 
-    def forget(self, call: Call[Forget]) -> None:  # noqa: ARG002  there is one thing to forget
+        Args:
+            lesson: The lesson.
+            plan: Plan for it, if it was made beforehand; it is used if it still holds.
+        """
+        on = self.filters.basis
+        if plan is None or plan.basis != on:
+            plan = self._planner.for_lesson(lesson, on)
+        found: Any = plan.found
+        if isinstance(found, RefusalError):
+            self._emit("warning", why=f"{lesson.why}; it is not assumed: {found.reply.why}")
+            return
+        self._payload.learn(lesson.payload, found, lesson.why, beyond=lesson.beyond)
+        self.peripherals.changed = True
+
+    def forget(self, call: Call[Forget]) -> None:
         """Assume what was declared again."""
         if self._payload.assumed != self.declared:
-            self._assume(self.declared, f"the declared {self.declared.mass:g} kg are assumed again")
-
-    def _assume(self, payload: Payload, why: str) -> None:
-        self._payload.learn(payload, self._planner.filters.with_payload(payload, self.filters.basis), why)
+            self._payload.forget(call.planned())
 
     # ------------------------------------------------------------------ commands that concern the whole robot
 

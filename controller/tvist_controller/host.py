@@ -147,9 +147,11 @@ class Host:
         self.tell_raised()
 
     def _learn(self, experience: Experience) -> None:
-        for lesson in experience.lessons():
+        for beliefs, lesson, plan in experience.lessons():
+            if beliefs.payload != self.controller.beliefs().payload:
+                continue  # it is void: another payload was declared, learnt or forgotten since
             self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
-            self.controller.learn(lesson)
+            self.controller.learn(lesson, plan)
         for error in experience.raised():
             for sink in self._sinks:
                 sink.raised(error)

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 
 from tvist_controller.controller import Controller
-from tvist_controller.experience.experience import Experience
 from tvist_controller.experience.lesson import Student
+from tvist_controller.experience.own_students import experience_of
 from tvist_controller.host import Host
 from tvist_controller.reporting.report import Report
 from tvist_controller.reporting.sink import Sink, Topic
@@ -22,7 +22,7 @@ class LoopbackHost(Sink):
     Args:
         setup: Initial setup; its clock should be `free` or `lockstep`.
         plant: Plant to control; None for the flexible arm of the setup.
-        students: Who studies the robot's motions.
+        students: Who studies the robot's motions, besides those that the setup asks for.
 
     Raises:
         ValueError: The setup is invalid, or the plant does not fit it.
@@ -32,8 +32,7 @@ class LoopbackHost(Sink):
         self.controller = Controller(setup, plant)
         self.entries: list[Entry] = []
         """Inputs of the controller; together with the setup, all that a replay needs."""
-        experience = Experience(setup.description.joints, students) if students else None
-        self._host = Host(self.controller, self, experience=experience)
+        self._host = Host(self.controller, self, experience=experience_of(setup, students))
         self._callbacks: dict[Topic, list[Callable[[bytes], object]]] = {}
 
     def request(self, client: str, data: bytes) -> bytes:  # noqa: ARG002  the network does not name its clients either

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -16,6 +16,7 @@ from tvist_controller.sources.own_shapers import OwnShaper
 from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
+from tvist_plant.model import carries_weight
 from tvist_plant.plant import Placeable, Plant
 from tvist_plant.plant_checks import measured_standing
 from tvist_plant.variants import hidden_variant
@@ -26,6 +27,9 @@ from tvist_protocol.info import Clock
 from tvist_protocol.values import Payload, ResetMode
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.named import Registry
+
+Adapt = Literal["payload"]
+"""What can follow a robot's own motions."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,8 @@ class Setup:
     """Whether `servoj`, `speedj` and `speedl` of programs are shaped where they begin at rest."""
     cell: Cell | None = None
     """What stands around the robot; None for nothing."""
+    adapt: Adapt | None = None
+    """What follows the arm's own motions: its payload; None for nothing."""
     instance: str = ""
     """Part of every lease's token that tells this run from earlier ones; empty where equal runs must be equal."""
 
@@ -103,6 +109,11 @@ class Setup:
             given = "truth is on" if self.truth else "a plant is given"
             raise ValueError(f"hidden is {self.hidden}, but {given}: leave one of them out")
         self.registry.check(self.shaper)
+        if self.adapt == "payload" and not carries_weight(self.description):
+            raise ValueError(
+                f"adapt is payload, but no joint of a {self.description.robot.model} carries weight, so its torques do "
+                "not tell it: leave adapt out, and declare the payload"
+            )
         if self.cell is not None:
             self.cell.check()
 
@@ -157,6 +168,7 @@ class Setup:
             **({} if self.plant is None else {"plant": msgspec.to_builtins(self.plant.recorded)}),
             **({} if self.hidden is None else {"hidden": self.hidden}),
             **({"instance": self.instance} if self.instance else {}),
+            **({} if self.adapt is None else {"adapt": self.adapt}),
         }
 
     @classmethod
@@ -186,6 +198,7 @@ class Setup:
                     own_shapers=tuple(own_shapers),
                     plant=plant,
                     cell=checked(content["cell"], Cell) if "cell" in content else None,
+                    adapt=msgspec.convert(content.get("adapt"), Adapt | None),
                 ),
                 **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
                 # Recordings from before these options existed do not have them.

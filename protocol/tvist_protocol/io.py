@@ -78,6 +78,8 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     """What the second digital output of the tool does."""
     tcp_force_zero: list[float] | None = None
     """Force and torque that count as zero since a program zeroed them, in the base frame [N, N m]; null: none."""
+    assumed_payload: Payload | None = None
+    """Payload that the robot has found and moves with, instead of the declared one; null while that is assumed."""
     actual_TCP_force: list[float] | None = None
     """Force and torque at the tool centre point that explain the torques measured in the previous tick, in the base
     frame [N, N m]; zero while the arm is braked. Sent once a second; null in messages sent because of a change."""

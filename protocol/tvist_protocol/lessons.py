@@ -12,6 +12,8 @@ class PayloadLesson(Struct, frozen=True, kw_only=True, tag_field="type", tag="pa
     """The payload."""
     why: str
     """What was learnt, in words."""
+    beyond: bool = False
+    """Whether the arm carries more than that, which is above its rating."""
 
 
 Lesson = PayloadLesson

@@ -9,7 +9,7 @@ from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from tvist_controller.cell.description import Cell, as_declared
-from tvist_controller.setup import Setup, check_rating, paper_payload
+from tvist_controller.setup import Adapt, Setup, check_rating, paper_payload
 from tvist_controller.sources.own_plants import load_plant
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
@@ -93,6 +93,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     hidden: Seed | None = None
     """Simulate an arm that is not quite its file: springs, dampers, loops, rotors, friction and payload are drawn from
     this seed and told to nobody. With several robots, each further one uses the next."""
+    adapt: Adapt | None = None
+    """payload: after each motion the robot finds from its torques what it carries, and moves as an arm that carries it,
+    instead of what is declared; tvist forget undoes that [nothing]."""
     calibration: str | None = None
     """Name of a calibration that comes with the package, or path of a calibration file; none for a robot that is yet to
     be identified [the one that comes with the package for this robot]."""
@@ -305,6 +308,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 truth=self.truth,
                 compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
                 shape_servo=self.shape_servo,
+                adapt=self.adapt,
                 plant=None if self.plant is None else load_plant(self.plant),
                 hidden=self.hidden,
             )

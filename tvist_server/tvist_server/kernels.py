@@ -96,7 +96,9 @@ def _said(process: _Process) -> str:
 
 def _line() -> None:
     """The control line and the simulated arm: what a tick needs."""
-    host = LoopbackHost(from_mapping({"clock": "lockstep", "truth": True}, "configuration").setup())
+    host = LoopbackHost(
+        from_mapping({"clock": "lockstep", "truth": True, "adapt": "payload"}, "configuration").setup()
+    )
 
     def ask(command: Command) -> Reply:
         return decode_reply(host.request("kernels", encode(command)))

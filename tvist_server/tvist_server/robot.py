@@ -7,8 +7,8 @@ from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.dispatch.planner import Planner
-from tvist_controller.experience.experience import Experience, at_once
 from tvist_controller.experience.lesson import Student
+from tvist_controller.experience.own_students import experience_of
 from tvist_controller.host import Host
 from tvist_controller.line.rehearsal import rehearse
 from tvist_controller.programs.socket_traffic import SocketNews
@@ -48,7 +48,7 @@ class ServedRobot:
         programs: Folder with programs that clients load by their names.
         hosts: Machines that programs may connect to, besides the one that sent them [none].
         keep: Number of ticks that the recording keeps at least; None keeps all.
-        students: Who studies the robot's motions, so that it learns.
+        students: Who studies the robot's motions, besides those that the setup asks for.
 
     Raises:
         ValueError: The setup is invalid.
@@ -94,9 +94,14 @@ class ServedRobot:
         sinks += [] if observe is None else [observe(self.controller)]
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
         """Gateway for the sockets of programs."""
-        self._studies = Studies() if students and self._realtime else None
-        later = at_once if self._studies is None else self._studies.later
-        experience = Experience(setup.description.joints, students, later) if students else None
+        self._studies = Studies() if self._realtime and (students or setup.adapt) else None
+        if self._studies is None:
+            experience = experience_of(setup, students)
+        else:
+            planner = Planner(setup)  # used by the studies' thread alone
+            experience = experience_of(
+                setup, students, self._studies.later, lambda lesson, on: planner.for_lesson(lesson, on.basis)
+            )
         self._host = Host(
             self.controller, *sinks, black_box, self._publisher, ports=self.sockets, experience=experience
         )

@@ -38,7 +38,7 @@ def plan_from_rest(
     planner, q = Planner(setup), np.array(setup.q, dtype=float)
     first = planner.filters.first()
     source, tvist = first.source, first.tvist
-    on = FilterBasis(tvist.name, tvist.estimator.modes, source, setup.payload)
+    on = FilterBasis(tvist.name, tvist.estimator.modes, source, setup.payload, setup.payload)
     motion = MotionBasis(
         q=q,
         speed=1.0,

@@ -4,7 +4,7 @@ from typing import Any
 
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.dispatch.table import COMMANDS
-from tvist_controller.planning.basis import PlanBasis
+from tvist_controller.planning.basis import FilterBasis, PlanBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.planning.path_planner import PathPlanner
@@ -14,6 +14,7 @@ from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.quiet.interior_point import rehearse
 from tvist_controller.setup import Setup
 from tvist_protocol.commands import Command
+from tvist_protocol.lessons import Lesson
 
 
 class Planner:
@@ -47,6 +48,13 @@ class Planner:
         rehearse()
         self._paths.rehearse()
         self._scripts.rehearse()
+
+    def for_lesson(self, lesson: Lesson, basis: FilterBasis) -> Plan:
+        """Plan what the robot has learnt: the present filter for what it carries."""
+        try:
+            return Plan(basis, self.filters.with_payload(lesson.payload, basis))
+        except RefusalError as refusal:
+            return Plan(basis, refusal)
 
     def plan(self, command: Command, basis: PlanBasis, *, within_tick: bool = False) -> Plan:
         """Plan a command; a refusal is a plan, too.

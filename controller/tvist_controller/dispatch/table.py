@@ -57,7 +57,8 @@ class WholeRobot(ABC):
         """Undo what the robot has learnt."""
 
     rows: ClassVar[tuple[Row, ...]] = (
-        Row(Forget, lambda self, call: self.forget(call), changes_io=True),
+        Row(Forget, lambda self, call: self.forget(call), changes_io=True,
+            plan=Planning("filter", FilterPlanner, lambda planner, _, on: planner.with_payload(on.given, on))),
         Row(
             SimulationReset,
             lambda self, call: self.place(call),

@@ -1,6 +1,7 @@
 """Records the motions of a robot, has them studied, and keeps the lessons until the arm rests."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 from tvist_controller.experience.lesson import Later, Student, Work
 from tvist_controller.experience.motion_record import Beliefs, MotionRecorder
@@ -14,19 +15,36 @@ def at_once(work: Work) -> Callable[[], bool]:
     return lambda: True
 
 
+class Taught(NamedTuple):
+    """A lesson, and what it depends on."""
+
+    beliefs: Beliefs
+    """What the controller took the arm for during the motion."""
+    lesson: Lesson
+    """What was learnt."""
+    plan: Any
+    """Plan for it; None if there is none yet."""
+
+
+Planned = Callable[[Lesson, Beliefs], Any]
+"""Plans what a lesson changes."""
+
+
 class Experience:
     """What a robot makes of its motions.
 
     Args:
-        joints: Number of joints.
         students: Who studies each motion, in this order.
         later: Has a study made beside the ticks.
+        plan: Plans what a lesson changes, next to its study; None if that is planned in the tick that takes it.
     """
 
-    def __init__(self, joints: int, students: Sequence[Student], later: Later = at_once) -> None:
-        self._recorder = MotionRecorder(joints)
-        self._students, self._later = students, later
-        self._under_way: list[tuple[Callable[[], bool], list[Lesson]]] = []
+    def __init__(
+        self, students: Sequence[Student], later: Later = at_once, plan: Planned | None = None
+    ) -> None:
+        self._recorder = MotionRecorder()
+        self._students, self._later, self._plan = students, later, plan
+        self._under_way: list[tuple[Callable[[], bool], list[Taught]]] = []
         self._raised: list[Exception] = []
 
     def watch(self, sample: Sample, beliefs: Callable[[], Beliefs], *, held: bool) -> None:
@@ -46,27 +64,25 @@ class Experience:
         if motion is None:
             return
         for student in self._students:
-            learnt: list[Lesson] = []
+            learnt: list[Taught] = []
 
-            def study(student: Student = student, learnt: list[Lesson] = learnt) -> None:
+            def study(student: Student = student, learnt: list[Taught] = learnt) -> None:
                 try:
-                    lesson = student.study(motion)
+                    lesson, plan = student.study(motion.record), None
+                    if lesson is not None and self._plan is not None:
+                        plan = self._plan(lesson, motion.beliefs)
                 except Exception as error:  # noqa: BLE001  a robot goes on without the lesson, and says so
                     self._raised.append(error)
                     return
                 if lesson is not None:
-                    learnt.append(lesson)
+                    learnt.append(Taught(motion.beliefs, lesson, plan))
 
             self._under_way.append((self._later(study), learnt))
 
-    def lessons(self) -> Sequence[Lesson]:
-        """Return the lessons of all finished studies, once; to be asked while the arm rests."""
-        if not self._under_way:
-            return ()
-        found: list[Lesson] = []
+    def lessons(self) -> Iterator[Taught]:
+        """Yield the lessons of all finished studies, once; to be asked while the arm rests."""
         while self._under_way and self._under_way[0][0]():
-            found += self._under_way.pop(0)[1]
-        return found
+            yield from self._under_way.pop(0)[1]
 
     def raised(self) -> Sequence[Exception]:
         """Return what studies have raised, once."""

@@ -1,6 +1,9 @@
 """A motion from rest to rest as the drives were told to make it, and what the arm's own sensors said meanwhile."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +30,8 @@ class Beliefs:
     """Calibration of the filter's modes; None for constant modes."""
     shaper: str
     """Name of the filter."""
+    basis: Any = None
+    """State that plans for lessons depend on; what it is matters to those who make them alone."""
 
 
 @dataclass(frozen=True)
@@ -51,19 +56,47 @@ class MotionRecord:
     """What the controller took the arm for."""
 
 
+@dataclass(frozen=True)
+class Recorded:
+    """A motion as its ticks left it: whoever studies it makes the arrays, which takes longer than a tick has."""
+
+    rest: DriveCommand
+    """See `MotionRecord`."""
+    samples: Sequence[Sample]
+    """Its ticks."""
+    stop: int
+    """See `MotionRecord`."""
+    whole: bool
+    """See `MotionRecord`."""
+    beliefs: Beliefs
+    """See `MotionRecord`."""
+
+    @cached_property
+    def record(self) -> MotionRecord:
+        """The motion."""
+        commands = [sample.command for sample in self.samples]
+        measured = [sample.measured for sample in self.samples]
+        return MotionRecord(
+            rest=self.rest,
+            commands=np.array([(one.q, one.qd, one.torque) for one in commands]),
+            q=np.array([one.q for one in measured]),
+            moments=np.array([one.moment for one in measured]),
+            accelerometer=np.array([one.accelerometer for one in measured]),
+            stop=self.stop,
+            whole=self.whole,
+            beliefs=self.beliefs,
+        )
+
+
 class MotionRecorder:
-    """Records one motion after the other.
+    """Records one motion after the other."""
 
-    Args:
-        joints: Number of joints n.
-    """
-
-    def __init__(self, joints: int) -> None:
-        n = self._n = joints
-        self._rows = np.empty((LONGEST + AFTER, 5 * n + 3))
+    def __init__(self) -> None:
+        self._samples: list[Sample] = []
         self._ticks, self._stop = 0, 0
         self._whole = self._moves = False
-        self._rest, self._at = DriveCommand(*np.zeros((3, n))), np.zeros(n)
+        self._rest: DriveCommand | None = None
+        self._at: Floats = np.zeros(0)
         self._before: DriveCommand | None = None
         self._beliefs: Beliefs | None = None
 
@@ -72,7 +105,7 @@ class MotionRecorder:
         """Whether the next tick in motion is the first one of a record, which needs to know what is believed."""
         return not self._moves or self._stop > 0
 
-    def take(self, sample: Sample, beliefs: Beliefs | None = None) -> MotionRecord | None:
+    def take(self, sample: Sample, beliefs: Beliefs | None = None) -> Recorded | None:
         """Take a tick.
 
         Args:
@@ -85,6 +118,7 @@ class MotionRecorder:
         resting, done = sample.mode.at_rest, None
         if not resting and self.begins:
             done = self._finished()
+            self._samples = []
             self._ticks, self._stop, self._moves, self._whole = 0, 0, True, True
             self._beliefs, self._rest = beliefs, self._before or sample.command
         elif self._stop and not np.array_equal(sample.reference, self._at):
@@ -93,8 +127,8 @@ class MotionRecorder:
         if not self._moves:
             return done
         self._whole = self._whole and (resting or sample.mode is LineMode.SHAPED)
-        if self._ticks < len(self._rows):
-            self._note(self._rows[self._ticks], sample)
+        if self._ticks < LONGEST + AFTER:
+            self._samples.append(sample)
         self._ticks += 1
         if resting and not self._stop:
             self._stop, self._at = self._ticks, sample.reference
@@ -105,25 +139,9 @@ class MotionRecorder:
 
     def forget(self) -> None:
         """Drop the present motion, since the drives do not hold the arm."""
-        self._moves, self._ticks, self._stop = False, 0, 0
+        self._moves, self._samples, self._ticks, self._stop = False, [], 0, 0
 
-    def _note(self, row: Floats, sample: Sample) -> None:
-        n, command, measured = self._n, sample.command, sample.measured
-        row[:n], row[n : 2 * n], row[2 * n : 3 * n] = command.q, command.qd, command.torque
-        row[3 * n : 4 * n], row[4 * n : 5 * n] = measured.q, measured.moment
-        row[5 * n :] = measured.accelerometer
-
-    def _finished(self) -> MotionRecord | None:
-        if not self._stop or self._stop > LONGEST or self._beliefs is None:
+    def _finished(self) -> Recorded | None:
+        if not self._stop or self._stop > LONGEST or self._beliefs is None or self._rest is None:
             return None
-        n, rows = self._n, self._rows[: self._ticks].copy()
-        return MotionRecord(
-            rest=self._rest,
-            commands=rows[:, : 3 * n].reshape(-1, 3, n),
-            q=rows[:, 3 * n : 4 * n],
-            moments=rows[:, 4 * n : 5 * n],
-            accelerometer=rows[:, 5 * n :],
-            stop=self._stop,
-            whole=self._whole,
-            beliefs=self._beliefs,
-        )
+        return Recorded(self._rest, self._samples, self._stop, self._whole, self._beliefs)

@@ -260,7 +260,13 @@ class Peripherals:
         self._bits, self._ints, self._doubles = bits, ints, doubles
 
     def io(
-        self, tick: int, payload: Payload, speed: float, program: LoadedProgram, wrench: list[float] | None
+        self,
+        tick: int,
+        payload: Payload,
+        speed: float,
+        program: LoadedProgram,
+        wrench: list[float] | None,
+        assumed: Payload | None = None,
     ) -> Io:
         """Return the message that publishes all this.
 
@@ -270,6 +276,7 @@ class Peripherals:
             speed: The speed slider [-].
             program: Loaded program.
             wrench: Wrench at the tool centre point in the last tick, base frame [N, N m]; None to leave it out.
+            assumed: Payload that is assumed instead of the declared one; None if that is.
         """
         return Io(
             tick=tick,
@@ -300,6 +307,7 @@ class Peripherals:
             tool_digital_output0_mode=self._tool_digital_modes[0],
             tool_digital_output1_mode=self._tool_digital_modes[1],
             tcp_force_zero=self.wrench_zero,
+            assumed_payload=assumed,
             actual_TCP_force=wrench,
         )
 

@@ -29,7 +29,8 @@ class Filters:
 
     def __init__(self, motion: MotionControl, source: ModeSource, declared: Payload, emit: Emit) -> None:
         self._motion, self._cycle, self._emit = motion, motion.cycle, emit
-        self._declared, self._clipped, self._limited = declared, False, False
+        self._declared = self._given = declared
+        self._clipped, self._limited = False, False
         self.source = source
         """Source of the filter's modes."""
         self._warn_of_payload()
@@ -39,7 +40,7 @@ class Filters:
     def basis(self) -> FilterBasis:
         """The present state that a new filter depends on."""
         tvist = self._cycle.line.filter.tvist
-        return FilterBasis(tvist.name, tvist.estimator.modes, self.source, self._declared)
+        return FilterBasis(tvist.name, tvist.estimator.modes, self.source, self._declared, self._given)
 
     def use(self, chosen: PlannedFilter) -> None:
         """Shape with a filter from now on."""
@@ -63,14 +64,16 @@ class Filters:
         self._choose(call)
         self._warn_of_payload()
 
-    def declare(self, payload: Payload, tvist: Filter | None) -> None:
+    def declare(self, payload: Payload, tvist: Filter | None, *, found: bool = False) -> None:
         """Take another payload into account, which may change the arm's modes.
 
         Args:
-            payload: Declared payload.
+            payload: The payload.
             tvist: Filter for it; None if its modes are not known to differ.
+            found: Whether the robot has found it; otherwise it is declared.
         """
         self._declared = payload
+        self._given = self._given if found else payload
         if tvist is not None:
             self._cycle.use(tvist, self._cycle.line.drives.wanted)
             self._motion.motions.keep_rate()
@@ -83,14 +86,14 @@ class Filters:
 
     def _warn_of_payload(self) -> None:
         """Warn if a shaper uses modes that belong to another payload."""
-        declared = self._declared
+        declared, word = self._declared, "declared" if self._declared == self._given else "carried"
         calibration = self.source.calibration
         if not self._idle and calibration is not None and not fits(calibration, declared, self.source.name):
             self._emit(
                 "warning",
                 code="payload_mismatch",
                 why=f"calibration {calibration.name!r} was made with "
-                f"{calibration.payload.mass:g} kg; {declared.mass:g} kg is declared: "
+                f"{calibration.payload.mass:g} kg; {declared.mass:g} kg is {word}: "
                 "the shaper's frequencies will be wrong. Take a modal calibration, which knows any payload, or "
                 "identify the arm with this one",
             )

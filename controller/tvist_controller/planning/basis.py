@@ -23,7 +23,9 @@ class FilterBasis(NamedTuple):
     source: ModeSource
     """Source of the modes."""
     declared: Payload
-    """Declared payload."""
+    """Payload that its modes are computed with."""
+    given: Payload
+    """Payload that a client has declared: another one if the robot has found out what it carries."""
 
 
 class MotionBasis(Struct, frozen=True, eq=False, gc=False):

@@ -37,16 +37,19 @@ class DeclaredPayload:
         motion: The arm's motion, and with it the control line.
         filters: The control line's filter.
         emit: Emits events.
+        follows: Whether the robot follows its payload.
     """
 
-    def __init__(self, payload: Payload, motion: MotionControl, filters: Filters, emit: Emit) -> None:
+    def __init__(
+        self, payload: Payload, motion: MotionControl, filters: Filters, emit: Emit, *, follows: bool
+    ) -> None:
         self.payload = payload
         """Declared payload."""
         self.assumed = payload
         """Payload that dynamics and modes are computed with: the declared one, or what the robot has learnt."""
         self._motion, self._filters, self._emit = motion, filters, emit
         self._description = motion.cycle.description
-        self._monitor = PayloadMonitor(self._description, body(payload))
+        self._monitor = PayloadMonitor(self._description, body(payload), follows=follows)
         self._held = False
         """Whether the brakes have held the arm since the last measurement of the drives."""
 
@@ -57,7 +60,9 @@ class DeclaredPayload:
             return
         if self._held:
             self.begin_anew()
-        why = self._monitor.update(sample.target, sample.fed_forward, sample.measured.moment)
+        why = self._monitor.update(
+            sample.target, sample.fed_forward, sample.measured.moment, at_rest=sample.mode.at_rest
+        )
         if why is not None:
             self._emit("warning", code="payload_mismatch", why=why)
 
@@ -74,22 +79,31 @@ class DeclaredPayload:
         self.payload = payload
         self._assume(payload, tvist, max(round(call.command.transition_time / PERIOD), SLEW))
 
-    def learn(self, payload: Payload, tvist: Filter | None, why: str) -> None:
-        """Assume another payload than the declared one, in dynamics and modes only.
+    def forget(self, tvist: Filter | None) -> None:
+        """Assume the declared payload again; `tvist` is the filter for it."""
+        self._motion.ahead.check_payload(body(self.payload), tvist)
+        self.learn(self.payload, tvist, f"the declared {self.payload.mass:g} kg are assumed again")
+
+    def learn(self, payload: Payload, tvist: Filter | None, why: str, *, beyond: bool = False) -> None:
+        """Assume a payload, found or declared, in dynamics and modes only.
 
         Args:
-            payload: What the arm carries.
+            payload: The payload.
             tvist: Filter for it; None if its modes are not known to differ.
             why: What was learnt, in words.
+            beyond: Whether the arm carries more, which is above its rating.
         """
-        self._assume(payload, tvist, SLEW)
+        self._assume(payload, tvist, SLEW, beyond=beyond)
         self._emit("learnt", why=why)
+        if beyond:
+            self._emit("warning", code="payload_mismatch", why=why)
 
-    def _assume(self, payload: Payload, tvist: Filter | None, ticks: int) -> None:
+    def _assume(self, payload: Payload, tvist: Filter | None, ticks: int, *, beyond: bool = False) -> None:
         self.assumed, carried = payload, body(payload)
         self._motion.cycle.line.dynamics.declare(carried, ticks)
-        self._filters.declare(payload, tvist)
-        self._monitor.declare(carried)
+        found = payload is not self.payload
+        self._filters.declare(payload, tvist, found=found)
+        self._monitor.declare(carried, found=found, told=beyond)
         self._held = False
 
     rows: ClassVar[tuple[Row, ...]] = (

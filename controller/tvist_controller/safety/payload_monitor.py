@@ -1,4 +1,4 @@
-"""Detection of a wrong declared payload, from the torque that the drives' feedback adds to the feed-forward."""
+"""Detection of a wrong payload, from the torque that the drives' feedback adds to the feed-forward."""
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +23,10 @@ TOLERATED = 0.5
 """Error of the declared mass that is tolerated [kg]."""
 FRICTION = 0.4
 """Share of the Coulomb friction that may be unknown in each joint, with the worst sign [-]."""
+STUDIED = 1.0
+"""Time at rest after a motion in which a robot that follows its payload has studied it [s]."""
+PATIENCE = 20.0
+"""Longest time for which a doubt waits for that [s]."""
 
 
 @compiled_for_ticks
@@ -61,6 +65,29 @@ def correlate(
     return square, product, bound
 
 
+class Patience:
+    """How long a doubt waits in a robot that follows its payload: until a motion has been studied in vain."""
+
+    def __init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin anew, since there is no doubt any more."""
+        self._doubted = self._rested = 0.0
+        self._moved = False
+
+    def lasts(self, doubtful: bool, at_rest: bool) -> bool:
+        """Take `EVERY` ticks; return whether a motion may still tell what the arm carries."""
+        if not doubtful:
+            self.begin()
+            return True
+        span = EVERY * PERIOD
+        self._doubted += span
+        self._moved = self._moved or not at_rest
+        self._rested = self._rested + span if at_rest and self._moved else 0.0
+        return self._rested < STUDIED and self._doubted < PATIENCE
+
+
 class PayloadMonitor:
     """Compares the payload that the drives feel with the declared one, in motion and at rest.
 
@@ -80,12 +107,17 @@ class PayloadMonitor:
     A deviating frequency would show the error too, but only while the arm vibrates, and less clearly: 3 kg instead of
     5 kg change the frequency by a fifth and the shoulder's torque by half.
 
+    A robot that follows its payload finds it after a motion by itself. There the warning waits as long as that may
+    still come, see `Patience`, and is about the payload that is assumed. So there is one verdict at a time.
+
     Args:
         description: The robot.
         declared: Declared payload.
+        follows: Whether the robot follows its payload.
     """
 
-    def __init__(self, description: RobotDescription, declared: Payload) -> None:
+    def __init__(self, description: RobotDescription, declared: Payload, *, follows: bool = False) -> None:
+        self._patience = Patience() if follows else None
         drives = description.drives
         self._judges = carries_weight(description)
         model = rigid_model(description, Payload())
@@ -103,13 +135,20 @@ class PayloadMonitor:
         add(still, still, still)
         correlate(self._chain, still, still, still, self._scratch, self._friction, still)
 
-    def declare(self, payload: Payload) -> None:
-        """Set another declared payload: discard past measurements, and wait until it is fully phased in."""
+    def declare(self, payload: Payload, *, found: bool = False, told: bool = False) -> None:
+        """Set another payload: discard past measurements, and wait until it is fully phased in.
+
+        Args:
+            payload: What is declared or, if the robot has found it, assumed.
+            found: Whether the robot has found it.
+            told: Whether a warning has told already that the arm carries something else.
+        """
         self.payload = payload
+        self._called = "assumed" if found else "declared"
         kilogram = pin.Inertia(1.0, np.array(payload.com), np.zeros((3, 3)))
         self._chain[-2, BODY:] = self._placement.act(kilogram).toDynamicParameters()
         self.reset()
-        self._wait = SLEW
+        self._wait, self._warned = SLEW, told
 
     def reset(self) -> None:
         """Discard past measurements, since the arm was placed elsewhere, its power was off, or something pushed it."""
@@ -118,6 +157,8 @@ class PayloadMonitor:
         self._time = 0.0
         self._yy, self._yr, self._bound = np.zeros((3, len(self._fade)))
         self._warned = False
+        if self._patience is not None:
+            self._patience.begin()
 
     @property
     def excess(self) -> tuple[float, float]:
@@ -130,17 +171,19 @@ class PayloadMonitor:
             return 0.0, np.inf
         return float(self._yr[memory] / self._yy[memory]), float(self._bound[memory] / self._yy[memory])
 
-    def update(self, target: Target, expected: Floats, moment: Floats) -> str | None:
+    def update(
+        self, target: Target, expected: Floats, moment: Floats, *, at_rest: bool = False
+    ) -> str | None:
         """Take one tick in which the drives hold the arm.
 
         Args:
             target: Shaped reference at the tick.
             expected: Feed-forward torque for it, with rotors and friction, shape (n,) [N m].
             moment: Motor torques measured at the end of the tick, shape (n,) [N m].
+            at_rest: Whether the shaped reference rests, on which a robot that follows its payload depends.
 
         Returns:
-            Once, a sentence saying that the declared payload cannot be right; otherwise None, until another is
-            declared.
+            Once, a sentence saying that the payload cannot be right; otherwise None, until another is set.
         """
         if self._wait > 0:
             self._wait -= 1
@@ -158,19 +201,22 @@ class PayloadMonitor:
         self._yy = fade * self._yy + square
         self._yr = fade * self._yr + product / EVERY
         self._bound = fade * self._bound + FRICTION * bound
-        return self._judge()
+        return self._judge(at_rest)
 
-    def _judge(self) -> str | None:
+    def _judge(self, at_rest: bool) -> str | None:
         if not self._judges or self._warned or self._time < ENOUGH:
             return None
         mass, bound = self.excess
-        if not abs(mass) > TOLERATED + bound:
+        doubtful = abs(mass) > TOLERATED + bound
+        if self._patience is not None and self._patience.lasts(doubtful, at_rest):
+            return None
+        if not doubtful:
             return None
         self._warned = True
         mass, bound = self._estimate(1)
         felt = max(self.payload.mass + mass, 0.0)
         return (
-            f"{self.payload.mass:g} kg are declared, but the drives hold about {felt:.1f} kg (within {bound:.1f} kg): "
-            f"declare them, in a program with set_payload({felt:.1f}, …) or set_target_payload({felt:.1f}, …) and "
-            "their centre of mass, or find out what pushes the arm"
+            f"{self.payload.mass:g} kg are {self._called}, but the drives hold about {felt:.1f} kg (within "
+            f"{bound:.1f} kg): declare them, in a program with set_payload({felt:.1f}, …) or "
+            f"set_target_payload({felt:.1f}, …) and their centre of mass, or find out what pushes the arm"
         )

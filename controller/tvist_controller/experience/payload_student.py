@@ -1,0 +1,264 @@
+"""What the arm carries, from the torques of its motors in a motion and the angles that it measured meanwhile.
+
+In means over 20 ms, the torques of an arm that carries a mass m, with its centre at c + d, are
+
+    τ = Y_l(q, q̇, q̈) 1 + B q̈ + F(q̇) + Y_m m + Y_c m d
+
+Y_l holds a column for each link and Y_m that of a kilogram at c, by inverse dynamics at the *measured* angles. So
+neither springs nor the drives' gains have to be known. All else that may be wrong is estimated along with m and m d,
+and counts as known to the deviation of `UNKNOWN`: it costs certainty, and makes no error that looks like a mass.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_controller._compiled import compiled
+from tvist_controller.experience.motion_record import MotionRecord
+from tvist_controller.line.differentiator import Floats
+from tvist_plant.chain import BODY, SCRATCH, chain_of, torques
+from tvist_plant.description import Payload as Body
+from tvist_plant.description import RobotDescription
+from tvist_plant.model import FLANGE, rigid_model
+from tvist_plant.plant import GRAVITY, PERIOD
+from tvist_protocol.lessons import PayloadLesson
+from tvist_protocol.values import Payload
+
+BLOCK = 10
+"""Number of ticks that are averaged."""
+LEAST = 20
+"""Smallest number of blocks of a motion."""
+UNKNOWN = {
+    "friction": 0.2,
+    "friction's width": 1.0,
+    "viscous friction": 0.3,
+    "sensor": 0.03,
+    "standing": 0.3,
+    "link": 0.03,
+    "rotor": 0.2,
+}
+"""Deviations, for each joint: Coulomb friction as a share of it; that of half its width; what grows with speed, as a
+share of Coulomb friction at 1 rad/s; the torque sensor's gain; friction at rest; the mass of the link; the rotor's
+inertia [-].
+"""
+FRICTION = ("friction", "friction's width", "viscous friction", "standing")
+"""What of it is friction."""
+NOISE = (0.08, 0.001)
+"""Noise of a mean, as a share of the joint's Coulomb friction, plus one of its torque limit [-]."""
+STICKING = 0.3
+"""Share of the Coulomb friction that is noise where a joint moves so slowly that its sign is not sure [-]."""
+CENTRE = 0.05
+"""Deviation of an unknown payload's centre of mass from the robot file's, along each axis [m]."""
+FARTHEST = 0.3
+"""Largest distance of a centre of mass from the flange along each axis that is believed [m]."""
+DECLARED = (0.1, 0.01)
+"""Deviation of what is declared, in mass [kg] and centre of mass [m]."""
+DRIFT = (0.2, 0.01)
+"""The same of what may have become of it since the last motion."""
+LIGHT = 0.25
+"""Mass below which nothing is said of the centre of mass [kg]."""
+DEAD = 0.25
+"""Smallest change of mass that is taught [kg]."""
+SURE = 2.0
+"""Number of standard deviations by which a payload has changed for sure [-]."""
+VAGUE = 0.35
+"""Deviation of the mass above which a motion teaches nothing [kg]."""
+PUSHED = 3.0
+"""Mean square of the residuals over their noise above which something else has pushed the arm [-]."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Mass and centre of mass with their covariance; its units are those of `x`."""
+
+    x: Floats
+    """Mass [kg] and centre of mass [m], shape (4,)."""
+    covariance: Floats
+    """Covariance, shape (4, 4)."""
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the mass [kg]."""
+        return float(np.sqrt(self.covariance[0, 0]))
+
+
+@compiled
+def along(chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Floats, out: Floats) -> None:
+    """Compute the torques of a chain in N states, each of shape (N, n); see `tvist_plant.chain.torques`."""
+    for row in range(len(q)):
+        torques(chain, q[row], qd[row], qdd[row], GRAVITY, scratch, out[row])
+
+
+class PayloadStudent:
+    """Follows the payload from motion to motion; see `tvist_controller.experience.lesson.Student`.
+
+    A motion is first judged alone. If its mass is that of what was known before, both are combined, as a Kalman filter
+    does; else the payload has changed, and what was known is void.
+
+    Args:
+        description: The robot, of which a joint carries weight.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._arm = _Arm(description)
+        self._own, self._rated = description.payload, description.limits.payload
+        self._known: Estimate | None = None
+        self._believed: Payload | None = None
+
+    def study(self, motion: MotionRecord) -> PayloadLesson | None:
+        """Return what the arm carries, if it differs from what is believed by more than `DEAD`, for sure."""
+        believed = motion.beliefs.payload
+        if not motion.whole or len(motion.moments) < LEAST * BLOCK:
+            return None
+        centre = np.array(believed.com if believed.mass >= LIGHT else self._own.com)
+        known = self._known
+        if known is None or believed != self._believed:
+            known = _independent(np.array([believed.mass, *centre]), *DECLARED)
+        self._believed = believed
+        equations = self._arm.equations(motion, known.x)
+        alone = equations.solve(_independent(known.x, self._rated, CENTRE))
+        if alone is None or alone.deviation > VAGUE:
+            return None
+        now = Estimate(known.x, known.covariance + _independent(known.x, *DRIFT).covariance)
+        changed = abs(alone.x[0] - known.x[0]) > SURE * np.hypot(alone.deviation, now.deviation)
+        found = alone if changed else equations.solve(now)
+        if found is None or found.x[0] < -SURE * found.deviation - DEAD:  # something holds the arm up
+            return None
+        self._known = found
+        return self._lesson(believed, found)
+
+    def _lesson(self, believed: Payload, found: Estimate) -> PayloadLesson | None:
+        mass, certain = float(found.x[0]), SURE * found.deviation
+        beyond = mass > self._rated + certain
+        assumed = round(min(max(mass, 0.0), self._rated), 3)
+        if not abs(assumed - believed.mass) > max(DEAD, certain):
+            return None
+        x, y, z = np.clip(found.x[1:], -FARTHEST, FARTHEST).round(4).tolist()
+        why = f"the arm carries {mass:.2f} kg ± {found.deviation:.2f} kg, not {believed.mass:g} kg"
+        if beyond:
+            why += f", which is above its rating: {self._rated:g} kg are assumed"
+        payload = Payload(mass=assumed, com=(x, y, z), inertia=self._inertia(assumed, believed))
+        self._believed = payload
+        return PayloadLesson(payload=payload, why=why, beyond=beyond)
+
+    def _inertia(self, mass: float, believed: Payload) -> tuple[float, float, float, float, float, float]:
+        """Scale the inertia of what is believed, or of the robot file's payload, with the mass."""
+        like = believed if believed.mass >= LIGHT else self._own
+        xx, xy, xz, yy, yz, zz = (mass / like.mass * value if like.mass else 0.0 for value in like.inertia)
+        return xx, xy, xz, yy, yz, zz
+
+
+def _independent(x: Floats, mass: float, centre: float) -> Estimate:
+    return Estimate(x, np.diag(np.square([mass, centre, centre, centre])))
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Linear equations of a motion, weighted by their noise."""
+
+    at: Floats
+    """Mass [kg] and centre of mass [m] about which they are linear, shape (4,)."""
+    rows: Floats
+    """Columns of the mass, of the first moment, and of all else that may be wrong, shape (N n, 4 + k)."""
+    bare: Floats
+    """What the arm needs without a payload, shape (N n,)."""
+    measured: Floats
+    """What is measured, shape (N n,)."""
+    others: Floats
+    """Deviations of all else, and of the sensors' gains, shape (k + n,) [-]."""
+    joints: int
+    """Number of joints n."""
+
+    def solve(self, prior: Estimate) -> Estimate | None:
+        """Return mass and centre of mass; None if something else pushed the arm, or a value is missing.
+
+        Args:
+            prior: What is known without the motion; its `x` is `at`.
+        """
+        if not (np.isfinite(self.rows).all() and np.isfinite(self.measured).all()):
+            return None
+        mass, per_kg = float(self.at[0]), self.rows[:, 0]
+        right = self.measured - self.bare - mass * per_kg
+        known = np.diag(np.concatenate([np.zeros(4), self.others**-2.0]))
+        for _ in range(3):  # first moments are as uncertain, and a gain as much wrong, as the mass is large
+            scale = np.array([1.0, *[max(mass, LIGHT)] * 3])
+            known[:4, :4] = np.linalg.inv(prior.covariance * np.outer(scale, scale))
+            gains = _each((self.bare + mass * per_kg).reshape(-1, self.joints))
+            rows = np.column_stack([self.rows, *(gain.ravel() for gain in gains)])
+            square = rows.T @ rows
+            found = np.linalg.solve(known + square, rows.T @ right)
+            mass = float(self.at[0] + found[0])
+        excess = float(np.mean((right - rows @ found) ** 2))
+        if excess > PUSHED:
+            return None
+        covariance = np.linalg.inv(known + square / max(excess, 1.0))[:4, :4]
+        return Estimate(self.at + found[:4] / scale, covariance / np.outer(scale, scale))
+
+
+class _Arm:
+    """Makes the equations of an arm's motions.
+
+    Args:
+        description: The robot.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        drives = description.drives
+        model = rigid_model(description, Body())
+        flange = model.getFrameId(FLANGE)
+        self._placement, self._chain = model.frames[flange].placement, chain_of(model, flange)
+        self._scratch = np.zeros((description.joints + 1, SCRATCH))
+        self._friction, self._width = np.array(drives.coulomb_friction), drives.friction_width
+        self._linear, self._rotors = drives.linear_friction, np.array(drives.rotor_inertia)
+        self._noise = NOISE[0] * self._friction + NOISE[1] * np.array(description.limits.torque)
+
+    def equations(self, motion: MotionRecord, at: Floats) -> Equations:
+        """Return the equations of a motion about a mass [kg] and centre of mass [m], shape (4,)."""
+        speeds = np.gradient(motion.q, PERIOD, axis=0)
+        q, qd, measured = _means(motion.q), _means(speeds), _means(motion.moments)
+        qdd, centre = np.gradient(qd, BLOCK * PERIOD, axis=0), at[1:]
+        per_kg = self._payload(centre, q, qd, qdd)
+        sides = [self._payload(centre + move, q, qd, qdd) - per_kg for move in 0.01 * np.eye(3)]
+        links = [self._torques(link, self._chain[link, BODY:], q, qd, qdd) for link in range(q.shape[1])]
+        sign = _means(speeds / self._width if self._linear else np.tanh(speeds / self._width))
+        sharper = np.zeros_like(sign) if self._linear else _means(np.tanh(2.0 * speeds / self._width)) - sign
+        at_rest = np.arange(len(q))[:, None] * BLOCK >= motion.stop
+        friction = self._friction * np.array([sign, sharper, qd, at_rest * np.ones_like(q)])
+        own = dict(zip(FRICTION, friction, strict=True))
+        own["rotor"] = self._rotors * qdd
+        columns = [column for values in own.values() for column in _each(values)] + links
+        others = [UNKNOWN[name] for name in [*own, "link", "sensor"] for _ in links]
+        slow = np.zeros_like(qd) if self._linear else np.exp(-np.square(qd / self._width))
+        weight = 1.0 / np.hypot(self._noise, STICKING * self._friction * slow)
+        weight[[0, -1]] = 0.0  # their accelerations are differences to one side
+        rows = np.stack([per_kg, *(side / 0.01 for side in sides), *columns], axis=-1)
+        bare = np.sum(links, axis=0) + own["rotor"] + own["friction"]
+        return Equations(
+            at, (rows * weight[..., None]).reshape(measured.size, -1), (bare * weight).ravel(),
+            (measured * weight).ravel(), np.array(others), joints=len(links),
+        )  # fmt: skip
+
+    def _payload(self, centre: Floats, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """Torques that a kilogram needs, with its centre in the flange frame, shape (N, n) [N m/kg]."""
+        kilogram = pin.Inertia(1.0, centre, np.zeros((3, 3)))
+        parameters = self._placement.act(kilogram).toDynamicParameters()
+        return self._torques(len(self._friction) - 1, parameters, q, qd, qdd)
+
+    def _torques(self, link: int, body: Floats, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """Torques that the arm needs if one of its links alone has mass, shape (N, n) [N m]."""
+        chain, out = self._chain.copy(), np.empty_like(q)
+        chain[:, BODY:] = 0.0
+        chain[link, BODY:] = body
+        along(chain, q, qd, qdd, self._scratch, out)
+        return out
+
+
+def _means(values: Floats) -> Floats:
+    blocks = len(values) // BLOCK
+    return np.asarray(values[: blocks * BLOCK].reshape(blocks, BLOCK, -1).mean(axis=1))
+
+
+def _each(values: Floats) -> list[Floats]:
+    """Return a column for each joint that has its values alone."""
+    return [values * (np.arange(values.shape[1]) == joint) for joint in range(values.shape[1])]

@@ -1,0 +1,42 @@
+"""How well a robot follows a payload that nobody has declared; `following` prints the tables of the documentation."""
+
+import numpy as np
+import pytest
+from tests.paper.following import CASES, SEED, followed, unchanged
+
+LARGEST_OFF = 0.35
+"""Largest error of a mass after a lesson [kg]."""
+
+
+def judged(cases, how, first):
+    rows = [row for seed in range(first, first + cases) if (row := followed(seed, **how)) is not None]
+    behind, errors = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+    taught = errors[:, -1] != errors[:, 0]
+    assert taught.mean() > 0.6
+    assert np.abs(errors[taught, -1]).max() < LARGEST_OFF
+    assert np.median(behind[:, 0]) > 5.0
+    assert np.median(behind[:, 1]) < 1.0
+    return behind
+
+
+def test_one_motion_tells_a_payload_and_an_unchanged_one_is_left_alone():
+    judged(4, CASES["friction"], first=100)
+    assert [unchanged(seed, 2, masses=0.03)[0] for seed in range(100, 104)] == [0] * 4
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("name", CASES)
+def test_one_motion_brings_nine_in_ten_within_two_points_of_the_known_payload(name):
+    behind = judged(60, CASES[name], first=SEED)
+    assert np.mean(behind[:, 1] <= 2.0) >= 0.85
+    assert np.mean(behind[:, 2] <= 2.0) >= 0.9
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("name", CASES)
+def test_of_thousands_of_unchanged_motions_none_in_a_thousand_teaches(name):
+    told, found = zip(*(unchanged(SEED + seed, 5, **CASES[name]) for seed in range(60)), strict=True)
+    assert sum(told) <= 1
+    assert np.abs(np.concatenate(found)).max() < LARGEST_OFF
