@@ -50,7 +50,7 @@ from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.commands import Forget
 from tvist_protocol.io import Io
-from tvist_protocol.lessons import Lesson
+from tvist_protocol.lessons import Lesson, MotionLesson
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
@@ -391,10 +391,24 @@ class Controller(WholeRobot):
 
     def learn(self, lesson: Lesson) -> None:
         """Take a lesson at rest, which changes how it moves from now on."""
+        if isinstance(lesson, MotionLesson):
+            self.know_motions()
+            self.cycle.corrections.learn(lesson)
+            if lesson.why:
+                self._emit("learnt", why=lesson.why)
+            return
         self._assume(lesson.payload, lesson.why)
 
-    def forget(self, call: Call[Forget]) -> None:  # noqa: ARG002  there is one thing to forget
-        """Assume what was declared again."""
+    def know_motions(self) -> None:
+        """Tell motions from one another from now on, so that they can be learnt."""
+        self.cycle.corrections.beliefs = lambda: self.beliefs().digest
+
+    def forget(self, call: Call[Forget]) -> None:
+        """Assume what was declared again, or correct no motion."""
+        if call.command.what == "motions":
+            if self.cycle.corrections.forget():
+                self._emit("learnt", why="no motion is corrected any more")
+            return
         if self._payload.assumed != self.declared:
             self._assume(self.declared, f"the declared {self.declared.mass:g} kg are assumed again")
 

@@ -1,9 +1,12 @@
 """A motion from rest to rest as the drives were told to make it, and what the arm's own sensors said meanwhile."""
 
 from dataclasses import dataclass
+from hashlib import blake2b
 
+import msgspec
 import numpy as np
 
+from tvist_controller.line.correction import Repetition
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
@@ -28,6 +31,11 @@ class Beliefs:
     shaper: str
     """Name of the filter."""
 
+    @property
+    def digest(self) -> bytes:
+        """Digest of all of it."""
+        return blake2b(msgspec.json.encode(self), digest_size=8).digest()
+
 
 @dataclass(frozen=True)
 class MotionRecord:
@@ -49,6 +57,8 @@ class MotionRecord:
     """Whether it went as planned: shaped from rest to rest, without stop, stream or bypass."""
     beliefs: Beliefs
     """What the controller took the arm for."""
+    repetition: Repetition | None = None
+    """What tells it from other motions, and how it was corrected; None if it cannot be made again."""
 
 
 class MotionRecorder:
@@ -66,18 +76,22 @@ class MotionRecorder:
         self._rest, self._at = DriveCommand(*np.zeros((3, n))), np.zeros(n)
         self._before: DriveCommand | None = None
         self._beliefs: Beliefs | None = None
+        self._repetition: Repetition | None = None
 
     @property
     def begins(self) -> bool:
         """Whether the next tick in motion is the first one of a record, which needs to know what is believed."""
         return not self._moves or self._stop > 0
 
-    def take(self, sample: Sample, beliefs: Beliefs | None = None) -> MotionRecord | None:
+    def take(
+        self, sample: Sample, beliefs: Beliefs | None = None, repetition: Repetition | None = None
+    ) -> MotionRecord | None:
         """Take a tick.
 
         Args:
             sample: Signals of the tick, in which the drives hold or move the arm.
             beliefs: What the controller takes the arm for; used at the beginning of a motion only.
+            repetition: The motion in progress, as far as it can be made again.
 
         Returns:
             The motion that is complete with this tick, or that the next one has cut short; None if there is none.
@@ -87,12 +101,15 @@ class MotionRecorder:
             done = self._finished()
             self._ticks, self._stop, self._moves, self._whole = 0, 0, True, True
             self._beliefs, self._rest = beliefs, self._before or sample.command
+            self._repetition = repetition
         elif self._stop and not np.array_equal(sample.reference, self._at):
             self.forget()  # it was placed elsewhere
         self._before = sample.command
         if not self._moves:
             return done
         self._whole = self._whole and (resting or sample.mode is LineMode.SHAPED)
+        if not self._stop and repetition is not self._repetition:  # slowed down, or several motions in one
+            self._repetition = None
         if self._ticks < len(self._rows):
             self._note(self._rows[self._ticks], sample)
         self._ticks += 1
@@ -126,4 +143,5 @@ class MotionRecorder:
             stop=self._stop,
             whole=self._whole,
             beliefs=self._beliefs,
+            repetition=self._repetition,
         )

@@ -1,7 +1,5 @@
 """The arm as the controller believes it to be, moved by the commands that the real one got."""
 
-from functools import lru_cache
-
 import numpy as np
 from msgspec.structs import replace
 
@@ -51,7 +49,6 @@ class Twin:
         return self.arm.play(motion.commands if more is None else motion.commands + more)
 
 
-@lru_cache(8)
 def identified_arm(description: RobotDescription, calibration: Calibration) -> RobotDescription:
     """Return a robot file's arm with springs and drives from a modal calibration.
 

@@ -3,6 +3,7 @@
 from typing import TypeVar
 
 from tvist_controller.line.boxes import Boxes
+from tvist_controller.line.correction import Corrections
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.guard import Guard, Obstacle
@@ -59,6 +60,8 @@ class ControlCycle:
         """Trajectory generator."""
         self.mode = LineMode.REST
         """What the line does."""
+        self.corrections = Corrections(description)
+        """What is added to motions that are made again."""
         self.guard: Guard | None = None
         """What checks the references and the stops of a guarded motion; None without one."""
         self.sample = self.reset(q, carried=carried, seed=seed)
@@ -82,6 +85,10 @@ class ControlCycle:
             target, signals, line.dynamics.payload_parameters,
             may_begin=mode.shaped and not line.filter.fading, may_go_on=mode is not LineMode.BYPASSED,
         )  # fmt: skip
+        if not self.corrections.idle:
+            command = self.corrections.add(
+                command, self.trajectory, shaped=mode is LineMode.SHAPED, rests=mode.at_rest
+            )
         measured = line.plant.step(command)
         self.sample = Sample(
             mode, reference, line.shaped.joints.window, target, signals, command, measured,
@@ -133,6 +140,12 @@ class ControlCycle:
             line.enter(path.start, path.posture_of)
         if mode.shaped and trajectory.limits is not None:
             line.filter.limits = trajectory.limits
+        if (
+            self.mode.at_rest
+            and mode is LineMode.SHAPED
+            and not (line.filter.fading or line.dynamics.changing)
+        ):
+            self.corrections.begin(trajectory)
         self.trajectory, self.mode, self.guard = trajectory, mode, guard
         return trajectory
 
@@ -190,6 +203,7 @@ class ControlCycle:
             measured = measured_standing(plant, len(q))
             q = measured.q.copy()
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
+        self.corrections.drop()
         signals = line.rest_at(q)
         target = Target(*signals[Q:TORQUE])
         command = line.drives.command(target, signals, line.dynamics.payload_parameters)
