@@ -88,6 +88,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     plant: str | None = None
     """The arm to move: FILE.py:NAME, which runs that file, or the name of an installed plant, such as mujoco [the
     simulated flexible arm of the robot file]. NAME takes a RobotDescription and a Payload, and makes a plant."""
+    learn: str | None = None
+    """File in which the robot keeps what it learns of its motions: one that is made again gets a correction, from what
+    the tool's accelerometer said after its stop. With several robots, each has its own [it learns nothing]."""
     calibration: str | None = None
     """Name of a calibration that comes with the package, or path of a calibration file; none for a robot that is yet to
     be identified [the one that comes with the package for this robot]."""

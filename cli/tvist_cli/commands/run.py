@@ -17,8 +17,8 @@ from tvist_cli.serving import leave
 from tvist_server.config import ConfigError, ServeConfig
 
 OPTIONS = {
-    "robot", "profile", "payload", "overload", "shaper", "shape_servo", "plant", "start", "seed", "record", "truth",
-    "listen", "ur", "ur_allow", "cell",
+    "robot", "profile", "payload", "overload", "learn", "shaper", "shape_servo", "plant", "start", "seed", "record",
+    "truth", "listen", "ur", "ur_allow", "cell",
 }  # fmt: skip
 """Options of `tvist serve` that one robot which ends with its program can do with."""
 

@@ -44,7 +44,7 @@ def _bumps() -> Floats:
     weights = (1.0, -5.0, 10.0, -10.0, 5.0, -1.0)  # of a B-spline, as truncated powers
 
     def derivative(power: int) -> Floats:
-        return np.asarray(sum(w * np.maximum(x - k, 0.0) ** power for k, w in enumerate(weights)))
+        return np.array(sum(w * np.maximum(x - k, 0.0) ** power for k, w in enumerate(weights)))
 
     tick = STEP * PERIOD
     shapes = np.stack((derivative(4) / 12.0, derivative(3) / (3.0 * tick), derivative(2) / tick**2), axis=1)
@@ -58,7 +58,7 @@ SHAPES = _bumps()
 
 def course(bumps: Floats) -> Floats:
     """Return position, velocity and acceleration of a correction, shape (140, 3, 3), from heights of shape (10, 3)."""
-    return np.einsum("kj,kdt->tdj", bumps, SHAPES)
+    return np.asarray(np.einsum("kj,kdt->tdj", bumps, SHAPES))
 
 
 def bounded(bumps: Floats) -> Floats:
@@ -195,7 +195,7 @@ def heights(bumps: Bumps) -> Floats:
 
 
 def identity(motion: PlannedMotion, beliefs: bytes) -> str:
-    """Return what tells a motion from all others: a digest of its way, its duration, and what is believed of the arm."""
+    """Return what tells a motion from all others: a digest of its way, its duration, and the beliefs."""
     postures = np.array([q for q, _, _ in motion.states(LOOKS)])
     seen = blake2b(beliefs, digest_size=8)
     seen.update(np.rint(postures / ALIKE).astype(np.int64).tobytes())
