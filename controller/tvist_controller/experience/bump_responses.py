@@ -31,7 +31,7 @@ SAMPLES = BEFORE + LISTENED // THIN
 """Number of samples in all."""
 NOISE = 0.03
 """Deviation of the accelerometer's noise in a tick [m/s²]."""
-SHARE = 0.7
+SHARE = 1.0
 """Deviation of the arm's response from the twin's, relative to the largest of that [-]."""
 SMOOTH, DECAY, STEADY = 0.012, 0.08, 0.05
 """Times in which the deviation changes, in which it decays, and for which it does not decay yet [s]."""

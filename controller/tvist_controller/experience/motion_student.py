@@ -29,6 +29,8 @@ RISES = 2
 """Repetitions in a row that are worse than the best one, after which that is kept."""
 SETTLED = 4
 """Repetitions in a row that are not better than the best one, after which that is kept."""
+SHORTER = 0.5
+"""Share of a step from the best correction that is made after one that was worse [-]."""
 TRIED = 0.1
 """Height of the bumps with which the twin is asked [rad/s²]."""
 Residual = Annotated[float, Meta(ge=0.0, le=1e3)]
@@ -136,7 +138,10 @@ class MotionStudent:
                 answers(Twin(self._description, motion.beliefs), motion, kept.begins)
             )
         learning.responses.hear(heights(made), thinned(motion.accelerometer, kept.begins - 1))
-        bumps = _as_bumps(with_room(learning.responses.best(), motion, kept, made, self._description))
+        best = learning.responses.best()
+        if learning.worse:  # what is believed of the arm has misled: a shorter step
+            best = heights(kept.bumps) + SHORTER * (best - heights(kept.bumps))
+        bumps = _as_bumps(with_room(best, motion, kept, made, self._description))
         return self._say(learning, bumps, f"{residual:.3f} now")
 
     def _watch(self, learning: _Learning, residual: float) -> MotionLesson | None:

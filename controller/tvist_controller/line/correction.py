@@ -2,9 +2,10 @@
 
 A correction is a sum of bumps of the first three joints' positions, each a B-spline of degree four, so that position,
 velocity and acceleration are zero at both ends: once begun it goes on to its end, whatever becomes of the motion, and
-never jumps. It is added to what the drives get. The lead of `elastic_lead` is an inverse of the arm: a correction in
-front of it would be asked of the tool, which is at rest in the wrong model only, and come out of the motors as another
-one.
+never jumps. It is added to what the drives get, behind the lead of `elastic_lead`. That is an inverse of the arm: of a
+correction in front of it, the lead would make the motors' motion with which the tool makes just that one and does not
+ring. A bump that has ended before the stop would then leave nothing after it, so that no vibration could be cancelled,
+and learning would ask for ever larger bumps.
 """
 
 from collections.abc import Callable
@@ -103,6 +104,8 @@ class Corrections:
         self._ticks, self._duration = 0, 0.0
         self._course: Floats | None = None
         self._played = 0
+        self.acceleration: Floats = np.zeros(n)
+        """Acceleration of the last correction, of the joints that have one [rad/s^2]."""
 
     @property
     def repetition(self) -> Repetition | None:
@@ -169,6 +172,7 @@ class Corrections:
         qd[:n] += more[1]
         room = np.maximum(self._torque - np.abs(torque[:n]), 0.0)
         torque[:n] += np.minimum(np.maximum(self._rotor * more[2], -room), room)
+        self.acceleration = more[2]
         return DriveCommand(q, qd, torque)
 
     def _follow(self, motion: PlannedMotion, trajectory: Trajectory, *, shaped: bool, rests: bool) -> None:

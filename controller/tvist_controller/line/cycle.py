@@ -85,14 +85,19 @@ class ControlCycle:
             target, signals, line.dynamics.payload_parameters,
             may_begin=mode.shaped and not line.filter.fading, may_go_on=mode is not LineMode.BYPASSED,
         )  # fmt: skip
+        motors = line.drives.reference
         if not self.corrections.idle:
-            command = self.corrections.add(
-                command, self.trajectory, shaped=mode is LineMode.SHAPED, rests=mode.at_rest
+            plain, command = (
+                command,
+                self.corrections.add(
+                    command, self.trajectory, shaped=mode is LineMode.SHAPED, rests=mode.at_rest
+                ),
             )
+            if motors is not None and command is not plain:
+                motors = motors.corrected(command, self.corrections.acceleration)
         measured = line.plant.step(command)
         self.sample = Sample(
-            mode, reference, line.shaped.joints.window, target, signals, command, measured,
-            line.drives.reference, refused,
+            mode, reference, line.shaped.joints.window, target, signals, command, measured, motors, refused,
         )  # fmt: skip
         self._settle()  # last, so that the tick that comes to rest is still reported as one of the motion
         return self.sample
