@@ -239,6 +239,17 @@ def test_after_two_rises_the_best_is_kept_and_one_that_comes_to_harm_is_learnt_a
     assert "anew" in anew.why
 
 
+def test_what_was_forgotten_is_learnt_anew():
+    student, ringing = MotionStudent(ROBOT), np.zeros((550, 3))
+    ringing[400:, 0] = np.sin(np.arange(150) / 8.0) * np.exp(-np.arange(150) / 60.0)
+    lesson = student.study(record(0.5 * ringing))
+    for size in (0.01, 0.01):
+        student.study(record(size * ringing, lesson))
+    for _ in range(2):
+        assert student.study(record(0.5 * ringing)) is None
+    assert student.study(record(0.5 * ringing)).bumps
+
+
 def test_corrections_have_room_for_a_hundred_motions():
     corrections = Corrections(ROBOT)
     for number in range(150):

@@ -67,6 +67,8 @@ class _Learning:
         """Number of repetitions in a row that were worse than the best one."""
         self.no_better = 0
         """Number of those that were not better."""
+        self.without = 0
+        """Number of repetitions in a row that did not get the correction that is kept."""
         self.settled = False
 
 
@@ -125,7 +127,7 @@ class MotionStudent:
         learning.repetitions += 1
         learning.worse = learning.worse + 1 if residual > kept.best + WORSE else 0
         if learning.settled:
-            return self._watch(learning, residual)
+            return self._watch(learning, made, residual)
         better = residual < kept.best or learning.repetitions == 1
         if better:
             kept = learning.kept = _with(kept, bumps=made, best=residual)
@@ -144,9 +146,13 @@ class MotionStudent:
         bumps = _as_bumps(with_room(best, motion, kept, made, self._description))
         return self._say(learning, bumps, f"{residual:.3f} now")
 
-    def _watch(self, learning: _Learning, residual: float) -> MotionLesson | None:
-        """Learn a motion anew if its correction has come to do harm, as on an arm that has changed."""
+    def _watch(self, learning: _Learning, made: Bumps, residual: float) -> MotionLesson | None:
+        """Learn a motion anew if its correction was forgotten, or does harm, as on an arm that has changed."""
         kept = learning.kept
+        learning.without = learning.without + 1 if kept.bumps and not made else 0
+        if learning.without == RISES:  # once may be a repetition that began before the lesson was taken
+            del self._motions[kept.move]
+            return None
         if learning.worse < RISES or residual <= kept.first + WORSE:
             return None
         del self._motions[kept.move]
