@@ -5,10 +5,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace as changed
 from tests.controller.test_experience import Q1, Q2, ROBOT, Served
+from tests.examples import examples
 
 from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.experience.bump_responses import LATE, SAMPLES, THIN, BumpResponses
@@ -156,7 +157,7 @@ def test_only_the_same_motion_is_corrected():
     assert robot.host.controller.cycle.corrections.repetition.corrected is None
 
 
-@settings(max_examples=6, deadline=None)
+@examples(6)
 @given(
     st.lists(
         st.tuples(st.integers(1, 900), st.sampled_from(("pause", "resume", "stop", "slow", "fast"))), min_size=1,

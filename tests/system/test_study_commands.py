@@ -114,6 +114,13 @@ def with_each_error(told, _):
     assert zv["stiffness"].keys() > zv["payload"].keys() > {"+0 %", "+20 %", "-20 %"}
 
 
+def ever_less(told, _):
+    """Each arm has a figure of each repetition."""
+    (arm,) = told["arms"]
+    assert (arm["arm"], arm["moves"], len(arm["repetitions"])) == ("springs_-30_percent", 1, 3)
+    assert arm["repetitions"][2]["median"] > arm["repetitions"][0]["median"]
+
+
 RANDOM = "evaluate --random 2 --seed 5 --payload uniform --clean --shaper auto --no-baselines --save-moves drawn.json"
 MAP = (
     "study map --points 5 --payload 1 --calibration ur5e_modal --shaper zvd --figures . --format svg --columns 1 "
@@ -126,6 +133,7 @@ RUNS = {
         {"robustness.png"},
         with_each_error,
     ),
+    "learning": ("study learning --moves 1 --repetitions 2 --arms softer --seed 5", set(), ever_less),
     "paths": (
         "study paths --random 1 --kind arc --shapers zv auto --seed 3 --payload 5 --clean --markdown page.md",
         set(),
