@@ -255,10 +255,12 @@ class Arm(Moves, Guiding, Terminals, Simulation):
             SetPayload(token=self.token, mass=believed.mass, com=believed.com, inertia=believed.inertia)
         )
 
-    async def forget(self, what: Literal["payload"]) -> None:
-        """Undo what the robot has learnt from its motions: the payload that it assumes instead of the declared one.
+    async def forget(self, what: Literal["payload", "motions"]) -> None:
+        """Undo what the robot has learnt from its motions.
 
-        A robot served with `--adapt payload` finds it anew in its next motions.
+        Args:
+            what: The payload that it assumes instead of the declared one, or the corrections of its motions. A robot
+                served with `--adapt payload` or `--learn` learns them anew.
         """
         await self.robot.request(Forget(token=self.token, what=what))
 

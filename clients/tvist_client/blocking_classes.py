@@ -285,10 +285,12 @@ class Arm:
         """
         self._portal.call(lambda: self._arm.set_payload(mass, com, inertia))
 
-    def forget(self, what: Literal["payload"]) -> None:
-        """Undo what the robot has learnt from its motions: the payload that it assumes instead of the declared one.
+    def forget(self, what: Literal["payload", "motions"]) -> None:
+        """Undo what the robot has learnt from its motions.
 
-        A robot served with `--adapt payload` finds it anew in its next motions.
+        Args:
+            what: The payload that it assumes instead of the declared one, or the corrections of its motions. A robot
+                served with `--adapt payload` or `--learn` learns them anew.
         """
         self._portal.call(lambda: self._arm.forget(what))
 

@@ -50,7 +50,7 @@ from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.commands import Forget
 from tvist_protocol.io import Io
-from tvist_protocol.lessons import Lesson
+from tvist_protocol.lessons import Lesson, MotionLesson
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
@@ -95,6 +95,7 @@ class Controller(WholeRobot):
         if setup.truth:
             truth_of(self.cycle.line.plant)  # raises now, not at the first tick, if the plant has no truth
         self._seed = setup.seed
+        self._digested: tuple[Beliefs | None, bytes] = None, b""
         self._reporter = Reporter(setup.description)
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
@@ -399,6 +400,12 @@ class Controller(WholeRobot):
             lesson: The lesson.
             plan: Plan for it, if it was made beforehand; it is used if it still holds.
         """
+        if isinstance(lesson, MotionLesson):
+            self.know_motions()
+            self.cycle.corrections.learn(lesson)
+            if lesson.why:
+                self._emit("learnt", why=lesson.why)
+            return
         on = self.filters.basis
         if plan is None or plan.basis != on:
             plan = self._planner.for_lesson(lesson, on)
@@ -409,8 +416,23 @@ class Controller(WholeRobot):
         self._payload.learn(lesson.payload, found, lesson.why, beyond=lesson.beyond)
         self.peripherals.changed = True
 
+    def know_motions(self) -> None:
+        """Tell motions from one another from now on, so that they can be learnt."""
+        self.cycle.corrections.beliefs = self._believed
+
+    def _believed(self) -> bytes:
+        """Digest of what it takes the arm for, which takes long and seldom changes."""
+        beliefs = self.beliefs()
+        if beliefs != self._digested[0]:
+            self._digested = beliefs, beliefs.digest
+        return self._digested[1]
+
     def forget(self, call: Call[Forget]) -> None:
-        """Assume what was declared again."""
+        """Assume what was declared again, or correct no motion."""
+        if call.command.what == "motions":
+            if self.cycle.corrections.forget():
+                self._emit("learnt", why="no motion is corrected any more")
+            return
         if self._payload.assumed != self.declared:
             self._payload.forget(call.planned())
 

@@ -4,7 +4,7 @@ It has no clock, thread or socket: time advances when `tick` is called. With the
 does this through `simulation.step`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import msgspec
 
@@ -25,6 +25,7 @@ from tvist_controller.sources.plant_calls import told
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Setpoint
 from tvist_protocol.journal import Entry, entry_of
+from tvist_protocol.lessons import Lesson
 from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationStep
 from tvist_protocol.stream import Event
@@ -52,6 +53,8 @@ class Host:
         experience: Experience | None = None,
     ) -> None:
         self.controller, self._experience = controller, experience
+        if experience is not None:
+            controller.know_motions()
         self._ports = ports or NoPorts()
         self.failure: str | None = None
         """Why the controller has stopped ticking; None if it ticks."""
@@ -134,7 +137,13 @@ class Host:
                 sink.io(io)
         report, events = self.controller.complete_tick()
         if self._experience is not None:
-            self._experience.watch(report.sample, self.controller.beliefs, held=self.controller.holds_arm)
+            controller = self.controller
+            self._experience.watch(
+                report.sample,
+                controller.beliefs,
+                controller.cycle.corrections.repetition,
+                held=controller.holds_arm,
+            )
         for sink in self._sinks:
             for event in events:
                 sink.event(event)
@@ -146,12 +155,20 @@ class Host:
             self.socket(one)
         self.tell_raised()
 
+    def recall(self, lessons: Iterable[Lesson]) -> None:
+        """Take lessons of earlier runs, before the first tick."""
+        for lesson in lessons:
+            self._take(lesson)
+
+    def _take(self, lesson: Lesson, plan: Plan | None = None) -> None:
+        self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
+        self.controller.learn(lesson, plan)
+
     def _learn(self, experience: Experience) -> None:
         for beliefs, lesson, plan in experience.lessons():
             if beliefs.payload != self.controller.beliefs().payload:
                 continue  # it is void: another payload was declared, learnt or forgotten since
-            self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
-            self.controller.learn(lesson, plan)
+            self._take(lesson, plan)
         for error in experience.raised():
             for sink in self._sinks:
                 sink.raised(error)

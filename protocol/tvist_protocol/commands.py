@@ -219,8 +219,8 @@ class Forget(ClientMessage, frozen=True, kw_only=True, tag="forget"):
 
     token: Token
     """Token of the lease."""
-    what: Literal["payload"]
-    """What to forget: the payload that it assumes instead of the declared one."""
+    what: Literal["payload", "motions"]
+    """What to forget: the payload that it assumes instead of the declared one, or the corrections of its motions."""
 
 
 class SetSpeed(ClientMessage, frozen=True, kw_only=True, tag="set_speed"):

@@ -78,10 +78,11 @@ def lesson_of(entry: Entry) -> Lesson:
         ProtocolError: The entry contains none, or an invalid one.
     """
     try:
-        return msgspec.convert(entry.message, Lesson)
+        lesson: Lesson = msgspec.convert(entry.message, Lesson)
     except msgspec.ValidationError as error:
         where = f"the journal's lesson before tick {entry.tick}"
         raise ProtocolError("malformed", "message", f"{where} is invalid: {error}") from error
+    return lesson
 
 
 def message_of(entry: Entry) -> Command | Setpoint:

@@ -8,6 +8,7 @@ from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.experience.lesson import Student
+from tvist_controller.experience.motion_student import MotionStudent
 from tvist_controller.experience.own_students import experience_of
 from tvist_controller.host import Host
 from tvist_controller.line.rehearsal import rehearse
@@ -24,6 +25,7 @@ from tvist_server.clock import Clock, Mailbox
 from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.gateways.sockets import ProgramSockets
 from tvist_server.lateness import Punctuality
+from tvist_server.learnt_file import LearntFile
 from tvist_server.plan_ahead import PlanAhead
 from tvist_server.plans_of_programs import PlansOfPrograms
 from tvist_server.program_folder import ProgramFolder
@@ -49,6 +51,7 @@ class ServedRobot:
         hosts: Machines that programs may connect to, besides the one that sent them [none].
         keep: Number of ticks that the recording keeps at least; None keeps all.
         students: Who studies the robot's motions, besides those that the setup asks for.
+        learnt: File with the motions that it learns; None if it learns none.
 
     Raises:
         ValueError: The setup is invalid.
@@ -65,6 +68,7 @@ class ServedRobot:
         hosts: AllowedHosts | None = None,
         keep: int | None = None,
         students: Sequence[Student] = (),
+        learnt: LearntFile | None = None,
     ) -> None:
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
@@ -94,6 +98,8 @@ class ServedRobot:
         sinks += [] if observe is None else [observe(self.controller)]
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
         """Gateway for the sockets of programs."""
+        if learnt is not None:
+            students = (*students, MotionStudent(setup.description, learnt.motions, learnt.write))
         self._studies = Studies() if self._realtime and (students or setup.adapt) else None
         if self._studies is None:
             experience = experience_of(setup, students)
@@ -105,6 +111,10 @@ class ServedRobot:
         self._host = Host(
             self.controller, *sinks, black_box, self._publisher, ports=self.sockets, experience=experience
         )
+        if learnt is not None:
+            self._host.recall(one.lesson for one in learnt.motions)
+            if learnt.ignored is not None:
+                self._host.warn(learnt.ignored)
         plant = self.controller.cycle.line.plant
         knows = isinstance(plant, Truthful) and plant.truth() is not None
         self.want_truth = self._publisher.want_truth if knows and not setup.truth else None

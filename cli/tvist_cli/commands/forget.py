@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def forget(
-    what: Literal["payload"],
+    what: Literal["payload", "motions"],
     *,
     endpoint: str = "tcp/127.0.0.1:7447",
     name: str | None = None,
@@ -23,10 +23,11 @@ def forget(
     """Take control of a served robot, and undo what it has learnt from its motions.
 
     A robot served with --adapt payload then moves as an arm that carries the declared payload, until its motions tell
-    it otherwise again. If another client has control, the command fails with exit code 1 and changes nothing.
+    it otherwise again; one served with --learn corrects no motion until it has learnt it anew. If another client has
+    control, the command fails with exit code 1 and changes nothing.
 
     Args:
-        what: What to forget: payload, what the robot has found that it carries.
+        what: What to forget: payload, what the robot has found that it carries; or motions, how it corrects them.
         endpoint: Zenoh endpoint of the robot.
         name: Name of the robot [ur5e; if there is none, the only robot at the endpoint].
         namespace: Namespace of the robot, if it is served in one.
@@ -46,6 +47,12 @@ def forget(
 
     with told():
         robot, before = asyncio.run(run())
+    if what == "motions":
+        if json:
+            print_json({"robot": robot, "forgot": "motions"})
+        else:
+            out.print(f"{robot} corrects no motion until it has learnt it anew")
+        return
     declared, assumed = before.payload.mass, before.assumed_payload
     if json:
         print_json({"robot": robot, "declared_kg": declared, "forgot_kg": assumed and assumed.mass})

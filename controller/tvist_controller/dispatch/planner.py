@@ -14,7 +14,7 @@ from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.quiet.interior_point import rehearse
 from tvist_controller.setup import Setup
 from tvist_protocol.commands import Command
-from tvist_protocol.lessons import Lesson
+from tvist_protocol.lessons import Lesson, MotionLesson
 
 
 class Planner:
@@ -50,7 +50,9 @@ class Planner:
         self._scripts.rehearse()
 
     def for_lesson(self, lesson: Lesson, basis: FilterBasis) -> Plan:
-        """Plan what the robot has learnt: the present filter for what it carries."""
+        """Plan what the robot has learnt: the present filter for what it carries; for a motion, nothing."""
+        if isinstance(lesson, MotionLesson):
+            return Plan(basis, None)
         try:
             return Plan(basis, self.filters.with_payload(lesson.payload, basis))
         except RefusalError as refusal:

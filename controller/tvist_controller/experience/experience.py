@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from tvist_controller.experience.lesson import Later, Student, Work
 from tvist_controller.experience.motion_record import Beliefs, MotionRecorder
+from tvist_controller.line.correction import Repetition
 from tvist_controller.line.sample import Sample
 from tvist_protocol.lessons import Lesson
 
@@ -47,12 +48,20 @@ class Experience:
         self._under_way: list[tuple[Callable[[], bool], list[Taught]]] = []
         self._raised: list[Exception] = []
 
-    def watch(self, sample: Sample, beliefs: Callable[[], Beliefs], *, held: bool) -> None:
+    def watch(
+        self,
+        sample: Sample,
+        beliefs: Callable[[], Beliefs],
+        repetition: Repetition | None = None,
+        *,
+        held: bool,
+    ) -> None:
         """Take a tick.
 
         Args:
             sample: Its signals.
             beliefs: Returns what the controller takes the arm for.
+            repetition: The motion in progress, as far as it can be made again.
             held: Whether the drives hold the arm.
         """
         recorder = self._recorder
@@ -60,7 +69,7 @@ class Experience:
             recorder.forget()
             return
         known = beliefs() if recorder.begins and not sample.mode.at_rest else None
-        motion = recorder.take(sample, known)
+        motion = recorder.take(sample, known, repetition)
         if motion is None:
             return
         for student in self._students:

@@ -3,10 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import blake2b
 from typing import Any
 
+import msgspec
 import numpy as np
 
+from tvist_controller.line.correction import Repetition
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
@@ -33,6 +36,12 @@ class Beliefs:
     basis: Any = None
     """State that plans for lessons depend on; what it is matters to those who make them alone."""
 
+    @property
+    def digest(self) -> bytes:
+        """Digest of what is believed."""
+        believed = (self.payload, self.calibration, self.shaper)
+        return blake2b(msgspec.json.encode(believed), digest_size=8).digest()
+
 
 @dataclass(frozen=True)
 class MotionRecord:
@@ -54,6 +63,8 @@ class MotionRecord:
     """Whether it went as planned: shaped from rest to rest, without stop, stream or bypass."""
     beliefs: Beliefs
     """What the controller took the arm for."""
+    repetition: Repetition | None = None
+    """What tells it from other motions, and how it was corrected; None if it cannot be made again."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +81,8 @@ class Recorded:
     """See `MotionRecord`."""
     beliefs: Beliefs
     """See `MotionRecord`."""
+    repetition: Repetition | None
+    """See `MotionRecord`."""
 
     @cached_property
     def record(self) -> MotionRecord:
@@ -85,6 +98,7 @@ class Recorded:
             stop=self.stop,
             whole=self.whole,
             beliefs=self.beliefs,
+            repetition=self.repetition,
         )
 
 
@@ -99,18 +113,22 @@ class MotionRecorder:
         self._at: Floats = np.zeros(0)
         self._before: DriveCommand | None = None
         self._beliefs: Beliefs | None = None
+        self._repetition: Repetition | None = None
 
     @property
     def begins(self) -> bool:
         """Whether the next tick in motion is the first one of a record, which needs to know what is believed."""
         return not self._moves or self._stop > 0
 
-    def take(self, sample: Sample, beliefs: Beliefs | None = None) -> Recorded | None:
+    def take(
+        self, sample: Sample, beliefs: Beliefs | None = None, repetition: Repetition | None = None
+    ) -> Recorded | None:
         """Take a tick.
 
         Args:
             sample: Signals of the tick, in which the drives hold or move the arm.
             beliefs: What the controller takes the arm for; used at the beginning of a motion only.
+            repetition: The motion in progress, as far as it can be made again.
 
         Returns:
             The motion that is complete with this tick, or that the next one has cut short; None if there is none.
@@ -121,12 +139,15 @@ class MotionRecorder:
             self._samples = []
             self._ticks, self._stop, self._moves, self._whole = 0, 0, True, True
             self._beliefs, self._rest = beliefs, self._before or sample.command
+            self._repetition = repetition
         elif self._stop and not np.array_equal(sample.reference, self._at):
             self.forget()  # it was placed elsewhere
         self._before = sample.command
         if not self._moves:
             return done
         self._whole = self._whole and (resting or sample.mode is LineMode.SHAPED)
+        if not self._stop and repetition is not self._repetition:  # slowed down, or several motions in one
+            self._repetition = None
         if self._ticks < LONGEST + AFTER:
             self._samples.append(sample)
         self._ticks += 1
@@ -144,4 +165,4 @@ class MotionRecorder:
     def _finished(self) -> Recorded | None:
         if not self._stop or self._stop > LONGEST or self._beliefs is None or self._rest is None:
             return None
-        return Recorded(self._rest, self._samples, self._stop, self._whole, self._beliefs)
+        return Recorded(self._rest, self._samples, self._stop, self._whole, self._beliefs, self._repetition)

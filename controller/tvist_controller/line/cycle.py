@@ -3,6 +3,7 @@
 from typing import TypeVar
 
 from tvist_controller.line.boxes import Boxes
+from tvist_controller.line.correction import Corrections
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.guard import Guard, Obstacle
@@ -62,6 +63,8 @@ class ControlCycle:
         """Trajectory generator."""
         self.mode = LineMode.REST
         """What the line does."""
+        self.corrections = Corrections(description)
+        """What is added to motions that are made again."""
         self.guard: Guard | None = None
         """What checks the references and the stops of a guarded motion; None without one."""
         self.sample = self.reset(q, carried=carried, seed=seed)
@@ -85,10 +88,19 @@ class ControlCycle:
             target, signals, line.dynamics.payload_parameters,
             may_begin=mode.shaped and not line.filter.fading, may_go_on=mode is not LineMode.BYPASSED,
         )  # fmt: skip
+        motors = line.drives.reference
+        if not self.corrections.idle:
+            plain, command = (
+                command,
+                self.corrections.add(
+                    command, self.trajectory, shaped=mode is LineMode.SHAPED, rests=mode.at_rest
+                ),
+            )
+            if motors is not None and command is not plain:
+                motors = motors.corrected(command, self.corrections.acceleration)
         measured = line.plant.step(command)
         self.sample = Sample(
-            mode, reference, line.shaped.joints.window, target, signals, command, measured,
-            line.drives.reference, refused,
+            mode, reference, line.shaped.joints.window, target, signals, command, measured, motors, refused,
         )  # fmt: skip
         self._settle()  # last, so that the tick that comes to rest is still reported as one of the motion
         return self.sample
@@ -136,6 +148,12 @@ class ControlCycle:
             line.enter(path.start, path.posture_of)
         if mode.shaped and trajectory.limits is not None:
             line.filter.limits = trajectory.limits
+        if (
+            self.mode.at_rest
+            and mode is LineMode.SHAPED
+            and not (line.filter.fading or line.dynamics.changing)
+        ):
+            self.corrections.begin(trajectory)
         self.trajectory, self.mode, self.guard = trajectory, mode, guard
         return trajectory
 
@@ -193,6 +211,7 @@ class ControlCycle:
             measured = measured_standing(plant, len(q))
             q = measured.q.copy()
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
+        self.corrections.drop()
         signals = line.rest_at(q)
         target = Target(*signals[Q:TORQUE])
         command = line.drives.command(target, signals, line.dynamics.payload_parameters)

@@ -1,6 +1,9 @@
 """Choice between the two kinds of feed-forward for the drives, and the transition from one to the other."""
 
+from typing import Self
+
 from msgspec import Struct
+from msgspec.structs import replace
 
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
@@ -24,6 +27,17 @@ class MotorReference(Struct, frozen=True, eq=False, gc=False):
     """Torque, shape (n,) [N m]."""
     limited: bool
     """Whether ẅ was limited to the torque that the drives have left."""
+
+    def corrected(self, command: DriveCommand, acceleration: Floats) -> Self:
+        """Return the motion with a correction.
+
+        Args:
+            command: The corrected command.
+            acceleration: Acceleration of the correction, of the first joints [rad/s^2].
+        """
+        qdd = self.qdd.copy()
+        qdd[: len(acceleration)] += acceleration
+        return replace(self, qd=command.qd, qdd=qdd, torque=command.torque)
 
 
 class DriveFeedForward:

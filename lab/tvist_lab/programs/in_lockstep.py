@@ -5,7 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from tvist_controller.api.line import Setup
-from tvist_controller.api.robot import Controller, Host, Sink, info_of
+from tvist_controller.api.robot import Controller, Host, MotionStudent, Sink, experience_of, info_of
 from tvist_lab.programs.start import start
 from tvist_lab.programs.watch import ProgramWatch
 from tvist_plant.plant_checks import check_unpaced
@@ -13,6 +13,7 @@ from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.programs import ProgramClosePopup
 from tvist_server.config import ConfigError
+from tvist_server.learnt_file import LearntFile
 from tvist_server.recording import Recorder
 
 ATTEND_EVERY = 50
@@ -25,6 +26,7 @@ def run_in_lockstep(
     inputs: Sequence[str],
     *,
     record: Path | None = None,
+    learn: Path | None = None,
     timeout: float | None = None,
     attend: Callable[[ProgramWatch], None],
     on_record_error: Callable[[str], None],
@@ -38,6 +40,7 @@ def run_in_lockstep(
         text: Text of the program.
         inputs: Inputs to set before, each as NAME=VALUE.
         record: MCAP file to record into.
+        learn: File with the motions that it learns; None if it learns none.
         timeout: Robot time after which the run ends although the program goes on [s].
         attend: Tells people about the run; called when the program has said something, and now and then.
         on_record_error: Called once, from another thread, with a sentence when the recording has stopped by itself.
@@ -51,6 +54,7 @@ def run_in_lockstep(
     try:
         controller = Controller(setup)
         check_unpaced(controller.cycle.line.plant)
+        learnt = None if learn is None else LearntFile(learn, controller.setup)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     waiting: list[Command] = []
@@ -63,7 +67,7 @@ def run_in_lockstep(
             start_of_it = controller.setup.to_builtins()
             recorder = Recorder(record, info_of(controller), start_of_it, wait=True, on_error=on_record_error)
             sinks.insert(0, ends.enter_context(recorder))
-        host = Host(controller, *sinks)
+        host = _host(controller, sinks, learnt)
         try:
             start(lambda command: host.request(encode(command)), text, inputs)
         except BaseException:
@@ -85,3 +89,16 @@ def run_in_lockstep(
 
 def _nothing() -> None:
     """Do nothing, since the loop checks after each tick whether the run is over."""
+
+
+def _host(controller: Controller, sinks: Sequence[Sink], learnt: LearntFile | None) -> Host:
+    """Return the host of a robot, which learns what its setup says, and its motions if there is a file for them."""
+    setup = controller.setup
+    if learnt is None:
+        return Host(controller, *sinks, experience=experience_of(setup))
+    student = MotionStudent(setup.description, learnt.motions, learnt.write)
+    host = Host(controller, *sinks, experience=experience_of(setup, [student]))
+    host.recall(one.lesson for one in learnt.motions)
+    if learnt.ignored is not None:
+        host.warn(learnt.ignored)
+    return host
