@@ -138,20 +138,43 @@ def modal_calibration(name: str) -> "Calibration":
     return known
 
 
+def modal_for(name: str | None, robot: str) -> "tuple[RobotDescription, Calibration]":
+    """Return a robot, and a calibration with a modal model: the one that was named, or the robot's own.
+
+    Args:
+        name: Name of a calibration that comes with the package, or path of a calibration file; None for the robot's.
+        robot: Name of a robot that comes with the package, or path of a robot file.
+
+    Raises:
+        Failure: There is no such robot or calibration.
+    """
+    from tvist_plant.description import DescriptionError, load
+
+    with told(DescriptionError, code=2):
+        description = load(robot)
+    own = calibration_for(None, "auto", (), 1, description) if name is None else modal_calibration(name)
+    if own is None:
+        raise Failure(
+            f"no calibration comes with the package for {robot}: name one with --calibration", code=2
+        )
+    return description, own
+
+
 def on_the_bench(
-    known: "Calibration", against: list[str] | None, mine: "str | OwnShaper | None" = None
-) -> "tuple[RobotDescription, list[Method]]":
-    """Return the arm of the bench, waiting, and the methods to compare; see `tvist_lab.study.catalogue.bench`.
+    description: "RobotDescription",
+    known: "Calibration",
+    against: list[str] | None,
+    mine: "str | OwnShaper | None" = None,
+) -> "list[Method]":
+    """Return waiting, and the methods to compare; see `tvist_lab.study.catalogue.bench`.
 
     Raises:
         Failure: There is no shaper of a name.
     """
     from tvist_lab.study.catalogue import bench
-    from tvist_plant.description import load
 
-    description = load("ur5e")
     with designing():
         try:
-            return description, bench(description, known, mine, against)
+            return bench(description, known, mine, against)
         except KeyError as error:
             raise Failure(f"against: {error.args[0]}", code=2) from None

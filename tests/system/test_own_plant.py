@@ -111,7 +111,7 @@ def _moves(arm):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--plant", "nobody"), "plant is 'nobody': must be FILE.py:NAME, or one of mujoco"),
+        (("--plant", "nobody"), "plant is 'nobody': must be FILE.py:NAME, or one of calibrated, coulomb"),
         (("--plant", PLACE, "--clock", "lockstep"), "clock is lockstep, but the plant"),
         (("--plant", PLACE, "--speed", "2"), "speed is 2, but the plant"),
         (("--plant", PLACE, "--robots", "ur5e*2"), "gives the tick, and there are 2 robots"),

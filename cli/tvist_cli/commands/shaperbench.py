@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import out, say, typed
-from tvist_cli.shapers_of import load_given, modal_calibration, on_the_bench
+from tvist_cli.shapers_of import load_given, modal_for, on_the_bench
 from tvist_cli.simulated_arm import plants_of
 from tvist_cli.studying import Figures, Places, check_range, check_seed, command, gathered, give, show
 
@@ -29,6 +29,7 @@ def shaperbench(
     moves: int | None = None,
     against: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     hidden: Annotated[list[int] | None, Parameter(consume_multiple=True)] = None,
+    robot: str = "ur5e",
     seed: int = 0,
     calibration: str | None = None,
     output: Path | None = None,
@@ -40,9 +41,9 @@ def shaperbench(
 ) -> None:
     """Rank shapers by how soon thirteen different arms come to rest, and by the vibration until then.
 
-    Every shaper gets the same random moves with payloads of 0 to 5 kg, of which the controller assumes 100, 110 and
-    90 %. Thirteen arms follow its reference; all but one differ from the controller's model. A shaper that uses future
-    samples or does not report its full delay is listed but not ranked.
+    Every shaper gets the same random moves with payloads up to the robot's rating, of which the controller assumes 100,
+    110 and 90 %. Thirteen arms follow its reference; all but one differ from the controller's model. A shaper that uses
+    future samples or does not report its full delay is listed but not ranked.
 
     Args:
         shaper: Python file with a class that has step(q_ref, info) -> q_star, and optionally reset(q) and delay in s;
@@ -52,9 +53,10 @@ def shaperbench(
         against: Names of the shapers and baselines to run, in addition to waiting; default: all.
         hidden: Seeds of hidden robots, each of which is one more arm: its springs, dampers, loops, rotors, friction and
             payload are drawn from its seed.
+        robot: Name of a robot that comes with the package, or path of a robot file.
         seed: Seed of moves, payloads, gear errors and parameter scatter.
         calibration: Name of a calibration that comes with the package, or path of a calibration file; it needs a modal
-            model [ur5e_modal].
+            model [that of the robot].
         output: JSON file to write the leaderboard to.
         figures: Folder to write figures of settling time against residual vibration and against delay to.
         look: How to write the figures.
@@ -72,10 +74,10 @@ def shaperbench(
     count = moves if moves is not None else QUICK if quick else MOVES
     check_range("moves", count, 1, 10_000)
     check_seed(seed)
-    known = modal_calibration(calibration or bench.CALIBRATION)
+    description, known = modal_for(calibration, robot)
     against = None if against is None else [name.lower() for name in against]
     mine = None if shaper is None else _mine(shaper)
-    description, methods = on_the_bench(known, against, mine)
+    methods = on_the_bench(description, known, against, mine)
     arms = [*ARMS, *plants_of([], hidden, description)]
     drawn = bench.draw(description, count, seed)
     faults = [bench.inspect(one, description, drawn) for one in methods]
@@ -89,6 +91,7 @@ def shaperbench(
         "shaper": shaper,
         "against": against,
         "hidden": hidden,
+        "robot": None if robot == "ur5e" else robot,
         "calibration": calibration,
         "quick": quick,
     }
@@ -97,6 +100,7 @@ def shaperbench(
         "command": command("shaperbench", **options, moves=count, seed=seed),
         "moves": count,
         "seed": seed,
+        "robot": description.robot.name,
         "payload_errors": list(bench.PAYLOAD_ERRORS),
         "arms": {arm.name: arm.label for arm in arms},
         "calibration": known.name,

@@ -88,16 +88,14 @@ class ControlCycle:
             target, signals, line.dynamics.payload_parameters,
             may_begin=mode.shaped and not line.filter.fading, may_go_on=mode is not LineMode.BYPASSED,
         )  # fmt: skip
-        motors = line.drives.reference
-        if not self.corrections.idle:
-            plain, command = (
-                command,
-                self.corrections.add(
-                    command, self.trajectory, shaped=mode is LineMode.SHAPED, rests=mode.at_rest
-                ),
+        motors, corrections = line.drives.reference, self.corrections
+        if not corrections.idle:  # what was learnt of this motion is added last, behind the lead
+            plain = command
+            command = corrections.add(
+                plain, self.trajectory, shaped=mode is LineMode.SHAPED, rests=mode.at_rest
             )
             if motors is not None and command is not plain:
-                motors = motors.corrected(command, self.corrections.acceleration)
+                motors = motors.corrected(command, corrections.acceleration)
         measured = line.plant.step(command)
         self.sample = Sample(
             mode, reference, line.shaped.joints.window, target, signals, command, measured, motors, refused,
@@ -148,11 +146,8 @@ class ControlCycle:
             line.enter(path.start, path.posture_of)
         if mode.shaped and trajectory.limits is not None:
             line.filter.limits = trajectory.limits
-        if (
-            self.mode.at_rest
-            and mode is LineMode.SHAPED
-            and not (line.filter.fading or line.dynamics.changing)
-        ):
+        changing = line.filter.fading or line.dynamics.changing
+        if self.mode.at_rest and mode is LineMode.SHAPED and not changing:
             self.corrections.begin(trajectory)
         self.trajectory, self.mode, self.guard = trajectory, mode, guard
         return trajectory

@@ -20,8 +20,6 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_plant.variants import Variant
 
-CALIBRATION = "ur5e_modal"
-"""Calibration of the bench's arm, unless another one is named."""
 PAYLOAD_ERRORS = (0.0, 0.1, -0.1)
 """Errors of the declared mass [-]."""
 WANTED = (

@@ -6,7 +6,7 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import told
 from tvist_cli.output import words
-from tvist_cli.shapers_of import modal_calibration
+from tvist_cli.shapers_of import modal_for
 from tvist_cli.studying import check_range, check_seed, command, gathered, give, show
 
 TERMS = {
@@ -22,26 +22,29 @@ def learning(
     repetitions: int = 6,
     plants: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     shaper: str = "elastic",
+    robot: str = "ur5e",
+    calibration: str | None = None,
     seed: int = 0,
     json: bool = False,
 ) -> None:
-    """Repeat random moves of a UR5e on plants that differ from what the controller knows, and learn each of them.
+    """Repeat random moves on plants that differ from what the controller knows, and learn each of them.
 
-    The payload is 0 to 5 kg, and declared.
+    The payload is up to the robot's rating, and declared.
 
     Args:
         moves: Number of moves of each plant; those that hardly ring unshaped are left out.
         repetitions: Number of times that each is made again.
         plants: Names of plants, or hidden-SEED [stribeck springs-30 springs+30 torsion base combined].
         shaper: Name of the shaper.
+        robot: Name of a robot that comes with the package, or path of a robot file.
+        calibration: Name of a calibration that comes with the package, or path of a calibration file; it needs a modal
+            model [that of the robot].
         seed: Seed of moves, payloads, deviations and noise.
         json: Print one JSON object.
     """
     from tvist_lab.studies.learning import PLANTS, LearningJob, learnt, report
-    from tvist_lab.studies.shaperbench import CALIBRATION
     from tvist_lab.study.case import arm_seed
     from tvist_lab.study.moves import draw_moves
-    from tvist_plant.description import load
     from tvist_plant.variants import variant
 
     check_range("moves", moves, 1, 10_000)
@@ -49,7 +52,7 @@ def learning(
     check_seed(seed)
     with told(ValueError, code=2):
         chosen = [variant(name.lower()) for name in plants or PLANTS]
-    known, description = modal_calibration(CALIBRATION), load("ur5e")
+    description, known = modal_for(calibration, robot)
     drawn = draw_moves(description, moves, seed, (0.0, description.limits.payload)).moves
     jobs = [
         LearningJob(description, known, shaper, one, move, arm_seed(seed, place), repetitions)
@@ -58,6 +61,7 @@ def learning(
     ]
     done = gathered(learnt(jobs), len(jobs), "moves")
     options = {"moves": moves, "repetitions": repetitions, "plants": plants, "shaper": shaper, "seed": seed}
+    options |= {"robot": None if robot == "ur5e" else robot, "calibration": calibration}
     result: dict[str, Any] = {
         "command": command("study learning", **options),
         "moves": moves,
