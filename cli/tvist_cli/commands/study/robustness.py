@@ -71,9 +71,8 @@ def robustness(
     todo = jobs(description, methods, draw(description, moves, seed), seed, hidden or ())
     done = gathered(made(todo), sum(job.motions for job in todo), "motions", ShaperFaultError, weigh=len)
     options = {"against": against, "hidden": hidden, "robot": None if robot == "ur5e" else robot}
-    options |= {"calibration": calibration, "moves": moves, "seed": seed}
     result: dict[str, Any] = {
-        "command": command("study robustness", **options),
+        "command": command("study robustness", **options, calibration=calibration, moves=moves, seed=seed),
         "moves": moves,
         "seed": seed,
         "robot": description.robot.name,
