@@ -191,6 +191,26 @@ def test_the_bending_of_links_is_indispensable_and_rotor_inertia_need_not_be_exa
     assert left_with(other_rotors) < 2.0 * known
 
 
+@pytest.mark.parametrize(
+    ("mass", "start", "target"),
+    [
+        (3.9, (-0.35, -0.82, 0.72, -0.48, 0.0, 0.0), (0.47, -1.64, 0.1, -0.9, 0.0, 0.0)),
+        (3.8, (2.54, -2.88, 1.94, -2.96, 0.0, 0.0), (-1.34, -1.83, 2.3, -0.91, 0.0, 0.0)),
+    ],
+)
+def test_the_acceleration_of_bending_links_counts_where_the_smoothing_is_short(mass, start, target):
+    left = {}
+    for smooth in (True, False):
+        cycle = line("elastic-16", np.array(start), mass=mass, description=UR5E.clean())
+        elastic = cycle.line.drives.wanted
+        command = elastic.command
+        elastic.command = lambda *what, smooth, counts=smooth, command=command: command(
+            *what, smooth=smooth and counts
+        )
+        left[smooth] = ringing(move(cycle, target)[1])
+    assert left[True] < 0.85 * left[False]
+
+
 def test_the_flange_accelerates_as_a_rigid_arms_would():
     """Independent of the lead's formula: the flexible arm's flange beside the rigid kinematics of its target."""
     wrong, kinematics = {}, ForwardKinematics(UR5E)
