@@ -13,7 +13,7 @@ tuned that are older than this rule (2026-11-26) was not written down.
 """
 JUDGING = MappingProxyType(
     {
-        "elastic": 20261123,
+        "elastic": 20261127,
         "elastic with wrong beliefs": 20261124,
         "shaperbench": 20261125,
         "robustness": 20261123,
