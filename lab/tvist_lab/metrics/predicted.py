@@ -85,6 +85,8 @@ class _Stop:
         if np.count_nonzero(counts) < 2 or self._time[-1] < stop + LATE + COUNTED[0]:
             raise NotMeasurableError("too little rest is left after the shaped stop")
         size = np.linalg.norm(alpha[counts], axis=1)
+        if not size.any():
+            raise NotMeasurableError("the accelerometer felt nothing after the stop")
         return float(np.sqrt(np.mean(size**2))), float(size.max())
 
 
