@@ -45,7 +45,7 @@ def test_a_length_that_no_filter_has_is_refused_with_the_lengths_that_there_are(
         "auto-16",
         "zv-16",
         "elastic-016",
-        "elastic-１６",
+        "elastic-\uff11\uff16",
         f"elastic-{'9' * 5000}",
     ],
 )
