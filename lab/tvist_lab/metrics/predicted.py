@@ -98,7 +98,7 @@ def predicted(measured: Measured, place: int) -> tuple[Predicted, ...]:
         place: Place of the motion among those of the log, from 0.
 
     Returns:
-        One for a single mode; and one for two, if two were found.
+        One for a single mode, and one for two.
 
     Raises:
         NotMeasurableError: The log has no repetition of the motion whose modes are known, or too little rest.
