@@ -78,7 +78,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     bound.add_argument("--random", type=_up_to(100_000), default=30, help="Number of random moves [30].")
     bound.add_argument("--seed", type=_up_to(2**63 - 1), default=0, help="Seed of the random moves.")
-    bound.add_argument("--shapers", nargs="+", help="Shapers to compare [zv auto auto-target planned].")
+    bound.add_argument(
+        "--shapers", nargs="+", help="Shapers to compare [zv auto auto-target planned elastic elastic-16]."
+    )
     return parser
 
 

@@ -70,7 +70,7 @@ def plants_of(
         found = [*(variant(name.lower()) for name in names), *map(hidden_variant, hidden or ())]
         for one in found:
             one.make(description, description.payload, 0)  # says what this arm cannot be
-    return found
+    return list({one.name: one for one in found}.values())  # one that is named twice counts once
 
 
 def limits_of(name: str) -> "MotionLimits":

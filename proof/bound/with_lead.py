@@ -86,8 +86,8 @@ def _lead(flexible: FlexibleModel, data: pin.Data, stiffness: Floats, q: Floats,
 
 
 def _least(way: float, limits: MotionLimits, most: Floats, enough: int) -> int:
-    """Least number of ticks of a motion whose |s⁗| keeps a limit at each share of its time."""
-    low, more = max(enough, 4), 4
+    """Least number of ticks, at least `enough`, of a motion whose |s⁗| keeps a limit at each share of its time."""
+    low, more = max(enough - 1, 4), 4
     while _farthest(low + more, limits, most) < way * (1.0 - SLACK):
         low, more = low + more, 2 * more
     high = low + more

@@ -95,7 +95,7 @@ little.
 """
 FIRST = 0.63
 """Share of the first of two running means in both, tuned at 40 ms [-]."""
-_LENGTH = re.compile(r"(.+)-(\d+)")
+_LENGTH = re.compile(r"(.+)-(0|[1-9][0-9]{0,8})")
 OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
     {
         "auto": "four modes with any payload, at a constant mean delay: keeps the limits",

@@ -76,17 +76,22 @@ def load(robot: str | Path) -> RobotDescription:
     except msgspec.ValidationError as error:
         raise RobotFileError(f"robot file {robot}: {in_words(error, content)}") from error
     check(description, robot)
-    _check_imperfections(description, robot)
+    if description.imperfections:
+        _check_imperfections(description, robot)
     return description
 
 
 def _check_imperfections(description: RobotDescription, source: str | Path) -> None:
-    """Check the table of imperfections by converting it.
+    """Check the table of imperfections by converting it, and that this arm can have them.
 
     Raises:
         RobotFileError: A key is unknown, or a value wrong; the message names the file and the key.
     """
-    from tvist_plant.imperfections import Imperfections  # pinocchio is slow to import
+    from tvist_plant.imperfections import (
+        GearLaw,
+        Imperfections,
+        imperfect_model,
+    )  # pinocchio is slow to import
 
     table = {"imperfections": description.imperfections}
     try:
@@ -104,3 +109,8 @@ def _check_imperfections(description: RobotDescription, source: str | Path) -> N
             raise RobotFileError(
                 f"robot file {source}: imperfections.{name:.200} is not a key of a robot file"
             )
+    try:
+        GearLaw.of(made, description)
+        imperfect_model(description, description.payload, made)
+    except ValueError as error:
+        raise RobotFileError(f"robot file {source}: imperfections: {error}") from error

@@ -366,6 +366,11 @@ def test_a_lead_that_the_torque_does_not_permit_is_limited_and_told():
     assert any(told)
 
 
+def test_friction_that_is_less_at_breakaway_takes_as_much_of_the_torque_as_in_motion():
+    law = np.array([[10.0], [0.5], [0.05], [0.03], [1e-9]]) * np.ones(6)
+    assert stage(law=law)._most == pytest.approx(0.95 * LIMIT - 10.0)
+
+
 def watched_commands(robot):
     """Commands that the drives get from now on."""
     commands, step = [], robot.controller.cycle.line.plant.step

@@ -1,11 +1,13 @@
 """A real UR5 that rings: twenty seconds of a published recording, see `data/NOTICE`."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tvist_lab.metrics import Measured, NotMeasurableError, predicted
+from tvist_lab.metrics.vibration import SENSOR
 from tvist_lab.recordings import read
 
 RECORDED = Path(__file__).parent / "data" / "ur5_that_rings.csv.gz"
@@ -65,3 +67,13 @@ def test_two_modes_of_other_repetitions_predict_that_a_fifth_of_a_real_arms_ring
 def test_a_stop_without_repetition_is_not_predicted():
     with pytest.raises(NotMeasurableError, match="no repetition of this motion"):
         predicted(Measured.of(read(RECORDED)), 0)
+
+
+def test_a_stop_at_which_the_accelerometer_is_frozen_is_not_predicted():
+    found = Measured.of(read(RECORDED.with_name("ur5_that_stops_again.csv.gz")))
+    felt = found.recording[SENSOR].copy()
+    rows = slice(found.motions[0].start, found.motions[0].end)
+    felt[rows] = (0.0, 0.0, 9.75)
+    frozen = replace(found.recording, columns={**found.recording.columns, SENSOR: felt})
+    with pytest.raises(NotMeasurableError, match="felt nothing"):
+        predicted(replace(found, recording=frozen), 0)

@@ -1,12 +1,16 @@
 """The lightly damped arm rings as the real UR5 that it is fitted to; `tests/lab/data/NOTICE` names the recordings."""
 
+import subprocess
+import sys
 from importlib import resources
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tvist_controller.api.line import respond
+from tvist_controller.api.line import paper_payload, respond
+from tvist_controller.experience.motion_record import Beliefs
+from tvist_controller.experience.twin import Twin
 from tvist_lab.metrics.ring_down import Ring
 from tvist_lab.study.line import RESTING, ControlLine
 from tvist_plant.description import DescriptionError, Payload, load
@@ -118,10 +122,24 @@ def test_the_file_s_imperfections_are_the_plant_s_and_more_may_be_added():
         ("rotor = 0", "rotor is 0.0: must be above 0"),
         ("base = {stiff = 1}", "imperfections.base.stiff is not a key"),
         ("base = {mass = 0}", "base.mass is 0.0: must be above 0"),
+        ("backlash = [1e-4]", "imperfections: backlash has 1 values: must have 6"),
+        ("torsion = 1e4", "imperfections: torsion is 10000 N m/rad, but no link"),
     ],
 )
 def test_a_wrong_imperfection_is_refused_by_its_name(tmp_path, line, said):
-    text = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
+    robot = "one-joint" if "torsion" in line else "ur5e"
+    text = (resources.files("tvist_plant") / "robots" / f"{robot}.toml").read_text(encoding="utf-8")
     (tmp_path / "wrong.toml").write_text(f"{text}\n[imperfections]\n{line}\n", encoding="utf-8")
     with pytest.raises(DescriptionError, match=said):
         load(tmp_path / "wrong.toml")
+
+
+def test_no_controller_knows_the_file_s_imperfections():
+    """The twin by which a robot learns is a controller's, too."""
+    twin = Twin(ARM, Beliefs(paper_payload(ARM, 2.0), None, "elastic"))
+    assert twin.arm._imperfections == Imperfections()
+
+
+def test_a_robot_file_without_imperfections_is_read_without_pinocchio_which_is_slow_to_import():
+    code = "import sys; from tvist_plant.description import load; load('ur5e'); print('pinocchio' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "False"

@@ -93,7 +93,7 @@ def test_with_a_lead_the_torque_alone_costs_time():
     strong, own, weak = (
         with_lead.bound_with_lead(arm, MOVE, PAPER) for arm in (weaker(100.0), ARM, weaker(0.1))
     )
-    assert strong <= own <= 2.01 * H < weak
+    assert 0.0 == strong <= own <= 2.01 * H < weak
 
 
 def test_the_lead_of_the_bound_is_that_of_the_controller():

@@ -36,7 +36,19 @@ def test_a_length_that_no_filter_has_is_refused_with_the_lengths_that_there_are(
         BUILT_IN.check(name)
 
 
-@pytest.mark.parametrize("name", ["elastic-", "elastic-x", "elastic-16-16", "auto-16", "zv-16"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "elastic-",
+        "elastic-x",
+        "elastic-16-16",
+        "auto-16",
+        "zv-16",
+        "elastic-016",
+        "elastic-\uff11\uff16",
+        f"elastic-{'9' * 5000}",
+    ],
+)
 def test_any_other_name_is_unknown(name):
     with pytest.raises(UnknownShaperError):
         BUILT_IN.check(name)

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from tests.system.test_command_line import tvist
 
+from tvist_cli.simulated_arm import plants_of
+from tvist_plant.description import load
 from tvist_shaping import SHAPERS, residual
 from tvist_shaping.impulse_train import Impulses
 
@@ -283,3 +285,8 @@ def test_shaperbench_names_a_cheat_and_does_not_rank_it(here):
     assert json.loads((here / "board.json").read_text(encoding="utf-8")) == ended.json
     assert set(rows["zv"]["by_arm"]) == set(ended.json["arms"])
     assert len(ended.json["arms"]) == 10
+
+
+def test_a_plant_that_is_named_twice_counts_once():
+    names = [one.name for one in plants_of(["stribeck", "Stribeck", "hidden-5"], [5, 6, 5], load("ur5e"))]
+    assert names == ["stribeck", "hidden-5", "hidden-6"]

@@ -27,7 +27,8 @@ class Twin:
         if calibration is not None and calibration.modal is not None:
             description = identified_arm(description, calibration)
         drives = replace(description.drives, gear_error_amplitude=0.0)
-        self.description = replace(description, drives=drives)
+        # Nobody has told a controller what the robot file says of its simulated arm alone.
+        self.description = replace(description, drives=drives, imperfections={})
         """The arm."""
         self.arm = FlexibleArm(self.description, body(beliefs.payload))
 

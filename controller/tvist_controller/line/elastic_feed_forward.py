@@ -53,9 +53,9 @@ class ElasticFeedForward:
         self._rotor = np.array(drives.rotor_inertia)
         friction = np.array(drives.coulomb_friction)
         self._law = np.zeros((0, 0)) if law is None else law
-        largest = (
-            friction if law is None else law[0] * law[1] + law[4] * np.array(description.limits.velocity)
-        )
+        largest = friction
+        if law is not None:
+            largest = law[0] * np.maximum(law[1], 1.0) + law[4] * np.array(description.limits.velocity)
         self._most, self._least = TORQUE_SHARE * limits - largest, LEAST_ROOM * limits
         self._linear, self._width = drives.linear_friction, drives.friction_width
         self._friction = friction / self._width if self._linear else drives.friction_feedforward * friction

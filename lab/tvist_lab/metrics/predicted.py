@@ -85,6 +85,8 @@ class _Stop:
         if np.count_nonzero(counts) < 2 or self._time[-1] < stop + LATE + COUNTED[0]:
             raise NotMeasurableError("too little rest is left after the shaped stop")
         size = np.linalg.norm(alpha[counts], axis=1)
+        if not size.any():
+            raise NotMeasurableError("the accelerometer felt nothing after the stop")
         return float(np.sqrt(np.mean(size**2))), float(size.max())
 
 
@@ -96,7 +98,7 @@ def predicted(measured: Measured, place: int) -> tuple[Predicted, ...]:
         place: Place of the motion among those of the log, from 0.
 
     Returns:
-        One for a single mode; and one for two, if two were found.
+        One for a single mode, and one for two.
 
     Raises:
         NotMeasurableError: The log has no repetition of the motion whose modes are known, or too little rest.

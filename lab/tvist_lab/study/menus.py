@@ -66,7 +66,7 @@ ROWS = (
     Row("ei2", "TVIST-EI2, lowest mode", ("lesson",)),
     Row("ei3", "TVIST-EI3, lowest mode", ("lesson",)),
     Row("auto", "constant mean delay, auto", ("bench", "robustness", "paths", "bound")),
-    Row("auto-target", "constant mean delay, given the end of each move", ("bench", "robustness", "paths", "bound")),
+    Row("auto-target", "ZV of three modes for the end of each move", ("bench", "robustness", "paths", "bound")),
     Row("short", "constant mean delay, short", ("bench", "paths")),
     Row("planned", "planned to leave no vibration", ("bench", "robustness", "bound")),
     Row("smoothing", "smoothing of elastic alone", ("bench", "robustness"), "shaped alone", "elastic"),

@@ -46,11 +46,14 @@ def learning(
     from tvist_lab.study.case import arm_seed
     from tvist_lab.study.moves import draw_moves
     from tvist_plant.variants import variant
+    from tvist_shaping.errors import ShapingError
+    from tvist_shaping.named import BUILT_IN
 
     check_range("moves", moves, 1, 10_000)
     check_range("repetitions", repetitions, 1, 1000)
     check_seed(seed)
-    with told(ValueError, code=2):
+    with told(ShapingError, ValueError, code=2):
+        BUILT_IN.check(shaper := shaper.lower())
         chosen = [variant(name.lower()) for name in plants or PLANTS]
     description, known = modal_for(calibration, robot)
     drawn = draw_moves(description, moves, seed, (0.0, description.limits.payload)).moves
