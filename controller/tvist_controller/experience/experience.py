@@ -1,12 +1,14 @@
 """Records the motions of a robot, has them studied, and keeps the lessons until the arm rests."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from tvist_controller.experience.lesson import Later, Student, Work
 from tvist_controller.experience.motion_record import Beliefs, MotionRecorder
 from tvist_controller.line.correction import Repetition
 from tvist_controller.line.sample import Sample
+from tvist_plant.user_file import named
 from tvist_protocol.lessons import Lesson
 
 
@@ -47,6 +49,7 @@ class Experience:
         self._students, self._later, self._plan = students, later, plan
         self._under_way: list[tuple[Callable[[], bool], list[Taught]]] = []
         self._raised: list[Exception] = []
+        self._said = set[str]()
 
     def watch(
         self,
@@ -72,6 +75,10 @@ class Experience:
         motion = recorder.take(sample, known, repetition)
         if motion is None:
             return
+        if (
+            motion.repetition is not None and motion.beliefs != beliefs()
+        ):  # it was made otherwise than it began
+            motion = replace(motion, repetition=None)
         for student in self._students:
             learnt: list[Taught] = []
 
@@ -88,14 +95,22 @@ class Experience:
 
             self._under_way.append((self._later(study), learnt))
 
+    def forget(self, *, lessons: bool) -> None:
+        """Drop the present motion, since the arm was placed elsewhere, and all lessons if with another load."""
+        self._recorder.begin_anew()
+        if lessons:
+            self._under_way = []
+
     def lessons(self) -> Iterator[Taught]:
         """Yield the lessons of all finished studies, once; to be asked while the arm rests."""
         while self._under_way and self._under_way[0][0]():
             yield from self._under_way.pop(0)[1]
 
     def raised(self) -> Sequence[Exception]:
-        """Return what studies have raised, once."""
+        """Return what studies have raised, once, and not the same with every motion."""
         if not self._raised:
             return ()
         raised, self._raised = self._raised, []
-        return raised
+        new = [error for error in raised if named(error) not in self._said]
+        self._said.update(map(named, new))
+        return new
