@@ -73,6 +73,11 @@ def test_a_folder_that_is_missing_is_refused(tmp_path):
         made_robot(SETUP, config, None, several=False)
 
 
+def test_a_name_that_no_file_can_have_is_refused(tmp_path):
+    with pytest.raises(LearntFileError, match="name too long"):
+        LearntFile(tmp_path / ("long" * 100), SETUP)
+
+
 @given(
     number=st.integers(0, 30),
     value=st.floats(allow_nan=True) | st.integers() | st.text(max_size=3) | st.none(),

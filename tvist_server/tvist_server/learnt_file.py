@@ -81,9 +81,9 @@ class LearntFile:
     def _read(self) -> tuple[LearntMotion, ...]:
         if not self._path.parent.is_dir():
             raise LearntFileError(f"learn is {self._path}: there is no folder {self._path.parent}")
-        if not self._path.exists():
-            return ()
         try:
+            if not self._path.exists():
+                return ()
             content = checked(parse_json(read_bytes(self._path, "file of learnt motions")), _Content)
         except OSError as error:
             raise LearntFileError(f"learn is {self._path}: {error.strerror}") from error
