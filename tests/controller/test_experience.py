@@ -180,3 +180,29 @@ def test_a_study_that_fails_is_told_once():
     for q in (Q2, Q1):
         robot.move(q)
     assert b"".join(robot.events).count(b"No space left on device") == 1
+
+
+def test_what_is_being_learnt_when_it_is_to_be_forgotten_is_not_taken():
+    robot, works = Served(Recalling(2.0)), []
+
+    def later(work):
+        works.append(work)
+        return lambda: not works
+
+    robot.host._host._experience._later = later
+    robot.move(Q2)
+    robot.ask(Forget(token=robot.token, what="payload"))
+    works.pop()()
+    robot.tick(5)
+    assert "lesson" not in [entry.kind for entry in robot.host.entries]
+
+
+def test_motions_that_are_made_faster_than_studied_do_not_fill_the_memory(monkeypatch):
+    monkeypatch.setattr("tvist_controller.experience.experience.WAITING", 2)
+    robot = Served(Recalling())
+    experience = robot.host._host._experience
+    experience._later = lambda _: lambda: False
+    for _ in range(2):
+        robot.move(Q2, 2.5)
+        robot.move(Q1, 2.5)
+    assert len(experience._under_way) == 2

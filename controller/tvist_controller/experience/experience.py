@@ -18,6 +18,10 @@ def at_once(work: Work) -> Callable[[], bool]:
     return lambda: True
 
 
+WAITING = 16
+"""Studies that may wait: of motions that are made faster than studied, such as at a high speed, some teach nothing."""
+
+
 class Taught(NamedTuple):
     """A lesson, and what it depends on."""
 
@@ -73,7 +77,7 @@ class Experience:
             return
         known = beliefs() if recorder.begins and not sample.mode.at_rest else None
         motion = recorder.take(sample, known, repetition)
-        if motion is None:
+        if motion is None or len(self._under_way) >= WAITING:
             return
         if (
             motion.repetition is not None and motion.beliefs != beliefs()
@@ -95,11 +99,13 @@ class Experience:
 
             self._under_way.append((self._later(study), learnt))
 
-    def forget(self, *, lessons: bool) -> None:
-        """Drop the present motion, since the arm was placed elsewhere, and all lessons if with another load."""
+    def placed(self) -> None:
+        """Drop the present motion, since the arm was placed elsewhere."""
         self._recorder.begin_anew()
-        if lessons:
-            self._under_way = []
+
+    def void(self) -> None:
+        """Drop what is being learnt of motions so far, since it is to be forgotten, or the arm carries another load."""
+        self._under_way = []
 
     def lessons(self) -> Iterator[Taught]:
         """Yield the lessons of all finished studies, once; to be asked while the arm rests."""
