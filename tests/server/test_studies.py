@@ -7,7 +7,11 @@ import time
 
 import pytest
 
+from tvist_controller.experience import payload_student
+from tvist_controller.experience.motion_student import MotionStudent
+from tvist_plant import flexible_arm
 from tvist_plant.arm_tick import play
+from tvist_plant.description import load
 from tvist_server.studies import Studies
 
 
@@ -31,3 +35,14 @@ def test_studies_do_not_inherit_what_the_tick_thread_has():
 def test_a_twin_moves_without_the_interpreters_lock():
     options = getattr(play, "targetoptions", {"nogil": True})  # none without numba
     assert options["nogil"]
+
+
+@pytest.mark.parametrize(
+    ("student", "module", "kernel"),
+    [(MotionStudent, flexible_arm, "play"), (payload_student.PayloadStudent, payload_student, "along")],
+)
+def test_compiled_code_is_loaded_before_the_first_tick(monkeypatch, student, module, kernel):
+    compiled, called = getattr(module, kernel), []
+    monkeypatch.setattr(module, kernel, lambda *given: called.append(kernel) or compiled(*given))
+    student(load("ur5e"))
+    assert called
