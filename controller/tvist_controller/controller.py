@@ -391,7 +391,9 @@ class Controller(WholeRobot):
     def beliefs(self) -> Beliefs:
         """Return what it takes the arm for."""
         basis = self.filters.basis
-        return Beliefs(self._payload.assumed, basis.source.calibration, basis.name, basis)
+        source = basis.source
+        modes = (basis.modes, source.name, *source.f_d, *source.zeta)
+        return Beliefs(self._payload.assumed, source.calibration, basis.name, modes, basis)
 
     def learn(self, lesson: Lesson, plan: Plan | None = None) -> None:
         """Take a lesson at rest, which changes how it moves from now on.

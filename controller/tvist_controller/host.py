@@ -22,12 +22,13 @@ from tvist_controller.programs.socket_ports import NoPorts, SocketPorts
 from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.reporting.sink import Sink
 from tvist_controller.sources.plant_calls import told
+from tvist_plant.user_file import named
 from tvist_protocol.codec import encode
-from tvist_protocol.commands import Setpoint
+from tvist_protocol.commands import Command, Forget, Setpoint
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.lessons import Lesson
 from tvist_protocol.replies import Done, Refused, Reply
-from tvist_protocol.simulation import SimulationStep
+from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event
 
 Attend = Callable[[], bool]
@@ -96,6 +97,8 @@ class Host:
             self.controller.session.lease, getattr(command, "token", None)
         ):
             self._note(entry)
+        if self._experience is not None and not isinstance(reply, Refused):
+            self._outdate(self._experience, command)
         if isinstance(command, SimulationStep) and isinstance(reply, Done):
             reply = self._step(command, attend)
         self.standing = self._standing()
@@ -170,8 +173,19 @@ class Host:
                 continue  # it is void: another payload was declared, learnt or forgotten since
             self._take(lesson, plan)
         for error in experience.raised():
+            self.warn(f"a motion has taught nothing: {named(error)}")
             for sink in self._sinks:
                 sink.raised(error)
+
+    def _outdate(self, experience: Experience, command: Command) -> None:
+        """Drop what a command that was carried out makes wrong."""
+        match command:
+            case Forget():
+                experience.void()
+            case SimulationReset():
+                experience.placed()
+                if command.payload is not None or self.controller.cell is not None:
+                    experience.void()
 
     def _tell_truth(self) -> None:
         """Pass on what a real robot cannot measure, computed once, to those who want it."""

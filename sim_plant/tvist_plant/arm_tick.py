@@ -2,7 +2,7 @@
 
 import math
 
-from tvist_plant._compiled import compiled
+from tvist_plant._compiled import compiled, compiled_for_long
 from tvist_plant.arm_memory import ENCODER_STEP, GRAVITY, NOW, ArmMemory, parts
 from tvist_plant.chain import collect_inertia, collect_torques, sweep
 from tvist_plant.integrator import advance, balance, rows
@@ -96,7 +96,7 @@ def tick(memory: Floats, q: Floats, qd: Floats, torque: Floats, out: Floats) -> 
     return evaluate(memory, out)
 
 
-@compiled
+@compiled_for_long
 def play(memory: Floats, commands: Floats, measured: Floats, flange: Floats) -> int:
     """Compute many periods of an arm on which nothing pushes, one by one as `tick` does.
 

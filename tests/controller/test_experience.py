@@ -13,9 +13,9 @@ from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay
 from tvist_plant.description import load
 from tvist_protocol.codec import decode_state, encode
-from tvist_protocol.commands import Forget, MoveJ, Stop, TakeControl
+from tvist_protocol.commands import Forget, MoveJ, SetEstimator, SetPayload, Stop, TakeControl
 from tvist_protocol.lessons import PayloadLesson
-from tvist_protocol.simulation import SimulationStep
+from tvist_protocol.simulation import SimulationReset, SimulationStep
 
 ROBOT = load("ur5e")
 Q1, Q2 = ROBOT.poses["Q1"], ROBOT.poses["Q2"]
@@ -124,3 +124,85 @@ def test_a_motion_longer_than_the_memory_teaches_nothing():
     assert not student.motions
     robot.move(Q1)
     assert len(student.motions) == 1
+
+
+def heavier(robot):
+    """Declare another payload, which is phased in during the next half second."""
+    other = paper_payload(ROBOT, 2.0)
+    robot.ask(SetPayload(token=robot.token, mass=2.0, com=other.com, inertia=other.inertia))
+
+
+def test_an_arm_that_is_placed_elsewhere_in_a_motion_has_made_none():
+    student = Recalling()
+    robot = Served(student)
+    robot.move(Q2, 0.6)
+    robot.ask(SimulationReset(token=robot.token, q=Q1, payload=paper_payload(ROBOT, 2.0)))
+    robot.tick(500)
+    assert not student.motions
+    robot.move(Q2, 2.5)
+    robot.ask(SimulationReset(token=robot.token, q=Q1))
+    robot.move(Q2)
+    assert np.abs(student.motions[-1].rest.q - Q1).max() < 0.01
+
+
+@pytest.mark.parametrize("when", ["before", "during"])
+def test_a_motion_in_which_another_payload_is_phased_in_is_no_repetition(when):
+    student = Recalling()
+    robot = Served(student)
+    robot.move(Q2)
+    robot.move(Q1)
+    if when == "before":
+        heavier(robot)
+    robot.move(Q2, 0.3)
+    if when == "during":
+        heavier(robot)
+    robot.tick(1500)
+    assert [motion.repetition is not None for motion in student.motions] == [True, True, False]
+
+
+def test_beliefs_tell_constant_modes_apart():
+    robot, digests = Served(shaper="zv"), set()
+    for f_d in (10.0, 6.0):
+        robot.ask(SetEstimator(token=robot.token, name="fixed", f_d=(f_d,), zeta=(0.1,)))
+        digests.add(robot.host.controller.beliefs().digest)
+    assert len(digests) == 2
+
+
+class Failing:
+    """Fails at each motion in the same way."""
+
+    def study(self, motion):  # noqa: ARG002
+        raise OSError(28, "No space left on device")
+
+
+def test_a_study_that_fails_is_told_once():
+    robot = Served(Failing())
+    for q in (Q2, Q1):
+        robot.move(q)
+    assert b"".join(robot.events).count(b"No space left on device") == 1
+
+
+def test_what_is_being_learnt_when_it_is_to_be_forgotten_is_not_taken():
+    robot, works = Served(Recalling(2.0)), []
+
+    def later(work):
+        works.append(work)
+        return lambda: not works
+
+    robot.host._host._experience._later = later
+    robot.move(Q2)
+    robot.ask(Forget(token=robot.token, what="payload"))
+    works.pop()()
+    robot.tick(5)
+    assert "lesson" not in [entry.kind for entry in robot.host.entries]
+
+
+def test_motions_that_are_made_faster_than_studied_do_not_fill_the_memory(monkeypatch):
+    monkeypatch.setattr("tvist_controller.experience.experience.WAITING", 2)
+    robot = Served(Recalling())
+    experience = robot.host._host._experience
+    experience._later = lambda _: lambda: False
+    for _ in range(2):
+        robot.move(Q2, 2.5)
+        robot.move(Q1, 2.5)
+    assert len(experience._under_way) == 2

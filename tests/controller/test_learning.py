@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace as changed
-from tests.controller.test_experience import Q1, Q2, ROBOT, Served
+from tests.controller.test_experience import Q1, Q2, ROBOT, Recalling, Served
 from tests.examples import examples
 
 from tvist_controller.calibrations import load as load_calibration
@@ -172,6 +172,38 @@ def test_whatever_becomes_of_a_motion_its_correction_neither_jumps_nor_begins_at
     assert np.abs(np.diff(more[:, 0], 2, axis=0)).max() / PERIOD**2 <= MOST * 1.05
     assert np.abs(more[-1]).max() < 1e-12
     assert (np.abs(corrected[:, 2]) <= np.array(ROBOT.limits.torque) + 1e-9).all()
+
+
+def test_a_correction_that_is_still_playing_goes_on_to_its_end():
+    def near(q):
+        return (q[0] + 0.02, *q[1:])
+
+    def sent_in(lessons, student):
+        robot = Served(student)
+        for one in lessons:
+            robot.host.controller.learn(one)
+        sent = Sent(robot)
+        for q in (Q2, near(Q2)):
+            robot.ask(MoveJ(token=robot.token, q=q))
+            while not robot.host.controller.cycle.mode.at_rest:
+                robot.tick(1)
+            if not lessons:
+                robot.tick(200)
+        robot.tick(300)
+        return sent.take()
+
+    student = Recalling()
+    sent_in((), student)
+    first, second = student.motions
+    lessons = [
+        MotionLesson(move=first.repetition.move, begins=first.stop + LATE - LENGTH, bumps=LOUD, why=""),
+        MotionLesson(move=second.repetition.move, begins=2, bumps=LOUD, why=""),
+    ]
+    plain = [changed(one, bumps=()) for one in lessons]
+    both, neither = (sent_in(these, Recalling()) for these in (lessons, plain))
+    more = both[:, 0] - neither[:, 0]
+    assert np.abs(more).max() > 1e-6
+    assert np.abs(np.diff(more, 2, axis=0)).max() / PERIOD**2 <= MOST * 1.05
 
 
 def run(happenings, *, corrected):

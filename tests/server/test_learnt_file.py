@@ -73,6 +73,11 @@ def test_a_folder_that_is_missing_is_refused(tmp_path):
         made_robot(SETUP, config, None, several=False)
 
 
+def test_a_name_that_no_file_can_have_is_refused(tmp_path):
+    with pytest.raises(LearntFileError, match="name too long"):
+        LearntFile(tmp_path / ("long" * 100), SETUP)
+
+
 @given(
     number=st.integers(0, 30),
     value=st.floats(allow_nan=True) | st.integers() | st.text(max_size=3) | st.none(),
@@ -104,3 +109,17 @@ def test_motions_of_another_robot_file_are_not_those_of_this_one(tmp_path):
     other = replace(SETUP, description=changed(SETUP.description, drives=drives))
     with pytest.raises(LearntFileError, match="give this robot a file of its own"):
         LearntFile(path, other)
+
+
+def test_what_cannot_be_written_is_told_once_and_learning_goes_on(tmp_path):
+    folder, told = tmp_path / "gone", []
+    folder.mkdir()
+    keep = LearntFile(folder / "moves.json", SETUP).keeper(told.append)
+    folder.rmdir()
+    keep([ONE])
+    keep([ONE])
+    assert len(told) == 1
+    assert "cannot be written" in told[0]
+    folder.mkdir()
+    keep([ONE])
+    assert LearntFile(folder / "moves.json", SETUP).motions == (ONE,)

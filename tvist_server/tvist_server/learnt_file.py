@@ -1,6 +1,6 @@
 """The file in which a robot keeps what it has learnt of its motions."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from hashlib import sha256
 from pathlib import Path
 from typing import Literal
@@ -61,12 +61,29 @@ class LearntFile:
         beside.write_bytes(msgspec.json.format(msgspec.json.encode(content), indent=1) + b"\n")
         beside.replace(self._path)
 
+    def keeper(self, tell: Callable[[str], None]) -> Callable[[Sequence[LearntMotion]], None]:
+        """Return what writes the file, and tells once if that is not possible: the robot goes on learning."""
+        told = False
+
+        def keep(motions: Sequence[LearntMotion]) -> None:
+            nonlocal told
+            try:
+                self.write(motions)
+            except OSError as error:
+                if not told:
+                    tell(f"{self._path} cannot be written, so that what is learnt is lost: {error.strerror}")
+                told = True
+            else:
+                told = False
+
+        return keep
+
     def _read(self) -> tuple[LearntMotion, ...]:
         if not self._path.parent.is_dir():
             raise LearntFileError(f"learn is {self._path}: there is no folder {self._path.parent}")
-        if not self._path.exists():
-            return ()
         try:
+            if not self._path.exists():
+                return ()
             content = checked(parse_json(read_bytes(self._path, "file of learnt motions")), _Content)
         except OSError as error:
             raise LearntFileError(f"learn is {self._path}: {error.strerror}") from error

@@ -22,6 +22,8 @@ class PlansOfPrograms:
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
         self._thread = ThreadPoolExecutor(1, "tvist-program-plans")
+        # Begun by the tick thread, it would inherit its priority and processor.
+        self._thread.submit(int)
 
     def order(self, command: Command, basis: PlanBasis) -> Callable[[], Plan]:
         """Have a command planned on a state; returns what waits for the plan."""

@@ -99,7 +99,7 @@ class ServedRobot:
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
         """Gateway for the sockets of programs."""
         if learnt is not None:
-            students = (*students, MotionStudent(setup.description, learnt.motions, learnt.write))
+            students = (*students, MotionStudent(setup.description, learnt.motions, learnt.keeper(self.warn)))
         self._studies = Studies() if self._realtime and (students or setup.adapt) else None
         if self._studies is None:
             experience = experience_of(setup, students)

@@ -11,6 +11,8 @@ class Studies:
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, "tvist-studies")
+        # Begun by the tick thread, it would inherit its priority and processor.
+        self._thread.submit(int)
 
     def later(self, work: Work) -> Callable[[], bool]:
         """Have a study made; returns what tells whether it has ended."""

@@ -1,12 +1,14 @@
 """Records the motions of a robot, has them studied, and keeps the lessons until the arm rests."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from tvist_controller.experience.lesson import Later, Student, Work
 from tvist_controller.experience.motion_record import Beliefs, MotionRecorder
 from tvist_controller.line.correction import Repetition
 from tvist_controller.line.sample import Sample
+from tvist_plant.user_file import named
 from tvist_protocol.lessons import Lesson
 
 
@@ -14,6 +16,10 @@ def at_once(work: Work) -> Callable[[], bool]:
     """Study within the tick; with the clocks lockstep and free a tick may take as long as it likes."""
     work()
     return lambda: True
+
+
+WAITING = 16
+"""Studies that may wait: of motions that are made faster than studied, such as at a high speed, some teach nothing."""
 
 
 class Taught(NamedTuple):
@@ -47,6 +53,7 @@ class Experience:
         self._students, self._later, self._plan = students, later, plan
         self._under_way: list[tuple[Callable[[], bool], list[Taught]]] = []
         self._raised: list[Exception] = []
+        self._said = set[str]()
 
     def watch(
         self,
@@ -70,8 +77,12 @@ class Experience:
             return
         known = beliefs() if recorder.begins and not sample.mode.at_rest else None
         motion = recorder.take(sample, known, repetition)
-        if motion is None:
+        if motion is None or len(self._under_way) >= WAITING:
             return
+        if (
+            motion.repetition is not None and motion.beliefs != beliefs()
+        ):  # it was made otherwise than it began
+            motion = replace(motion, repetition=None)
         for student in self._students:
             learnt: list[Taught] = []
 
@@ -88,14 +99,24 @@ class Experience:
 
             self._under_way.append((self._later(study), learnt))
 
+    def placed(self) -> None:
+        """Drop the present motion, since the arm was placed elsewhere."""
+        self._recorder.begin_anew()
+
+    def void(self) -> None:
+        """Drop what is being learnt of motions so far, since it is to be forgotten, or the arm carries another load."""
+        self._under_way = []
+
     def lessons(self) -> Iterator[Taught]:
         """Yield the lessons of all finished studies, once; to be asked while the arm rests."""
         while self._under_way and self._under_way[0][0]():
             yield from self._under_way.pop(0)[1]
 
     def raised(self) -> Sequence[Exception]:
-        """Return what studies have raised, once."""
+        """Return what studies have raised, once, and not the same with every motion."""
         if not self._raised:
             return ()
         raised, self._raised = self._raised, []
-        return raised
+        new = [error for error in raised if named(error) not in self._said]
+        self._said.update(map(named, new))
+        return new

@@ -33,13 +33,15 @@ class Beliefs:
     """Calibration of the filter's modes; None for constant modes."""
     shaper: str
     """Name of the filter."""
+    modes: tuple[Any, ...] = ()
+    """Number and source of the modes that it suppresses."""
     basis: Any = None
     """State that plans for lessons depend on; what it is matters to those who make them alone."""
 
     @property
     def digest(self) -> bytes:
         """Digest of what is believed."""
-        believed = (self.payload, self.calibration, self.shaper)
+        believed = (self.payload, self.calibration, self.shaper, self.modes)
         return blake2b(msgspec.json.encode(believed), digest_size=8).digest()
 
 
@@ -161,6 +163,11 @@ class MotionRecorder:
     def forget(self) -> None:
         """Drop the present motion, since the drives do not hold the arm."""
         self._moves, self._samples, self._ticks, self._stop = False, [], 0, 0
+
+    def begin_anew(self) -> None:
+        """Drop also the last command, since the arm was placed elsewhere."""
+        self.forget()
+        self._before = None
 
     def _finished(self) -> Recorded | None:
         if not self._stop or self._stop > LONGEST or self._beliefs is None or self._rest is None:

@@ -19,6 +19,7 @@ from tvist_controller.experience.twin import Twin
 from tvist_controller.line.correction import BUMPS, JOINTS, KEPT, LENGTH, course, heights
 from tvist_controller.line.differentiator import Floats
 from tvist_plant.description import RobotDescription
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.lessons import Bumps, MotionLesson
 
 STILL = 0.04
@@ -93,6 +94,10 @@ class MotionStudent:
     ) -> None:
         self._description, self._keep = description, keep
         self._motions = {one.move: _Learning(one) for one in learnt}
+        still = np.zeros((1, 3, description.joints))
+        FlexibleArm(description, description.payload).play(
+            still
+        )  # loads compiled code, which takes many ticks
 
     def study(self, motion: MotionRecord) -> MotionLesson | None:
         """Return the correction of the motion's next repetition; None if it stays as it is."""

@@ -212,6 +212,10 @@ class _Arm:
         self._friction, self._width = np.array(drives.coulomb_friction), drives.friction_width
         self._linear, self._rotors = drives.linear_friction, np.array(drives.rotor_inertia)
         self._noise = NOISE[0] * self._friction + NOISE[1] * np.array(description.limits.torque)
+        still = np.zeros((1, description.joints))
+        self._torques(
+            0, self._chain[0, BODY:], still, still, still
+        )  # loads compiled code, which takes many ticks
 
     def equations(self, motion: MotionRecord, at: Floats) -> Equations:
         """Return the equations of a motion about a mass [kg] and centre of mass [m], shape (4,)."""

@@ -130,8 +130,8 @@ class Corrections:
         known, self._known = self._known, {}
         return bool(known)
 
-    def begin(self, trajectory: Trajectory) -> None:
-        """Take notice of a shaped motion that begins at rest."""
+    def begin(self, trajectory: Trajectory | None) -> None:
+        """Take notice of a shaped motion that begins at rest; None for any other one."""
         self._repetition = self._motion = None
         if self.beliefs is None or not isinstance(trajectory, PlannedMotion):
             return
@@ -186,8 +186,12 @@ class Corrections:
             self._repetition = self._motion = None
             return
         corrected = None if self._repetition is None else self._repetition.corrected
-        if corrected is not None and self._ticks == corrected.begins:
-            self._course, self._played = course(heights(corrected.bumps))[:, :, : self._joints], 0
+        if corrected is None or self._ticks != corrected.begins:
+            return
+        if self._course is not None:  # that of the motion before goes on to its end
+            self._repetition = self._motion = None
+            return
+        self._course, self._played = course(heights(corrected.bumps))[:, :, : self._joints], 0
 
 
 def heights(bumps: Bumps) -> Floats:

@@ -146,9 +146,9 @@ class ControlCycle:
             line.enter(path.start, path.posture_of)
         if mode.shaped and trajectory.limits is not None:
             line.filter.limits = trajectory.limits
-        changing = line.filter.fading or line.dynamics.changing
-        if self.mode.at_rest and mode is LineMode.SHAPED and not changing:
-            self.corrections.begin(trajectory)
+        if self.mode.at_rest:
+            known = mode is LineMode.SHAPED and not (line.filter.fading or line.dynamics.changing)
+            self.corrections.begin(trajectory if known else None)
         self.trajectory, self.mode, self.guard = trajectory, mode, guard
         return trajectory
 

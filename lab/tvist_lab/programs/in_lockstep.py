@@ -96,7 +96,11 @@ def _host(controller: Controller, sinks: Sequence[Sink], learnt: LearntFile | No
     setup = controller.setup
     if learnt is None:
         return Host(controller, *sinks, experience=experience_of(setup))
-    student = MotionStudent(setup.description, learnt.motions, learnt.write)
+
+    def tell(why: str) -> None:
+        host.warn(why)
+
+    student = MotionStudent(setup.description, learnt.motions, learnt.keeper(tell))
     host = Host(controller, *sinks, experience=experience_of(setup, [student]))
     host.recall(one.lesson for one in learnt.motions)
     if learnt.ignored is not None:

@@ -66,7 +66,11 @@ class BlackBox(Sink):
         said = named(error)
         if said not in self._said and len(self._said) < MAX_FILES:
             self._said.add(said)
-            log.error("robot %s: a method of the arm has failed", self._info().name, exc_info=error)
+            log.error(
+                "robot %s: a method of the arm, or a study of its motions, has failed",
+                self._info().name,
+                exc_info=error,
+            )
 
     def truth(self, truth: Truth) -> None:
         self._kept.append(truth)
