@@ -18,12 +18,12 @@ from tvist_controller.commands.counters import Counters
 from tvist_controller.commands.events import Fields
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.dispatch.guided_commands import GuidedCommands
+from tvist_controller.dispatch.lessons import Lessons
 from tvist_controller.dispatch.motion_commands import MotionCommands
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.dispatch.program_commands import ProgramCommands
 from tvist_controller.dispatch.setpoints import Setpoints, Unreadable
 from tvist_controller.dispatch.table import COMMANDS, CommandTable, WholeRobot
-from tvist_controller.experience.motion_record import Beliefs
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.tool_forces import ToolForces
@@ -48,10 +48,7 @@ from tvist_controller.setup import Setup, body
 from tvist_plant.fingerprint import fingerprint
 from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError
 from tvist_protocol import commands as c
-from tvist_protocol.commands import Forget
 from tvist_protocol.io import Io
-from tvist_protocol.lessons import Lesson, MotionLesson
-from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event, EventKind, State, Truth
@@ -79,7 +76,7 @@ class Controller(WholeRobot):
         self.tick_number = 0
         self.counters = Counters()
         self._events: list[Event] = []
-        planner = self._planner = Planner(setup)
+        planner = Planner(setup)
         self._failed: PlantError | None = None
         """Failure of the plant between two ticks, with which the next one deals."""
         self._next_timeout = -math.inf
@@ -95,7 +92,6 @@ class Controller(WholeRobot):
         if setup.truth:
             truth_of(self.cycle.line.plant)  # raises now, not at the first tick, if the plant has no truth
         self._seed = setup.seed
-        self._digested: tuple[Beliefs | None, bytes] = None, b""
         self._reporter = Reporter(setup.description)
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
@@ -125,10 +121,14 @@ class Controller(WholeRobot):
         self._payload = DeclaredPayload(
             setup.payload, self.motion, self.filters, self._emit, follows=setup.adapt == "payload"
         )
+        self.lessons = Lessons(
+            self.motion, self.filters, self._payload, self.peripherals, planner.for_lesson, self._emit
+        )
+        """What it has learnt from its motions."""
         parts = (
             self._authority, MotionCommands(self.motion, safety, self.programs),
             GuidedCommands(guidance, self.programs), self.filters, self._payload, self.peripherals,
-            self._faults, ProgramCommands(self.programs, self.motion), self,
+            self._faults, self.lessons, ProgramCommands(self.programs, self.motion), self,
         )  # fmt: skip
         self._commands = CommandTable(parts, setup.description)
         self.report = self._report(self.cycle.sample)
@@ -380,63 +380,6 @@ class Controller(WholeRobot):
             shape_guided=self.setup.shape_servo,
             cell=self.cell,
         )
-
-    # ------------------------------------------------------------------ what it learns from its motions
-
-    @property
-    def holds_arm(self) -> bool:
-        """Whether the drives hold or move the arm."""
-        return self.motion.robot_mode is RobotMode.RUNNING
-
-    def beliefs(self) -> Beliefs:
-        """Return what it takes the arm for."""
-        basis = self.filters.basis
-        source = basis.source
-        modes = (basis.modes, source.name, *source.f_d, *source.zeta)
-        return Beliefs(self._payload.assumed, source.calibration, basis.name, modes, basis)
-
-    def learn(self, lesson: Lesson, plan: Plan | None = None) -> None:
-        """Take a lesson at rest, which changes how it moves from now on.
-
-        Args:
-            lesson: The lesson.
-            plan: Plan for it, if it was made beforehand; it is used if it still holds.
-        """
-        if isinstance(lesson, MotionLesson):
-            self.know_motions()
-            self.cycle.corrections.learn(lesson)
-            if lesson.why:
-                self._emit("learnt", why=lesson.why)
-            return
-        on = self.filters.basis
-        if plan is None or plan.basis != on:
-            plan = self._planner.for_lesson(lesson, on)
-        found: Any = plan.found
-        if isinstance(found, RefusalError):
-            self._emit("warning", why=f"{lesson.why}; it is not assumed: {found.reply.why}")
-            return
-        self._payload.learn(lesson.payload, found, lesson.why, beyond=lesson.beyond)
-        self.peripherals.changed = True
-
-    def know_motions(self) -> None:
-        """Tell motions from one another from now on, so that they can be learnt."""
-        self.cycle.corrections.beliefs = self._believed
-
-    def _believed(self) -> bytes:
-        """Digest of what it takes the arm for, which takes long and seldom changes."""
-        beliefs = self.beliefs()
-        if beliefs != self._digested[0]:
-            self._digested = beliefs, beliefs.digest
-        return self._digested[1]
-
-    def forget(self, call: Call[Forget]) -> None:
-        """Assume what was declared again, or correct no motion."""
-        if call.command.what == "motions":
-            if self.cycle.corrections.forget():
-                self._emit("learnt", why="no motion is corrected any more")
-            return
-        if self._payload.assumed != self.declared:
-            self._payload.forget(call.planned())
 
     # ------------------------------------------------------------------ commands that concern the whole robot
 

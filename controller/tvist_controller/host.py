@@ -55,7 +55,7 @@ class Host:
     ) -> None:
         self.controller, self._experience = controller, experience
         if experience is not None:
-            controller.know_motions()
+            controller.lessons.know_motions()
         self._ports = ports or NoPorts()
         self.failure: str | None = None
         """Why the controller has stopped ticking; None if it ticks."""
@@ -143,9 +143,9 @@ class Host:
             controller = self.controller
             self._experience.watch(
                 report.sample,
-                controller.beliefs,
+                controller.lessons.beliefs,
                 controller.cycle.corrections.repetition,
-                held=controller.holds_arm,
+                held=controller.lessons.held,
             )
         for sink in self._sinks:
             for event in events:
@@ -165,11 +165,11 @@ class Host:
 
     def _take(self, lesson: Lesson, plan: Plan | None = None) -> None:
         self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
-        self.controller.learn(lesson, plan)
+        self.controller.lessons.learn(lesson, plan)
 
     def _learn(self, experience: Experience) -> None:
         for beliefs, lesson, plan in experience.lessons():
-            if beliefs.payload != self.controller.beliefs().payload:
+            if beliefs.payload != self.controller.lessons.beliefs().payload:
                 continue  # it is void: another payload was declared, learnt or forgotten since
             self._take(lesson, plan)
         for error in experience.raised():

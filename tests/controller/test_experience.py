@@ -106,11 +106,11 @@ def test_what_is_learnt_is_told_journaled_replayed_and_undone():
     robot = Served(Recalling(2.0), payload=paper_payload(ROBOT, 1.0), carried=paper_payload(ROBOT, 2.0))
     controller = robot.host.controller
     robot.move(Q2)
-    assert (controller.declared.mass, controller.beliefs().payload.mass) == (1.0, 2.0)
+    assert (controller.declared.mass, controller.lessons.beliefs().payload.mass) == (1.0, 2.0)
     assert b"it carries 2 kg" in b"".join(robot.events)
     robot.move(Q1)
     robot.ask(Forget(token=robot.token, what="payload"))
-    assert controller.beliefs().payload.mass == 1.0
+    assert controller.lessons.beliefs().payload.mass == 1.0
     robot.move(Q2)
     assert [entry.kind for entry in robot.host.entries].count("lesson") == 1
     assert replay(robot.setup, robot.host.entries, robot.states[1:]).first_difference is None
@@ -164,7 +164,7 @@ def test_beliefs_tell_constant_modes_apart():
     robot, digests = Served(shaper="zv"), set()
     for f_d in (10.0, 6.0):
         robot.ask(SetEstimator(token=robot.token, name="fixed", f_d=(f_d,), zeta=(0.1,)))
-        digests.add(robot.host.controller.beliefs().digest)
+        digests.add(robot.host.controller.lessons.beliefs().digest)
     assert len(digests) == 2
 
 

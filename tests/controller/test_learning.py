@@ -66,7 +66,7 @@ def lesson():
     """Return a lesson for the motion to Q2, which a robot makes once to know it."""
     robot = Served()
     corrections = robot.host.controller.cycle.corrections
-    robot.host.controller.know_motions()
+    robot.host.controller.lessons.know_motions()
     robot.ask(MoveJ(token=robot.token, q=Q2))
     robot.tick(3)
     return MotionLesson(move=corrections.repetition.move, begins=700, bumps=LOUD, why="")
@@ -139,7 +139,7 @@ def test_only_the_same_motion_is_corrected():
     plain = sent.take()
     robot.move(Q1)
     sent.take()
-    robot.host.controller.learn(lesson())
+    robot.host.controller.lessons.learn(lesson())
     robot.move(Q2)
     more = sent.take() - plain
     moved = np.flatnonzero(np.abs(more[:, 0]).max(axis=1) > 1e-12)
@@ -181,7 +181,7 @@ def test_a_correction_that_is_still_playing_goes_on_to_its_end():
     def sent_in(lessons, student):
         robot = Served(student)
         for one in lessons:
-            robot.host.controller.learn(one)
+            robot.host.controller.lessons.learn(one)
         sent = Sent(robot)
         for q in (Q2, near(Q2)):
             robot.ask(MoveJ(token=robot.token, q=q))
@@ -209,7 +209,7 @@ def test_a_correction_that_is_still_playing_goes_on_to_its_end():
 def run(happenings, *, corrected):
     robot = Served()
     if corrected:
-        robot.host.controller.learn(lesson())
+        robot.host.controller.lessons.learn(lesson())
     sent = Sent(robot)
     robot.ask(MoveJ(token=robot.token, q=Q2))
     sent.take()

@@ -39,7 +39,7 @@ class Following(Served):
 
     @property
     def assumed(self):
-        return self.host.controller.beliefs().payload
+        return self.host.controller.lessons.beliefs().payload
 
     def told(self, kind):
         return [event for event in map(decode_event, self.events) if event.kind == kind]

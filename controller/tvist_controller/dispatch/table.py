@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Protocol
 from tvist_controller.authority.rights import Authority
 from tvist_controller.commands.refusal import check_body, check_joints
 from tvist_controller.dispatch.guided_commands import GuidedCommands
+from tvist_controller.dispatch.lessons import Lessons
 from tvist_controller.dispatch.motion_commands import MotionCommands
 from tvist_controller.dispatch.program_commands import ProgramCommands
 from tvist_controller.instruments.peripherals import Peripherals
@@ -21,7 +22,7 @@ from tvist_controller.planning.reachable import Reachable
 from tvist_controller.safety.declared_payload import DeclaredPayload
 from tvist_controller.safety.faults import Faults
 from tvist_plant.description import RobotDescription
-from tvist_protocol.commands import Command, Forget
+from tvist_protocol.commands import Command
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.replies import Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
@@ -52,13 +53,7 @@ class WholeRobot(ABC):
     def check_step(self, call: Call[SimulationStep]) -> Reply:
         """Check that a client may advance time; the host then does so."""
 
-    @abstractmethod
-    def forget(self, call: Call[Forget]) -> None:
-        """Undo what the robot has learnt."""
-
     rows: ClassVar[tuple[Row, ...]] = (
-        Row(Forget, lambda self, call: self.forget(call), changes_io=True,
-            plan=Planning("filter", FilterPlanner, lambda planner, _, on: planner.with_payload(on.given, on))),
         Row(
             SimulationReset,
             lambda self, call: self.place(call),
@@ -75,7 +70,7 @@ class WholeRobot(ABC):
 
 
 _PARTS: tuple[type[Part], ...] = (
-    Authority, MotionCommands, GuidedCommands, Filters, DeclaredPayload, Peripherals, Faults, ProgramCommands,
+    Authority, MotionCommands, GuidedCommands, Filters, DeclaredPayload, Peripherals, Faults, Lessons, ProgramCommands,
     WholeRobot,
 )  # fmt: skip
 COMMANDS: dict[type[Command], Row] = {row.message: row for part in _PARTS for row in part.rows}
