@@ -146,6 +146,7 @@ class Host:
                 controller.lessons.beliefs,
                 controller.cycle.corrections.repetition,
                 held=controller.lessons.held,
+                placements=controller.cycle.placements,
             )
         for sink in self._sinks:
             for event in events:
@@ -182,10 +183,8 @@ class Host:
         match command:
             case Forget():
                 experience.void()
-            case SimulationReset():
-                experience.placed()
-                if command.payload is not None or self.controller.cell is not None:
-                    experience.void()
+            case SimulationReset() if command.payload is not None or self.controller.cell is not None:
+                experience.void()
 
     def _tell_truth(self) -> None:
         """Pass on what a real robot cannot measure, computed once, to those who want it."""

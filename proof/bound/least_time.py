@@ -9,6 +9,8 @@ and x = ẋ = 0 in the end, which is an integral of s̈ for each pole and does n
 is the least number of ticks for which this is possible. The bound is T less the least time without any mode.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from tvist_controller.api.line import JointLine, MotionLimits, Programme, inside, optimize, quickest_motion
@@ -59,15 +61,20 @@ def least_ticks(way: float, limits: MotionLimits, poles: Floats, enough: int) ->
         poles: Poles of the modes, as in `poles_of`.
         enough: Number of ticks with which it can at most just be made.
     """
-    low, more = max(enough, 3), 4
-    while farthest(low + more, limits, poles) < way * (1.0 - SLACK):
+    return fewest(max(enough, 3), lambda ticks: farthest(ticks, limits, poles) >= way * (1.0 - SLACK))
+
+
+def fewest(ticks: int, suffice: Callable[[int], bool]) -> int:
+    """Least number of ticks that suffices, from one that at most just does; more than enough suffice as well."""
+    low, more = ticks, 4
+    while not suffice(low + more):
         low, more = low + more, 2 * more
     high = low + more
-    if farthest(low, limits, poles) >= way * (1.0 - SLACK):
+    if suffice(low):
         return low
     while high - low > 1:
         middle = (low + high) // 2
-        if farthest(middle, limits, poles) >= way * (1.0 - SLACK):
+        if suffice(middle):
             high = middle
         else:
             low = middle

@@ -15,6 +15,7 @@ import pinocchio as pin
 from scipy.optimize import linprog
 from scipy.sparse import diags, vstack
 
+from proof.bound.least_time import fewest
 from tvist_controller.api.line import MotionLimits, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.study.case import Case
@@ -87,17 +88,7 @@ def _lead(flexible: FlexibleModel, data: pin.Data, stiffness: Floats, q: Floats,
 
 def _least(way: float, limits: MotionLimits, most: Floats, enough: int) -> int:
     """Least number of ticks, at least `enough`, of a motion whose |s⁗| keeps a limit at each share of its time."""
-    low, more = max(enough - 1, 4), 4
-    while _farthest(low + more, limits, most) < way * (1.0 - SLACK):
-        low, more = low + more, 2 * more
-    high = low + more
-    while high - low > 1:
-        middle = (low + high) // 2
-        if _farthest(middle, limits, most) >= way * (1.0 - SLACK):
-            high = middle
-        else:
-            low = middle
-    return high
+    return fewest(max(enough, 5), lambda ticks: _farthest(ticks, limits, most) >= way * (1.0 - SLACK))
 
 
 def _farthest(ticks: int, limits: MotionLimits, most: Floats) -> float:

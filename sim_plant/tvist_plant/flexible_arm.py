@@ -28,7 +28,7 @@ SUBSTEPS_OF_A_PERIOD = 4
 0.09; most of that is the ripple of the gears.
 """
 SUBSTEPS_IF_IMPERFECT = 8
-"""Substeps per period of an arm whose file has imperfections, which are integrated explicitly."""
+"""Substeps per period of an arm with imperfections, which are integrated explicitly."""
 
 
 class FlexibleArm:

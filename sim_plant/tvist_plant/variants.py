@@ -13,15 +13,13 @@ import numpy as np
 from msgspec import structs
 
 from tvist_plant.drives import DriveCommand
-from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.flexible_arm import SUBSTEPS_IF_IMPERFECT, FlexibleArm
 from tvist_plant.hidden import hidden, hidden_payload
 from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.plant import Measurement, Placeable
 from tvist_plant.robot_tables import Payload, RobotDescription
 from tvist_plant.similar import counterpart
 
-SUBSTEPS: Final = 8
-"""Number of integrator steps per period for an arm with imperfections, which are integrated explicitly."""
 SCATTER: Final = 0.15
 """Relative deviation of each stiffness and gain from the description, with random sign [-]."""
 MASS_SCATTER, COM_SCATTER = 0.07, 0.010
@@ -70,7 +68,9 @@ class Variant:
             joints = description.joints
             widths = (self.backlash * BACKLASH[counterpart(joint, joints)] for joint in range(joints))
             found = replace(found or Imperfections(), backlash=tuple(widths))
-        how: dict[str, Any] = {} if found is None else {"imperfections": found, "substeps": SUBSTEPS}
+        how: dict[str, Any] = (
+            {} if found is None else {"imperfections": found, "substeps": SUBSTEPS_IF_IMPERFECT}
+        )
         if self.carries is None:
             return FlexibleArm(arm, carried, **how)
         return _Mistaken(arm, carried, self.carries, **how)

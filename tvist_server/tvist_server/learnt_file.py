@@ -8,7 +8,8 @@ from typing import Literal
 import msgspec
 from msgspec import Struct
 
-from tvist_controller.experience.motion_student import LearntMotion
+from tvist_controller.experience.motion_student import LearntMotion, MotionStudent
+from tvist_controller.host import Host
 from tvist_controller.setup import Setup
 from tvist_plant.fingerprint import fingerprint
 from tvist_plant.user_file import UserFileError, read_bytes
@@ -41,7 +42,7 @@ class LearntFile:
     """
 
     def __init__(self, path: Path, setup: Setup) -> None:
-        self._path = path
+        self._path, self._description = path, setup.description
         self._robot = fingerprint(setup.description)
         calibration = msgspec.json.encode(setup.calibration, order="sorted")
         self._calibration = sha256(calibration).hexdigest()[:16]
@@ -60,6 +61,16 @@ class LearntFile:
         beside = self._path.with_name(f".{self._path.name}.new")
         beside.write_bytes(msgspec.json.format(msgspec.json.encode(content), indent=1) + b"\n")
         beside.replace(self._path)
+
+    def student(self, tell: Callable[[str], None]) -> MotionStudent:
+        """Return who learns the robot's motions and keeps them in the file; `tell` tells if that is not possible."""
+        return MotionStudent(self._description, self.motions, self.keeper(tell))
+
+    def recall(self, host: Host) -> None:
+        """Let a robot take what was learnt in earlier runs, before its first tick."""
+        host.recall(one.lesson for one in self.motions)
+        if self.ignored is not None:
+            host.warn(self.ignored)
 
     def keeper(self, tell: Callable[[str], None]) -> Callable[[Sequence[LearntMotion]], None]:
         """Return what writes the file, and tells once if that is not possible: the robot goes on learning."""

@@ -8,7 +8,6 @@ from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.experience.lesson import Student
-from tvist_controller.experience.motion_student import MotionStudent
 from tvist_controller.experience.own_students import experience_of
 from tvist_controller.host import Host
 from tvist_controller.line.rehearsal import rehearse
@@ -99,7 +98,7 @@ class ServedRobot:
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
         """Gateway for the sockets of programs."""
         if learnt is not None:
-            students = (*students, MotionStudent(setup.description, learnt.motions, learnt.keeper(self.warn)))
+            students = (*students, learnt.student(self.warn))
         self._studies = Studies() if self._realtime and (students or setup.adapt) else None
         if self._studies is None:
             experience = experience_of(setup, students)
@@ -112,9 +111,7 @@ class ServedRobot:
             self.controller, *sinks, black_box, self._publisher, ports=self.sockets, experience=experience
         )
         if learnt is not None:
-            self._host.recall(one.lesson for one in learnt.motions)
-            if learnt.ignored is not None:
-                self._host.warn(learnt.ignored)
+            learnt.recall(self._host)
         plant = self.controller.cycle.line.plant
         knows = isinstance(plant, Truthful) and plant.truth() is not None
         self.want_truth = self._publisher.want_truth if knows and not setup.truth else None

@@ -55,7 +55,7 @@ def thinned(accelerometer: Floats, begins: int) -> Floats:
 
 
 class BumpResponses:
-    """What is known of the tool's answer to bumps in one motion.
+    """The tool's answers to bumps in one motion, as far as they are known.
 
     Args:
         twin: The twin's answers, shape (10, 3, 48, 3) [m/s² per rad/s²].

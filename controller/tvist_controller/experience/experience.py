@@ -54,6 +54,7 @@ class Experience:
         self._under_way: list[tuple[Callable[[], bool], list[Taught]]] = []
         self._raised: list[Exception] = []
         self._said = set[str]()
+        self._placements = 0
 
     def watch(
         self,
@@ -62,6 +63,7 @@ class Experience:
         repetition: Repetition | None = None,
         *,
         held: bool,
+        placements: int,
     ) -> None:
         """Take a tick.
 
@@ -70,8 +72,12 @@ class Experience:
             beliefs: Returns what the controller takes the arm for.
             repetition: The motion in progress, as far as it can be made again.
             held: Whether the drives hold the arm.
+            placements: Number of times that the arm was put somewhere, see `ControlCycle`.
         """
         recorder = self._recorder
+        if placements != self._placements:
+            self._placements = placements
+            recorder.begin_anew()
         if not held:
             recorder.forget()
             return
@@ -98,10 +104,6 @@ class Experience:
                     learnt.append(Taught(motion.beliefs, lesson, plan))
 
             self._under_way.append((self._later(study), learnt))
-
-    def placed(self) -> None:
-        """Drop the present motion, since the arm was placed elsewhere."""
-        self._recorder.begin_anew()
 
     def void(self) -> None:
         """Drop what is being learnt of motions so far, since it is to be forgotten, or the arm carries another load."""

@@ -112,7 +112,6 @@ class MotionRecorder:
         self._ticks, self._stop = 0, 0
         self._whole = self._moves = False
         self._rest: DriveCommand | None = None
-        self._at: Floats = np.zeros(0)
         self._before: DriveCommand | None = None
         self._beliefs: Beliefs | None = None
         self._repetition: Repetition | None = None
@@ -142,8 +141,6 @@ class MotionRecorder:
             self._ticks, self._stop, self._moves, self._whole = 0, 0, True, True
             self._beliefs, self._rest = beliefs, self._before or sample.command
             self._repetition = repetition
-        elif self._stop and not np.array_equal(sample.reference, self._at):
-            self.forget()  # it was placed elsewhere
         self._before = sample.command
         if not self._moves:
             return done
@@ -154,7 +151,7 @@ class MotionRecorder:
             self._samples.append(sample)
         self._ticks += 1
         if resting and not self._stop:
-            self._stop, self._at = self._ticks, sample.reference
+            self._stop = self._ticks
         if self._stop and self._ticks == self._stop + AFTER:
             done = self._finished()
             self.forget()

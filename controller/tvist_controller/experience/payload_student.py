@@ -164,7 +164,7 @@ class Equations:
     bare: Floats
     """What the arm needs without a payload, shape (N n,)."""
     measured: Floats
-    """What is measured, shape (N n,)."""
+    """Measured torques, shape (N n,)."""
     others: Floats
     """Deviations of all else, and of the sensors' gains, shape (k + n,) [-]."""
     joints: int

@@ -64,7 +64,9 @@ class ControlCycle:
         self.mode = LineMode.REST
         """What the line does."""
         self.corrections = Corrections(description)
-        """What is added to motions that are made again."""
+        """Corrections of motions that are made again."""
+        self.placements = 0
+        """Number of times that the arm was put at rest somewhere, which breaks off what it did."""
         self.guard: Guard | None = None
         """What checks the references and the stops of a guarded motion; None without one."""
         self.sample = self.reset(q, carried=carried, seed=seed)
@@ -207,6 +209,7 @@ class ControlCycle:
             q = measured.q.copy()
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
         self.corrections.drop()
+        self.placements += 1
         signals = line.rest_at(q)
         target = Target(*signals[Q:TORQUE])
         command = line.drives.command(target, signals, line.dynamics.payload_parameters)

@@ -5,7 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from tvist_controller.api.line import Setup
-from tvist_controller.api.robot import Controller, Host, MotionStudent, Sink, experience_of, info_of
+from tvist_controller.api.robot import Controller, Host, Sink, experience_of, info_of
 from tvist_lab.programs.start import start
 from tvist_lab.programs.watch import ProgramWatch
 from tvist_plant.plant_checks import check_unpaced
@@ -100,9 +100,6 @@ def _host(controller: Controller, sinks: Sequence[Sink], learnt: LearntFile | No
     def tell(why: str) -> None:
         host.warn(why)
 
-    student = MotionStudent(setup.description, learnt.motions, learnt.keeper(tell))
-    host = Host(controller, *sinks, experience=experience_of(setup, [student]))
-    host.recall(one.lesson for one in learnt.motions)
-    if learnt.ignored is not None:
-        host.warn(learnt.ignored)
+    host = Host(controller, *sinks, experience=experience_of(setup, [learnt.student(tell)]))
+    learnt.recall(host)
     return host

@@ -114,7 +114,7 @@ class Named(Stepping):
 
     @property
     def shapes(self) -> bool:
-        """Whether it shapes any reference; a move that is planned to leave no vibration is no reference's."""
+        """False for `planned`, which plans a move of its own instead of shaping a reference."""
         return self.recipe.shaper != PLANNED
 
     def stepper(self, task: Task) -> Running:
