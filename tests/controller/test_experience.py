@@ -15,7 +15,7 @@ from tvist_plant.description import load
 from tvist_protocol.codec import decode_state, encode
 from tvist_protocol.commands import Forget, MoveJ, SetEstimator, SetPayload, Stop, TakeControl
 from tvist_protocol.lessons import PayloadLesson
-from tvist_protocol.simulation import SimulationReset, SimulationStep
+from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
 
 ROBOT = load("ur5e")
 Q1, Q2 = ROBOT.poses["Q1"], ROBOT.poses["Q2"]
@@ -206,3 +206,12 @@ def test_motions_that_are_made_faster_than_studied_do_not_fill_the_memory(monkey
         robot.move(Q2, 2.5)
         robot.move(Q1, 2.5)
     assert len(experience._under_way) == 2
+
+
+def test_a_motion_that_the_simulation_broke_off_after_a_fault_is_no_motion():
+    student = Recalling()
+    robot = Served(student)
+    robot.move(Q2, 0.4)
+    robot.ask(SimulationInject(token=robot.token, fault="nan"))
+    robot.tick(400)
+    assert not student.motions
