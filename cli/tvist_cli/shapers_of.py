@@ -152,12 +152,20 @@ def modal_for(name: str | None, robot: str) -> "tuple[RobotDescription, Calibrat
 
     with told(DescriptionError, code=2):
         description = load(robot)
-    own = calibration_for(None, "auto", (), 1, description) if name is None else modal_calibration(name)
+    return description, own_modal(description) if name is None else modal_calibration(name)
+
+
+def own_modal(description: "RobotDescription") -> "Calibration":
+    """Return the modal calibration that comes with the package for a robot.
+
+    Raises:
+        Failure: There is none.
+    """
+    own = calibration_for(None, "elastic", (), 1, description)
     if own is None:
-        raise Failure(
-            f"no calibration comes with the package for {robot}: name one with --calibration", code=2
-        )
-    return description, own
+        model = description.robot.model
+        raise Failure(f"the package has no calibration of a {model}: give --calibration FILE", code=2)
+    return own
 
 
 def on_the_bench(

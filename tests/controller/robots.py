@@ -6,6 +6,7 @@ import numpy as np
 from tvist_controller.controller import Controller
 from tvist_controller.foresight.stopper import Outlook
 from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.elastic_lead import loads_of
 from tvist_controller.line.limits import StreamTorqueRoom
 from tvist_controller.reporting.sink import Sink
 from tvist_controller.setup import Setup, body, paper_payload
@@ -206,3 +207,11 @@ class Robot:
 
     def column(self, name):
         return np.array([getattr(state, name) for state in self.states])
+
+
+def spring_loads(springs, joints, target):
+    """Torques on all springs of an arm whose links do not bend, and the flange's Jacobian."""
+    load = np.empty(springs.motion.shape[1])
+    springs.motion[:, joints] = target.q, target.qd, target.qdd
+    loads_of(springs.chain, springs.motion, springs.scratch, springs.jacobian, load)
+    return load, springs.jacobian

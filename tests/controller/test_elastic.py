@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, calibration, cut
+from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, calibration, cut, spring_loads
 
 from tvist_controller.calibrations import load
 from tvist_controller.line.differentiator import Target
@@ -109,7 +109,8 @@ def test_a_payload_counts_like_a_body_of_the_model():
     for name, dynamics in (("heavy", heavy), ("light", light)):
         springs = stage()._springs
         springs.carry(dynamics.payload_parameters)
-        found = springs.of(target)[0][elastic_model(UR5E, MODAL).joints]
+        joints = elastic_model(UR5E, MODAL).joints
+        found = spring_loads(springs, joints, target)[0][joints]
         loads[name] = found
     rigid = {
         name: dynamics.torque(*(getattr(target, field) for field in ("q", "qd", "qdd")))

@@ -8,6 +8,7 @@ from proof.bound.least_time import bound, farthest, least_ticks, poles_of
 from scipy import sparse
 from scipy.optimize import linprog
 from scipy.signal import cont2discrete
+from tests.controller.robots import spring_loads
 
 from tvist_controller.api.line import MotionLimits, body, paper_payload
 from tvist_controller.line.differentiator import Target
@@ -108,7 +109,7 @@ def test_the_lead_of_the_bound_is_that_of_the_controller():
     loads = model.loads()
     loads.carry(InverseDynamics(ARM, payload).payload_parameters)
     q, along = np.array(MOVE.start) + 0.3, np.array([1.0, -0.4, 0.7, 0.1, 0.0, 0.2])
-    load_on, jacobian = loads.of(Target(q, np.zeros(6), along))
+    load_on, jacobian = spring_loads(loads, model.joints, Target(q, np.zeros(6), along))
     lead = np.empty(6)
     wanted_lead(
         load_on, jacobian, model.joints, model.flexes, stiffness, np.zeros_like(stiffness),

@@ -8,7 +8,7 @@ from tvist_controller.authority.presence import Presence
 from tvist_controller.controller import Controller
 from tvist_controller.experience.experience import Experience
 from tvist_controller.experience.lesson import Student
-from tvist_controller.experience.motion_record import Beliefs, MotionRecord
+from tvist_controller.experience.motion_record import AFTER, Beliefs, MotionRecord
 from tvist_controller.experience.motion_student import MotionStudent, added
 from tvist_controller.experience.own_students import experience_of
 from tvist_controller.experience.twin import Twin
@@ -22,6 +22,7 @@ from tvist_controller.reporting.sink import Sink
 from tvist_controller.sources.own_plants import OwnPlant, RecordedPlant, load_plant
 
 __all__ = [
+    "AFTER",
     "Beliefs",
     "Controller",
     "Experience",

@@ -3,8 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.line.differentiator import Floats, Target
-from tvist_controller.line.elastic_lead import loads_of
+from tvist_controller.line.differentiator import Floats
 from tvist_plant.chain import BODY, SCRATCH, chain_of
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, flexible_model, rigid_model
@@ -51,7 +50,6 @@ class SpringLoads:
         self.scratch, self.motion = np.zeros((model.nv + 1, SCRATCH)), np.zeros((3, model.nv))
         """Scratch of the kernels in `elastic_lead`, as the next one."""
         self.jacobian = np.zeros((3, model.nv))
-        self._joints = flexible.joints
         self._bare = self.chain[-2, BODY:].copy()
         own = rigid.frames[rigid.getFrameId(FLANGE)]
         self._placement = model.frames[flexible.flange].placement * own.placement.inverse()
@@ -67,18 +65,6 @@ class SpringLoads:
         if added is not self._added:
             self._added = added
             self.chain[-2, BODY:] = self._bare + _moved(added, self._placement)
-
-    def of(self, target: Target) -> tuple[Floats, Floats]:
-        """Compute the loads for links that are not bent and do not bend.
-
-        Returns:
-            Torques on the springs without gravity, shape (N,) [N m], and the flange's translation Jacobian in the
-            base's axes, shape (3, N).
-        """
-        motion, load = np.zeros_like(self.motion), np.empty(self.motion.shape[1])
-        motion[:, self._joints] = target.q, target.qd, target.qdd
-        loads_of(self.chain, motion, self.scratch, self.jacobian, load)
-        return load, self.jacobian
 
 
 def _moved(parameters: Floats, placement: pin.SE3) -> Floats:

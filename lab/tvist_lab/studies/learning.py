@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from tvist_controller.api.line import Driven, DrivenLine, body, paper_payload, respond
-from tvist_controller.api.robot import Beliefs, MotionRecord, MotionStudent, Repetition, added, heights
+from tvist_controller.api.robot import AFTER, Beliefs, MotionRecord, MotionStudent, Repetition, added, heights
+from tvist_lab.metrics.common_clock import AFTER_STOP
 from tvist_lab.recordings import Floats
 from tvist_lab.runners import Processes, in_order
 from tvist_lab.study.line import RESTING, Unchanged, point_to_point
@@ -25,9 +26,7 @@ from tvist_protocol.lessons import MotionLesson
 
 PLANTS = ("stribeck", "springs-30", "springs+30", "torsion", "base", "combined")
 """The plants unless others are named."""
-AFTER = 150
-"""Ticks that are recorded after a stop."""
-LATER = 5
+LATER = round(AFTER_STOP / PERIOD)
 """Ticks after the stop from which on vibration counts."""
 WORSE = 0.01
 """What the last repetition may leave more than the first one before it counts as worse: noise [m/s²]."""

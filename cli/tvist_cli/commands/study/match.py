@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import out
-from tvist_cli.shapers_of import calibration_for, designing, loaded
+from tvist_cli.shapers_of import calibration_for, calibration_of, designing, loaded, own_modal
 from tvist_cli.simulated_arm import disturbed, limits_of, named, plants_of
 from tvist_cli.studying import Places, check_range, check_seed, command, gathered, give, show
 
@@ -131,10 +131,7 @@ def _method(name: str, description: "RobotDescription", calibration: str | None)
             method = Named(Recipe(shaper, known, own=own), shaper, own[0].place)
             method.recipe.make(description, description.limits.payload)
         return method
-    found = calibration_for(calibration, "elastic", (), 1, description)
-    if found is None:
-        model = description.robot.model
-        raise Failure(f"the package has no calibration of a {model}: give --calibration FILE", code=2)
+    found = own_modal(description) if calibration is None else calibration_of(calibration)
     try:
         with designing():
             return some([shaper], description, found)[0]
