@@ -59,7 +59,7 @@ def test_the_report_is_ordered_by_delay_and_names_what_does_not_count(done):
         "reduction_percent_interval": {"median": None, "p5": None},
         "beyond_waiting_percent": {"median": None, "p5": None},
     }
-    about = {"moves": 1, "seed": 0, "shapers": entries}
+    about = {"moves": 1, "seed": 0, "robot": "UR5e", "shapers": entries}
     more = {
         "plants": [(one.name, one.label) for one, _ in columns()[PLANT].values()],
     }

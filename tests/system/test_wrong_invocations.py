@@ -91,7 +91,7 @@ MISUSE = [
     (("paper", "--runs", "0"), ["runs is 0", "at least 1"]),
     (("paper", "--runs", "1.5"), ["--runs is '1.5'", "a whole number"]),
     (("bench", "--seconds", "-1"), ["seconds is -1", "at least 0"]),
-    (("bench", "--shaper", "zzz"), ["no shaper zzz", "tvist shapers"]),
+    (("bench", "--shaper", "zzz"), ["no shaper is called 'zzz'", "um_zvd", "elastic"]),
     (("watch", "--seconds", "0"), ["seconds is 0", "more than 0"]),
     (("log", "record", "x.mcap", "--seconds", "-3"), ["seconds is -3"]),
     (("log", "record", "x.mcap", "--keep", "10"), ["keep is '10'", "90s, 10min or 2h"]),
