@@ -182,9 +182,8 @@ class SetpointStream(Trajectory):
             return self._wait()
         self._pause = None
         _, offset = play_out.position
-        q, slope = self._curve(self._points, offset - math.ceil(offset) + 1.0)
-        qd = (play_out.rate / self._period) * slope
-        self._speed = float(np.abs(qd).max())
+        q, qd = self._curve(self._points, offset - math.ceil(offset) + 1.0, play_out.rate / self._period)
+        self._speed = max(map(abs, qd.tolist()))
         return q, qd
 
     def _complete(self, needed: int) -> bool:
