@@ -128,6 +128,8 @@ def stop_has_room(
     """
     n, time = q.shape[0], 0.0
     now, fastest, left = np.empty(n), np.empty(n), np.empty(n)
+    waiting = np.arange(pairs.shape[0])  # pairs that are not known to stay apart until the end
+    count = waiting.shape[0]
     for _ in range(LOOKS):
         for j in range(n):
             phases = stop_phases(qd[j], qdd[j], limit, jerk)
@@ -138,8 +140,9 @@ def stop_has_room(
             fastest[j] = abs(v) + 0.5 * a * a / jerk if rest > 0.0 else 0.0
             left[j] = fastest[j] * min(rest, 0.5 * fastest[j] / limit + (limit + abs(a)) / jerk)
         place(chain, now, bodies, ends)
-        step, ends_clear = math.inf, True
-        for p in range(pairs.shape[0]):
+        step, looked, count = math.inf, count, 0
+        for number in range(looked):
+            p = waiting[number]
             way = speed = 0.0
             for j in range(n):
                 way += pairs[p, ARMS + j] * left[j]
@@ -148,9 +151,10 @@ def stop_has_room(
             if not room > 0.0:  # negated, so that nothing is clear in a posture that is not finite
                 return False
             if not room > way:
-                ends_clear = False
+                waiting[count] = p
+                count += 1
                 step = min(step, room / speed)
-        if ends_clear:
+        if count == 0:
             return True
         time += step
     return False
