@@ -15,6 +15,7 @@ from tvist_lab.bench.moving import (
     line_tick,
     motion,
     plant_tick,
+    stream_tick,
     us_per_tick,
 )  # fmt: skip
 from tvist_lab.in_process import free_setup
@@ -28,6 +29,8 @@ from tvist_shaping import TvistFilter, shaper
 OF_TICKS = 20
 SHAPERS = ("zv", "auto")
 """Filters with which the line is measured; the first one is that of a robot without options."""
+STREAMS = (500, 125)
+"""Rates of set-points with which it is measured [Hz]."""
 MUJOCO_STEP = 0.00025
 """Step at which MuJoCo agrees with our plant [s]."""
 MUJOCO = "MuJoCo's tick"
@@ -44,6 +47,7 @@ def line(tell: Callable[[str], None]) -> dict[str, Figure]:
     runs: dict[str, Run] = {
         "mujoco": _mujoco_tick(), "plant": plant_tick(), "filter": _filter_tick(), "cycle": cycle_tick(),
         **{_key(name): line_tick(name) for name in SHAPERS},
+        **{f"stream_{rate}_hz": stream_tick(round(1.0 / (rate * PERIOD))) for rate in STREAMS},
     }  # fmt: skip
     found = in_alternation(runs, OF_TICKS)
     mujoco, usual = found.pop("mujoco"), SHAPERS[0]
@@ -52,6 +56,10 @@ def line(tell: Callable[[str], None]) -> dict[str, Figure]:
         "filter": f"the filter {usual} with its estimator",
         "cycle": f"Figure 6 with {usual}: trajectory to plant",
         **{_key(name): f"the line with {name}: messages to encoded state" for name in SHAPERS},
+        **{
+            f"stream_{rate}_hz": f"the line with {usual} and set-points at {rate} Hz: messages to encoded state"
+            for rate in STREAMS
+        },
     }
     figures = {
         f"{key}_us_per_tick": figure(said[key], "µs", taken, MUJOCO, mujoco) for key, taken in found.items()

@@ -12,7 +12,7 @@ from tvist_protocol.explain import EXPLAINED_BYTES
 from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationStep, StepSetpoint
 
-LEASE = Lease("anna", "anna#1", 30.0, 30.0, None)
+LEASE = Lease("anna", "anna#1", 30.0, None)
 Q = (0.0,) * 6
 JUNK = [{}] * 100_000
 """Takes a hundred ticks to read."""

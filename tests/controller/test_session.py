@@ -22,7 +22,7 @@ def test_any_other_token_is_stale_and_renews_nothing(session, token):
     error = refusal(session.renew, token, 1.0)
     assert error.code == "stale_token"
     assert "'a'" in error.why
-    assert session.lease.ends == 2.0
+    assert session.ends == 2.0
 
 
 def test_without_timeouts_nothing_runs_out():

@@ -23,7 +23,7 @@ from tvist_protocol.simulation import SimulationStep, StepSetpoint
 from tvist_server.jobs import Jobs
 from tvist_server.reception import Reception
 
-LEASE = Lease("anna", "anna#1", 30.0, 30.0, None)
+LEASE = Lease("anna", "anna#1", 30.0, None)
 HOLD = ClockHold("bert", "bert#clock1", None)
 Q2 = UR5E.poses["Q2"]
 LONG = tuple(StepSetpoint(sequence=n, q=(3.0,) * 6) for n in range(1000))

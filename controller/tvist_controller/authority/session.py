@@ -1,7 +1,7 @@
 """Control of the arm by lease. Motion, network and clock are not involved: the time is an argument."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from tvist_protocol.replies import Code, Refused
 
@@ -14,8 +14,6 @@ class Lease:
     token: str
     seconds: float
     """Duration without renewal [s]."""
-    ends: float
-    """Time at which it ends if it is not renewed [s]."""
     session: str | None
     """Session whose end ends the lease; empty if the client's token does not name it, None if it had no token."""
 
@@ -84,6 +82,7 @@ class Session:
         self._prefix = f"{instance}." if instance else ""
         self._granted = 0
         self.lease: Lease | None = None
+        self._ends = math.inf
 
     def take(self, client: str, seconds: float, now: float, session: str | None = None) -> Lease:
         """Give control to a client; one that already has it gets a new lease.
@@ -108,8 +107,8 @@ class Session:
             NoControlError: See `check_token`.
         """
         lease = check_token(self.lease, token)
-        self.lease = replace(lease, ends=now + lease.seconds)
-        return self.lease
+        self._ends = now + lease.seconds
+        return lease
 
     def hand_over(self, client: str, now: float, session: str | None = None) -> None:
         """Reserve the lease for another client from now on, which only has to take it.
@@ -129,7 +128,7 @@ class Session:
     @property
     def ends(self) -> float:
         """Time at which the lease runs out if it is not renewed [s]; infinite if it does not."""
-        return self.lease.ends if self._timeouts and self.lease is not None else math.inf
+        return self._ends if self._timeouts and self.lease is not None else math.inf
 
     def expired(self, now: float) -> bool:
         """Return whether the lease has run out."""
@@ -141,4 +140,5 @@ class Session:
 
     def _grant(self, client: str, seconds: float, now: float, session: str | None) -> Lease:
         self._granted += 1
-        return Lease(client, f"{client}#{self._prefix}{self._granted}", seconds, now + seconds, session)
+        self._ends = now + seconds
+        return Lease(client, f"{client}#{self._prefix}{self._granted}", seconds, session)

@@ -10,8 +10,20 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.line.differentiator import Floats
+from tvist_controller.foresight.clearance import (
+    ARMS,
+    BODY,
+    FIRST,
+    FLOOR,
+    LINK,
+    RADIUS,
+    SECOND,
+    has_room,
+    stop_has_room,
+)
+from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.trajectory import Way
+from tvist_plant.chain import AXES, chain_of
 from tvist_plant.description import Body, Payload, RobotDescription
 from tvist_plant.model import FLANGE, link_frame, rigid_model
 
@@ -23,8 +35,9 @@ SHORT = 0.004
 """Travel of the arm's points between two checks where bodies are as close as permitted [m]."""
 ROUNDING = 1e-9
 """Changes of a distance below this are rounding errors [m]."""
+SURE = 1e-5
+"""What a bound must leave beyond the clearance, more than the accuracy of distances [m]."""
 PAYLOAD = "payload"
-FLOOR = "floor"
 
 
 @dataclass(frozen=True)
@@ -54,6 +67,7 @@ class CollisionModel:
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
         self._model = rigid_model(description, Payload())
         self._data = self._model.createData()
+        self._chain = chain_of(self._model, self._model.getFrameId(FLANGE))
         self._reach = np.zeros(description.joints)
         self.declared = payload
         """Declared payload."""
@@ -68,11 +82,16 @@ class CollisionModel:
         self._fine, self._coarse = (self._request(margin) for margin in (CLEARANCE, FAR))
         self._distances = self._geometry.createData()
         self._pairs = list(self._geometry.collisionPairs)
-        if self._names:
-            self._with_payload = np.array(
-                [self._payload in (pair.first, pair.second) for pair in self._pairs]
-            )
-            self.declare(payload)
+        self._bodies = np.zeros((len(self._names), BODY))
+        self._far = np.full((len(self._names), description.joints), np.inf)
+        for number in range(len(self._names)):
+            self._bound(number)
+        self._with_payload = np.array(
+            [PAYLOAD in (self._names[pair.first], self._names[pair.second]) for pair in self._pairs], dtype=bool
+        )
+        self._loaded = False
+        self._bounds = self._bound_pairs()
+        self.declare(payload)
 
     def meeting(self, q: Floats) -> Meeting | None:
         """Return the nearest pair of bodies at a posture, if it is closer than the clearance.
@@ -153,11 +172,25 @@ class CollisionModel:
         """Upper bound of any point's travel [m] while the joints turn by these angles, shape (n,) [rad]."""
         return float(np.abs(turned) @ self._reach)
 
-    def room(self, q: Floats) -> float:
-        """How far any point of the arm may travel from a posture without a meeting [m]; 0 in a meeting."""
-        if not self._names:
-            return math.inf
-        return max(self._nearest(q).distance - CLEARANCE, 0.0)
+    def is_spacious(self, q: Floats, turned: Floats) -> bool:
+        """Return whether the joints can certainly turn by some angles without a meeting.
+
+        Args:
+            q: Joint positions around which they turn, shape (n,) [rad].
+            turned: Largest angle of each joint, shape (n,) [rad].
+        """
+        return has_room(*self._bounds, q, turned, CLEARANCE + SURE)
+
+    def stop_is_spacious(self, state: Target, acceleration: float, jerk: float) -> bool:
+        """Return whether the joints can certainly stop without a meeting.
+
+        Args:
+            state: State of motion at the start.
+            acceleration: Acceleration limit [rad/s^2].
+            jerk: Jerk limit [rad/s^3].
+        """
+        least = CLEARANCE + SURE
+        return stop_has_room(*self._bounds, state.q, state.qd, state.qdd, acceleration, jerk, least)
 
     def _request(self, margin: float) -> pin.GeometryData:
         data = self._geometry.createData()
@@ -217,6 +250,8 @@ class CollisionModel:
         self._loaded = payload.mass > 0.0
         body.disableCollision = not self._loaded
         self._reach = self._reaches()
+        self._bound(self._payload)
+        self._bounds = self._bound_pairs()
 
     def _reaches(self) -> Floats:
         """Largest distance of any point of the arm from each joint's axis, in any posture, shape (n,) [m]."""
@@ -234,6 +269,39 @@ class CollisionModel:
             reach[joint] = beyond = max(own[joint], beyond)
             beyond += links[joint + 1]
         return reach
+
+    def _bound(self, number: int) -> None:
+        """Tell the bounds of `clearance` where a body is, and how far each joint may carry it [m/rad]."""
+        body, row = self._geometry.geometryObjects[number], self._bodies[number]
+        if isinstance(body.geometry, coal.Halfspace):
+            row[[LINK, RADIUS]] = FLOOR, body.geometry.d
+            return
+        link, radius = body.parentJoint, body.geometry.radius
+        # From pinocchio's frame of the link to that of its chain, whose z is the axis.
+        turned = AXES[self._model.joints[link].shortname()] if link > 0 else np.eye(3)
+        axis = body.placement.rotation[:, 2] * body.geometry.halfLength
+        ends = np.array([body.placement.translation - axis, body.placement.translation + axis])
+        row[LINK], row[FIRST:RADIUS], row[RADIUS] = link, (ends @ turned).ravel(), radius
+        own = radius + float(np.linalg.norm(ends, axis=1).max())
+        along = np.cumsum([np.linalg.norm(placement.translation) for placement in self._model.jointPlacements])
+        self._far[number] = own + np.abs(along[link] - along[1:])
+
+    def _bound_pairs(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Chain, bodies, pairs that can meet, and scratch, as the bounds of `clearance` take them."""
+        joints = self._model.nv
+        pairs = np.zeros((len(self._pairs), ARMS + joints))
+        upright = bool(np.allclose(self._chain[0, [2, 5]], 0.0))  # the first joint changes no height
+        for row, pair in zip(pairs, self._pairs, strict=True):
+            one, other = pair.first, pair.second
+            links = [max(int(self._bodies[number, LINK]), 0) for number in (one, other)]
+            between = slice(min(links), max(links))
+            row[:ARMS] = one, other
+            row[ARMS:][between] = np.minimum(self._far[one], self._far[other])[between]
+            if upright and self._bodies[other, LINK] == FLOOR:
+                row[ARMS] = 0.0
+        if not self._loaded:
+            pairs = pairs[~self._with_payload]
+        return self._chain, self._bodies, pairs, np.zeros((len(self._names), 6))
 
     def _add_capsule(
         self, name: str, joint: int, frame: pin.SE3, start: Floats, end: Floats, radius: float
@@ -254,8 +322,8 @@ class CollisionModel:
         if not self._names or not collision.has_floor:
             return
         floor = coal.Halfspace(np.array([0.0, 0.0, 1.0]), collision.floor)
-        self._geometry.addGeometryObject(pin.GeometryObject(FLOOR, 0, pin.SE3.Identity(), floor))
-        self._names.append(FLOOR)
+        self._geometry.addGeometryObject(pin.GeometryObject("floor", 0, pin.SE3.Identity(), floor))
+        self._names.append("floor")
         for number in bodies[2:]:  # the base stands on the floor, and the shoulder cannot reach it
             self._geometry.addCollisionPair(pin.CollisionPair(number, len(self._names) - 1))
 

@@ -155,7 +155,9 @@ class WayAhead:
         q = cycle.line.shaped.position
         window = np.abs(cycle.line.filter.window() - q).max(axis=0)
         _, qd, qdd = end.at(0.0)
-        return self._guard.is_spacious(q, window + self._guard.turned(qd, qdd, end.acceleration, end.jerk))
+        return self._collisions.is_spacious(
+            q, window + self._guard.turned(qd, qdd, end.acceleration, end.jerk)
+        )
 
     def _on(self, ahead: Floats | None) -> Meeting | None:
         """Return the first pair of bodies that meets along known references, one for each tick, shape (k, n)."""

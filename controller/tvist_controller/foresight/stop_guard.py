@@ -16,8 +16,6 @@ MARGIN = 0.8
 """Share of the acceleration that the torque permits at the start of a stop, which the stop uses, since the permitted
 acceleration changes on the way [-].
 """
-FRESH = 8
-"""Number of ticks for which a computed permitted acceleration is reused; the margin covers its changes."""
 
 
 class LookAhead(Guard):
@@ -26,8 +24,7 @@ class LookAhead(Guard):
     As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the
     previous state is made. It was checked a tick earlier, so there is always a clear stop.
 
-    If everything is far away, a bound of the stop's travel is enough: no point of the arm travels farther than the
-    turned angles times its reach. The free space around a posture is cached until it is used up.
+    If bounds prove the stop to be clear, which takes microseconds, it is made only when it is needed.
 
     Args:
         collisions: Collision model of the arm.
@@ -47,11 +44,7 @@ class LookAhead(Guard):
     ) -> None:
         self._reach = reach
         self._collisions, self._stops, self._torque = collisions, stops, room
-        self._centre: Floats | None = None
-        self._room = 0.0
-        self._declared = collisions.declared
         self._before: tuple[Target, Callable[[], JointStop]] | None = None
-        self._acceleration, self._age = GENTLEST_STOP, FRESH
         self.met: Meeting | None = None
         """Meeting that the latest refused reference would have led to."""
         self._outside: str | None = None
@@ -61,7 +54,6 @@ class LookAhead(Guard):
         """Start from rest."""
         self._before = state, self._within(state, GENTLEST_STOP)
         self.met = self._outside = self._stuck = None
-        self._acceleration, self._age = GENTLEST_STOP, FRESH
 
     def __call__(self, state: Target) -> JointStop | None:
         """Decide whether a reference that leads to this state may be played; see `Guard`."""
@@ -101,7 +93,7 @@ class LookAhead(Guard):
         self._outside = None if self._is_inside(q, turned) else self._beyond(stop)
         if self._outside is not None:
             return False
-        if self.is_spacious(q, turned):
+        if self._collisions.is_spacious(q, turned):
             return True
         self.met = self.meeting(stop)
         return self.met is None
@@ -121,21 +113,15 @@ class LookAhead(Guard):
 
     def _permitted(self, state: Target) -> Callable[[], JointStop] | None:
         """Return a function that makes a clear stop; None if there is none."""
-        self._age += 1
-        # In free space a bound of the stop's way is enough, and its acceleration may be some ticks old.
-        if self._age <= FRESH and self._is_spacious_for(state):
-            return self._within(state, self._acceleration)
+        stops = self._stops
         allowed = MARGIN * self._torque.acceleration(state.q, state.qd)
-        self._acceleration, self._age = min(max(allowed, GENTLEST_STOP), self._stops.highest), 0
-        if self._is_spacious_for(state):
-            return self._within(state, self._acceleration)
-        stop = self._stops.stop(state, self._acceleration)
-        found = stop if self.clear(stop) else self._stops.by_joints(state, None, self.clear)
+        acceleration = min(max(allowed, GENTLEST_STOP), stops.highest)
+        inside = self._reach is None or self._is_inside(state.q, self.turned(state.qd, state.qdd, acceleration))
+        if inside and self._collisions.stop_is_spacious(state, acceleration, stops.jerk):
+            return self._within(state, acceleration)
+        stop = stops.stop(state, acceleration)
+        found = stop if self.clear(stop) else stops.by_joints(state, None, self.clear)
         return None if found is None else lambda: found
-
-    def _is_spacious_for(self, state: Target) -> bool:
-        turned = self.turned(state.qd, state.qdd, self._acceleration)
-        return self._is_inside(state.q, turned) and self.is_spacious(state.q, turned)
 
     def _is_inside(self, q: Floats, turned: Floats) -> bool:
         """Return whether the joints can certainly turn by these angles around q inside their range."""
@@ -149,19 +135,6 @@ class LookAhead(Guard):
         if beyond[joint] <= 0.0:
             return None
         return f"joint {joint} would pass the end of its range, ±{self._reach[joint]:g} rad"
-
-    def is_spacious(self, q: Floats, turned: Floats) -> bool:
-        """Return whether the joints can certainly turn by these angles around q without a meeting."""
-        collisions = self._collisions
-        if self._declared is not collisions.declared:
-            self._declared, self._centre = collisions.declared, None
-        way = collisions.travel(turned)
-        moved = np.inf if self._centre is None else collisions.travel(q - self._centre)
-        if way + moved < self._room:
-            return True
-        if moved > 0.0:
-            self._centre, self._room = q, collisions.room(q)
-        return way < self._room
 
     def turned(self, qd: Floats, qdd: Floats, acceleration: float, jerk: float | None = None) -> Floats:
         """Upper bound of the angle that each joint turns in a stop, shape (n,) [rad].

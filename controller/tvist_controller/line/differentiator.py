@@ -53,6 +53,23 @@ def central_differences(references: Floats, period: float) -> tuple[Floats, Floa
 
 
 @compiled_for_ticks
+def extrapolate(before: Floats, middle: Floats, last: Floats, period: float, rates: Floats) -> None:
+    """Velocity and acceleration at the last one of three references, as of a parabola through them.
+
+    Args:
+        before: First reference, shape (n,) [rad].
+        middle: Second reference.
+        last: Third reference.
+        period: Tick [s].
+        rates: Velocity [rad/s] and acceleration [rad/s^2], shape (2, n).
+    """
+    for j in range(middle.shape[0]):
+        rise, fall = last[j] - middle[j], middle[j] - before[j]
+        rates[1, j] = (rise - fall) / (period * period)
+        rates[0, j] = rise / period + 0.5 * period * rates[1, j]
+
+
+@compiled_for_ticks
 def differentiate(before: Floats, middle: Floats, last: Floats, period: float, rates: Floats) -> None:
     """Central differences at the middle one of three references, each of shape (n,) [rad].
 
@@ -137,7 +154,6 @@ class Differentiator:
         return self._state(self._middle, self._last, q)
 
     def _state(self, before: Floats, middle: Floats, last: Floats) -> Target:
-        h = self._period
-        rise, fall = last - middle, middle - before
-        qdd = (rise - fall) / (h * h)
-        return Target(q=last, qd=rise / h + 0.5 * h * qdd, qdd=qdd)
+        rates = np.empty((2, len(last)))
+        extrapolate(before, middle, last, self._period, rates)
+        return Target(last, rates[0], rates[1])

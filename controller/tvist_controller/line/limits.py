@@ -5,9 +5,11 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.differentiator import Floats, Target, central_differences
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.trajectory import AnyStop, MotionLimits, Path
+from tvist_plant.chain import collect_inertia, torques
 from tvist_plant.description import RobotDescription
 
 TORQUE_SHARE = 0.9
@@ -47,6 +49,46 @@ def rate_of(speed: float, velocity: float, slowest: float | None) -> float:
     return speed if slowest is None else min(speed, slowest / velocity)
 
 
+@compiled_for_ticks
+def keeps_torque(
+    chain: Floats, q: Floats, qd: Floats, qdd: Floats, gravity: float, scratch: Floats, most: Floats
+) -> bool:
+    """Return whether a state of motion keeps within torques, shape (n,) [N m]; see `tvist_plant.chain.torques`."""
+    found = np.empty(q.shape[0])
+    torques(chain, q, qd, qdd, gravity, scratch, found)
+    for j in range(q.shape[0]):
+        if not abs(found[j]) <= most[j]:
+            return False
+    return True
+
+
+@compiled_for_ticks
+def torque_room(
+    chain: Floats, q: Floats, qd: Floats, gravity: float, scratch: Floats, most: Floats, share: float
+) -> float:
+    """Return the largest acceleration of all joints at once that keeps torques, shape (n,) [N m], whatever its direction.
+
+    Args:
+        chain: As in `tvist_plant.chain.torques`; also q, qd, gravity and scratch.
+        q: Joint positions.
+        qd: Velocities.
+        gravity: Gravitational acceleration.
+        scratch: Scratch.
+        most: The torques.
+        share: Factor of the torque that belongs to the acceleration [-].
+    """
+    n, least = q.shape[0], math.inf
+    found, M = np.zeros(n), np.empty((n, n))
+    torques(chain, q, qd, np.zeros(n), gravity, scratch, found)
+    collect_inertia(scratch, M)
+    for i in range(n):
+        pushed = 0.0
+        for j in range(n):
+            pushed += abs(M[min(i, j), max(i, j)])
+        least = min(least, (most[i] - abs(found[i])) / (share * pushed))
+    return least
+
+
 class StreamTorqueRoom:
     """The acceleration of a stream that the joints' torques permit, after gravity and velocities.
 
@@ -61,9 +103,7 @@ class StreamTorqueRoom:
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
         """Return whether a state of motion keeps all torques within their share, or is as gentle as any stop."""
-        if (self._dynamics.effort(q, qd, qdd) <= self._most).all():
-            return True
-        return bool(np.abs(qdd).max() <= GENTLEST_STOP)
+        return self._keeps(q, qd, qdd, self._most) or bool(np.abs(qdd).max() <= GENTLEST_STOP)
 
     def acceleration(self, q: Floats, qd: Floats) -> float:
         """Largest a such that every q̈ with |q̈ᵢ| ≤ a keeps the torques within their share [rad/s^2].
@@ -71,8 +111,20 @@ class StreamTorqueRoom:
         With τ = M q̈ + h, such a q̈ needs at most |hᵢ| + a Σⱼ|Mᵢⱼ| at joint i. The result is at least that of the
         gentlest stop.
         """
-        left = self._most - self._dynamics.effort(q, qd, np.zeros_like(q))
-        return max(float((left / np.abs(self._dynamics.inertia(q)).sum(axis=1)).min()), GENTLEST_STOP)
+        return max(self._room(q, qd, self._most, 1.0), GENTLEST_STOP)
+
+    def _keeps(self, q: Floats, qd: Floats, qdd: Floats, most: Floats) -> bool:
+        dynamics = self._dynamics
+        if dynamics.changing:
+            return bool((dynamics.effort(q, qd, qdd) <= most).all())
+        return keeps_torque(dynamics.chain, q, qd, qdd, dynamics.gravitation, dynamics.scratch, most)
+
+    def _room(self, q: Floats, qd: Floats, most: Floats, share: float) -> float:
+        dynamics = self._dynamics
+        if dynamics.changing:
+            left = most - dynamics.effort(q, qd, np.zeros_like(q))
+            return float((left / (share * np.abs(dynamics.inertia(q)).sum(axis=1))).min())
+        return torque_room(dynamics.chain, q, qd, dynamics.gravitation, dynamics.scratch, most, share)
 
 
 class GuidedTorqueRoom(StreamTorqueRoom):
@@ -88,16 +140,15 @@ class GuidedTorqueRoom(StreamTorqueRoom):
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
         """Return whether a state of motion keeps all torques within their limits, or is as gentle as any stop."""
-        if not super().allows(q, qd, qdd):
-            return False
-        swung = self._dynamics.effort(q, qd, (1.0 + REBOUND) * qdd)
-        return bool((swung <= self._limits).all() or np.abs(qdd).max() <= GENTLEST_STOP)
+        gentle = bool(np.abs(qdd).max() <= GENTLEST_STOP)
+        swung = (1.0 + REBOUND) * qdd
+        return gentle or (self._keeps(q, qd, qdd, self._most) and self._keeps(q, qd, swung, self._limits))
 
     def acceleration(self, q: Floats, qd: Floats) -> float:
         """Largest a such that every q̈ with |q̈ᵢ| ≤ a is allowed [rad/s^2]."""
-        left = self._limits - self._dynamics.effort(q, qd, np.zeros_like(q))
-        most = (1.0 + REBOUND) * np.abs(self._dynamics.inertia(q)).sum(axis=1)
-        return max(min(float((left / most).min()), super().acceleration(q, qd)), GENTLEST_STOP)
+        return max(
+            min(self._room(q, qd, self._limits, 1.0 + REBOUND), super().acceleration(q, qd)), GENTLEST_STOP
+        )
 
 
 class StopTorque:

@@ -2,25 +2,29 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.trajectory.limits import Floats
 
 
-def linear(points: Sequence[Floats], u: float) -> tuple[Floats, Floats]:
+def linear(points: Sequence[Floats], u: float, rate: float = 1.0) -> tuple[Floats, Floats]:
     """Interpolate linearly between the last two points; the slope is that of the parabola through the last three.
 
     Args:
         points: The last four points, each of shape (n,).
         u: Position between the last two points, 0 < u ≤ 1; at 1 the value is exactly the last point [-].
+        rate: Factor of the derivative: how fast u grows.
 
     Returns:
-        Value, and derivative with respect to u.
+        Value, and derivative with respect to u times the rate.
     """
-    before, last = points[2] - points[1], points[3] - points[2]
-    value = points[3] if u == 1.0 else points[2] + u * last
-    return value, last + (u - 0.5) * (last - before)
+    found = np.empty((2, len(points[0])))
+    on_parabola(points[1], points[2], points[3], u, rate, found)
+    return found[0], found[1]
 
 
-def cubic(points: Sequence[Floats], u: float) -> tuple[Floats, Floats]:
+def cubic(points: Sequence[Floats], u: float, rate: float = 1.0) -> tuple[Floats, Floats]:
     """Evaluate the uniform cubic B-spline between the middle two of four points.
 
     Its second derivative varies linearly from one second difference of the points to the next, and its third
@@ -30,13 +34,42 @@ def cubic(points: Sequence[Floats], u: float) -> tuple[Floats, Floats]:
     Args:
         points: Four points, each of shape (n,).
         u: Position between the second and the third point, 0 < u ≤ 1 [-].
+        rate: See `linear`.
 
     Returns:
-        Value, and derivative with respect to u.
+        Value, and derivative with respect to u times the rate.
     """
-    first, middle, last = points[1] - points[0], points[2] - points[1], points[3] - points[2]
     v = 1.0 - u
-    # Use differences, so that equal points give exactly their own value.
+    found = np.empty((2, len(points[0])))
     inner = (1.0 + u * (3.0 + u * (3.0 - 2.0 * u))) / 6.0
-    value = points[1] - (v**3 / 6.0) * first + inner * middle + (u**3 / 6.0) * last
-    return value, 0.5 * v * v * first + (0.5 + u * v) * middle + 0.5 * u * u * last
+    values, slopes = (v**3 / 6.0, inner, u**3 / 6.0), (0.5 * v * v, 0.5 + u * v, 0.5 * u * u)
+    on_cubic(points[0], points[1], points[2], points[3], values, slopes, rate, found)
+    return found[0], found[1]
+
+
+@compiled_for_ticks
+def on_parabola(before: Floats, middle: Floats, last: Floats, u: float, rate: float, found: Floats) -> None:
+    """Compute what `linear` returns, shape (2, n)."""
+    for j in range(last.shape[0]):
+        fall, rise = middle[j] - before[j], last[j] - middle[j]
+        found[0, j] = last[j] if u == 1.0 else middle[j] + u * rise
+        found[1, j] = rate * (rise + (u - 0.5) * (rise - fall))
+
+
+@compiled_for_ticks
+def on_cubic(
+    first: Floats,
+    second: Floats,
+    third: Floats,
+    fourth: Floats,
+    values: tuple[float, float, float],
+    slopes: tuple[float, float, float],
+    rate: float,
+    found: Floats,
+) -> None:
+    """Compute what `cubic` returns, shape (2, n), from the weights of the points' differences."""
+    for j in range(first.shape[0]):
+        # Use differences, so that equal points give exactly their own value.
+        a, b, c = second[j] - first[j], third[j] - second[j], fourth[j] - third[j]
+        found[0, j] = second[j] - values[0] * a + values[1] * b + values[2] * c
+        found[1, j] = rate * (slopes[0] * a + slopes[1] * b + slopes[2] * c)

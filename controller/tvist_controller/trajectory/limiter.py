@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import ruckig
 
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 Bools = npt.NDArray[np.bool_]
@@ -17,6 +18,65 @@ STOPS = 0.8
 the permitted one changes on the way [-]."""
 HEAVY = 8.0
 """Acceleration below which the torque hardly ever keeps a joint of an arm [rad/s^2]."""
+
+
+FASTEST, HARDEST, HARSHEST, JERK, TOLERANCE, ROUNDING, INNER, PERIOD = range(8)
+"""Places of the numbers with which `judge` compares: the largest first, second and third difference of positions; the
+jerk limit as a third difference; `Limiter.TOLERANCE` and `ROUNDING`; the largest position that is far from the ends of
+the range [rad]; and the tick [s].
+"""
+STEP, BEND, QD, QDD, DIFFERENCES = range(5)
+"""Rows of differences: first and second one [rad], and as velocity and acceleration; their number."""
+FIT, FAR = 1, 2
+"""Bits of what `judge` returns: all joints fit; all are far from the ends of their range."""
+
+
+@compiled_for_ticks
+def judge(q: Floats, last: Floats, before: Floats, most: Floats, now: Floats, fits: Bools) -> int:
+    """Find which joints' differences are within the limits and can stay there.
+
+    Args:
+        q: Position, shape (n,) [rad].
+        last: Position a tick earlier.
+        before: Differences a tick earlier, shape (4, n), see `DIFFERENCES`.
+        most: Numbers to compare with, see `FASTEST`.
+        now: Result: differences, shape (4, n).
+        fits: Result: which joints fit, shape (n,).
+
+    Returns:
+        Sum of `FIT` and `FAR`, where they apply.
+    """
+    fastest, jerk, h = most[FASTEST], most[JERK], most[PERIOD]
+    far, free = True, True
+    for j in range(q.shape[0]):
+        step = q[j] - last[j]
+        bend = step - before[STEP, j]
+        now[STEP, j], now[BEND, j], now[QD, j], now[QDD, j] = step, bend, step / h, bend / (h * h)
+        size, turn = abs(step), abs(bend)
+        fits[j] = size <= fastest and turn <= most[HARDEST] and abs(bend - before[BEND, j]) <= most[HARSHEST]
+        if size + turn * turn * (0.5 / jerk) > fastest:
+            free = False
+        if not abs(q[j]) <= most[INNER]:
+            far = False
+    found = FAR if far else 0
+    fit = True
+    for j in range(q.shape[0]):
+        step, bend = now[STEP, j], now[BEND, j]
+        if not free:
+            # Velocity at the time when the acceleration, reduced by a tick's worth of jerk per tick, has reached
+            # zero.
+            turn, sign = abs(bend), np.sign(bend)
+            ticks = np.floor(turn / jerk)
+            towards = step * sign + ticks * (turn - 0.5 * jerk * (ticks + 1.0))
+            # If the acceleration is rising, check its present value as well, since limiting would start from that.
+            rise = (bend - before[BEND, j]) * sign
+            present = turn + rise
+            reached = step * sign + turn / 6.0 + present / 3.0 + present * present * (0.5 / jerk)
+            falls = rise <= most[TOLERANCE] * jerk + 4.0 * most[ROUNDING]
+            stays = falls or reached <= fastest + 2.0 * turn
+            fits[j] = fits[j] and towards <= fastest + most[TOLERANCE] * turn and stays
+        fit = fit and fits[j]
+    return found + FIT if fit else found
 
 
 class TorqueRoom(Protocol):
@@ -79,28 +139,34 @@ class Limiter:
         self._torque = torque
         self.q = np.array(q, dtype=float)
         """Position of the reference, shape (n,) [rad]."""
-        # Velocity of the signal; first and second differences of the reference, and the second difference a tick
-        # earlier.
-        self._signal_qd, self._step, self._bend, self._bend_before = np.zeros((4, n))
+        # Velocity of the signal; differences of the reference, and its second difference a tick earlier.
+        self._signal_qd, self._bend_before, self._now = np.zeros(n), np.zeros(n), np.zeros((DIFFERENCES, n))
         self._state: Floats | None = None  # derivatives, if they differ from those of the differences
         if state is not None:
             _, qd, qdd = state
-            self._signal_qd, self._step = qd, period * (qd - 0.5 * period * qdd)
-            self._bend = self._bend_before = period * period * qdd
+            self._signal_qd, self._now[STEP] = qd, period * (qd - 0.5 * period * qdd)
+            self._now[BEND] = self._bend_before = period * period * qdd
             self._state = np.stack(state)
-        self._behind = np.zeros(n, dtype=bool)
+        self._behind: Bools | None = None  # which joints are not on the signal, if any
         self.behind = 0.0
         """Time by which joints lag behind a signal that is at its limits, so that they cannot catch up [s]."""
         # Within this position, no state within the limits needs a check of the range.
         slow = limits.acceleration if torque is None else min(limits.acceleration, HEAVY)
         ramp, swing = limits.acceleration / limits.jerk, limits.velocity / slow
         lasting = max(swing + ramp, 2.0 * math.sqrt(limits.velocity / limits.jerk))
-        self._inner = float(self._reach.min()) - 2.0 * limits.velocity * (ramp + lasting)
+        inner = float(self._reach.min()) - 2.0 * limits.velocity * (ramp + lasting)
         room = 1.0 + self.TOLERANCE
-        self._most = (
-            room * limits.velocity * period + self.ROUNDING,
-            room * limits.acceleration * period**2 + 2.0 * self.ROUNDING,
-            room * limits.jerk * period**3 + 4.0 * self.ROUNDING,
+        self._most = np.array(
+            (
+                room * limits.velocity * period + self.ROUNDING,
+                room * limits.acceleration * period**2 + 2.0 * self.ROUNDING,
+                room * limits.jerk * period**3 + 4.0 * self.ROUNDING,
+                limits.jerk * period**3,
+                self.TOLERANCE,
+                self.ROUNDING,
+                inner,
+                period,
+            )
         )
         self._catcher, self._brake = ruckig.Ruckig(n, period), ruckig.Ruckig(n, period)
         self._catch_request, self._brake_request = ruckig.InputParameter(n), ruckig.InputParameter(n)
@@ -113,12 +179,12 @@ class Limiter:
     @property
     def limited(self) -> bool:
         """Whether the reference differs from the signal."""
-        return bool(self._behind.any())
+        return self._behind is not None
 
     @property
     def resting(self) -> bool:
         """Whether the last two positions were equal."""
-        return not self._step.any()
+        return not self._now[STEP].any()
 
     def follow(self, q: Floats, qd: Floats) -> Floats:
         """Advance by one tick towards a moving position.
@@ -130,25 +196,23 @@ class Limiter:
         Returns:
             Position of the reference, shape (n,) [rad].
         """
-        step = q - self.q
-        bend = step - self._step
-        fits = self._fits(step, bend)
-        if self._behind.any():
-            fits &= ~self._behind | self._meets(qd, step, bend)
-        near = np.abs(q).max() > self._inner
-        if near:
-            fits &= self._stoppable(self._passed(q, step, bend), self._accelerations()[1])
+        now, fits = np.empty((DIFFERENCES, len(q))), np.empty(len(q), dtype=np.bool_)
+        found = judge(q, self.q, self._now, self._most, now, fits)
+        if self._behind is not None:
+            fits &= ~self._behind | self._meets(qd, now)
+        if not found & FAR:
+            fits &= self._stoppable(self._passed(q, now), self._accelerations()[1])
+        passes = (found == FIT | FAR and self._behind is None) or bool(fits.all())
         self.behind = 0.0
-        if fits.all() and self._allowed(q, step, bend):
-            self._state = None
+        if passes and (self._torque is None or self._torque.allows(q, now[QD], now[QDD])):
+            self._state = self._behind = None
         else:
-            self._state, fits = self._held_back(q, qd, self._passed(q, step, bend), fits)
+            self._state, fits = self._held_back(q, qd, self._passed(q, now), fits)
+            self._behind = None if fits.all() else ~fits
             q = self._state[0]
-            step = q - self.q
-            bend = step - self._step
-        self._behind = ~fits
-        self._signal_qd, self._step = qd, step
-        self._bend, self._bend_before = bend, self._bend
+            now[STEP] = q - self.q
+            now[BEND] = now[STEP] - self._now[STEP]
+        self._signal_qd, self._bend_before, self._now = qd, self._now[BEND], now
         self.q = q
         return q
 
@@ -156,47 +220,22 @@ class Limiter:
     def state(self) -> tuple[Floats, Floats, Floats]:
         """Position, velocity and acceleration of the reference, each of shape (n,)."""
         if self._state is None:
-            self._state = self._passed(self.q, self._step, self._bend, self._bend_before)
+            self._state = self._passed(self.q, self._now, self._bend_before)
         q, qd, qdd = self._state
         return q, qd, qdd
 
-    def _allowed(self, q: Floats, step: Floats, bend: Floats) -> bool:
-        h = self._period
-        return self._torque is None or self._torque.allows(q, step / h, bend / (h * h))
-
-    def _passed(self, q: Floats, step: Floats, bend: Floats, bend_before: Floats | None = None) -> Floats:
+    def _passed(self, q: Floats, now: Floats, bend_before: Floats | None = None) -> Floats:
         """State, shape (3, n), of joints on the signal: derivatives of the cubic through the last four positions."""
-        h, limit = self._period, self._limits.acceleration
-        change = bend - (self._bend if bend_before is None else bend_before)
+        h, limit, step, bend = self._period, self._limits.acceleration, now[STEP], now[BEND]
+        change = bend - (self._now[BEND] if bend_before is None else bend_before)
         mean = bend / (h * h)
         # The mean acceleration was within the limit, so the present one is clamped to the limit as well.
         qdd = np.clip(mean + change / (h * h), np.minimum(mean, -limit), np.maximum(mean, limit))
         return np.stack((q, step / h + h * (mean / 6.0 + qdd / 3.0), qdd))
 
-    def _fits(self, step: Floats, bend: Floats) -> Bools:
-        """Return which joints' differences are within the limits and can stay there."""
-        fastest, hardest, harshest = self._most
-        size, turn = np.abs(step), np.abs(bend)
-        fits: Bools = size <= fastest
-        fits &= turn <= hardest
-        fits &= np.abs(bend - self._bend) <= harshest
-        jerk = self._limits.jerk * self._period**3
-        if (size + turn * turn * (0.5 / jerk)).max() > fastest:
-            # Velocity at the time when the acceleration, reduced by a tick's worth of jerk per tick, has reached
-            # zero.
-            ticks = np.floor(turn / jerk)
-            towards = step * np.sign(bend) + ticks * (turn - 0.5 * jerk * (ticks + 1.0))
-            fits &= towards <= fastest + self.TOLERANCE * turn
-            # If the acceleration is rising, check its present value as well, since limiting would start from that.
-            rise = (bend - self._bend) * np.sign(bend)
-            now = turn + rise
-            reached = step * np.sign(bend) + turn / 6.0 + now / 3.0 + now * now * (0.5 / jerk)
-            fits &= (rise <= self.TOLERANCE * jerk + 4.0 * self.ROUNDING) | (reached <= fastest + 2.0 * turn)
-        return fits
-
-    def _meets(self, qd: Floats, step: Floats, bend: Floats) -> Bools:
+    def _meets(self, qd: Floats, now: Floats) -> Bools:
         """Return which joints, if placed on the signal now, can continue on it within the limits."""
-        h, limits = self._period, self._limits
+        h, limits, step, bend = self._period, self._limits, now[STEP], now[BEND]
         signal = self._signal_acceleration(qd, limits.acceleration)
         following = (qd - step / h) / h + 0.5 * signal  # second difference at the next tick
         meets: Bools = np.abs(following) <= limits.acceleration

@@ -50,6 +50,7 @@ class PlayOut:
         self._origin, self._now = first, 0
         self._parts: deque[tuple[float, float]] = deque(maxlen=4)
         self._part, self._count = (0.0, 0.0), 0
+        self._earliest = self._latest = 0.0  # over all parts
         self._wanted = self._base
         self._held, self._calm = self._base, 0
         self._lags, self._rate = [self._base] * 3, 0.0
@@ -72,22 +73,21 @@ class PlayOut:
     def _lateness(self, sequence: int) -> float:
         return round(self._now - (sequence - self._origin) * self._ticks, 6)
 
-    @property
-    def _earliest(self) -> float:
-        return min(part[0] for part in (self._part, *self._parts))
-
     def hear(self, sequence: int) -> None:
         """Take note of a set-point that arrived before the coming tick."""
         lateness = self._lateness(sequence)
         if lateness - self._earliest > self._most:
             return  # too late to wait for
-        self._part = (min(self._part[0], lateness), max(self._part[1], lateness))
+        early, late = self._part
+        self._part = (min(early, lateness), max(late, lateness))
+        self._earliest, self._latest = min(self._earliest, lateness), max(self._latest, lateness)
         self._count += 1
         if self._count >= WINDOW // 4:
             self._parts.append(self._part)
             self._part, self._count = (lateness, lateness), 0
-        latest = max(part[1] for part in (self._part, *self._parts))
-        wanted = self._base + min(latest, self._earliest + self._most)
+            self._earliest = min(early for early, _ in self._parts)
+            self._latest = max(late for _, late in self._parts)
+        wanted = self._base + min(self._latest, self._earliest + self._most)
         if wanted > self._wanted or wanted < self._wanted - SLACK * self._ticks:
             self._wanted = wanted
 

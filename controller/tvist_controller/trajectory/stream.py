@@ -148,10 +148,11 @@ class SetpointStream(Trajectory):
         for sequence in self._heard:
             play_out.hear(sequence)
         self._heard.clear()
-        for sequence in sorted(number for number in self._waiting if number <= self._head):
-            # It was replaced meanwhile, but later replacements should take it into account.
-            self._keep(sequence, self._waiting.pop(sequence))
-            self.late += 1
+        if min(self._waiting) <= self._head:
+            for sequence in sorted(number for number in self._waiting if number <= self._head):
+                # It was replaced meanwhile, but later replacements should take it into account.
+                self._keep(sequence, self._waiting.pop(sequence))
+                self.late += 1
 
     def _begin(self, first: int) -> PlayOut:
         self._real.extend(((first - 2, self._rest), (first - 1, self._rest)))
@@ -171,20 +172,15 @@ class SetpointStream(Trajectory):
         self._play_out = PlayOut(sequence, self._look_ahead, self._ticks, self.limits, self._period)
         return self._play_out
 
-    def _needed(self, play_out: PlayOut) -> int:
-        """Number of the newest set-point that the curve needs now."""
-        origin, offset = play_out.position
-        return origin + math.ceil(offset) + self._look_ahead - 1
-
     def _evaluate(self, play_out: PlayOut) -> tuple[Floats, Floats]:
         """Position [rad] and velocity [rad/s] of the stream."""
-        if not self._complete(self._needed(play_out)):
+        origin, offset = play_out.position
+        after = math.ceil(offset)
+        if not self._complete(origin + after + self._look_ahead - 1):
             return self._wait()
         self._pause = None
-        _, offset = play_out.position
-        q, slope = self._curve(self._points, offset - math.ceil(offset) + 1.0)
-        qd = (play_out.rate / self._period) * slope
-        self._speed = float(np.abs(qd).max())
+        q, qd = self._curve(self._points, offset - after + 1.0, play_out.rate / self._period)
+        self._speed = max(map(abs, qd.tolist()))
         return q, qd
 
     def _complete(self, needed: int) -> bool:

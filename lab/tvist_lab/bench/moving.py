@@ -3,6 +3,7 @@
 import gc
 import time
 from collections.abc import Callable
+from itertools import count
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,7 +25,7 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD
 from tvist_protocol.codec import decode_reply, encode
-from tvist_protocol.commands import Command, MoveJ, TakeControl
+from tvist_protocol.commands import Command, MoveJ, ServoStart, Setpoint, TakeControl
 from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_shaping import TvistFilter, shaper
@@ -54,15 +55,8 @@ def line_tick(shaper: str) -> Run:
     Raises:
         ConfigError: There is no such shaper.
     """
-    host = LoopbackHost(free_setup(truth=False, shaper=shaper))
+    host, token, send = _robot(shaper)
     host.subscribe("state", len)
-    host.request("bench", encode(TakeControl(client="bench")))
-    lease = host.controller.session.lease
-    token = lease.token if lease else ""
-
-    def send(command: Command) -> None:
-        reply = decode_reply(host.request("bench", encode(command)))
-        assert not isinstance(reply, Refused), reply.why
 
     def run() -> float:
         send(SimulationReset(token=token, q=pose("Q1")))
@@ -70,6 +64,45 @@ def line_tick(shaper: str) -> Run:
         return us_per_tick(lambda: send(SimulationStep(token=token, ticks=TICKS)))
 
     return run
+
+
+def stream_tick(every: int) -> Run:
+    """Return what measures a tick of the line with `zv`, fed with set-points, one every so many ticks."""
+    host, token, send = _robot("zv")
+    setpoints = [
+        encode(Setpoint(token=token, sequence=number, q=tuple(q.tolist())))
+        for number, q in enumerate(motion()[::every])
+    ]
+    states = count()
+
+    def answer(_: bytes) -> None:
+        number, between = divmod(next(states), every)
+        if between == 0 and number < len(setpoints):
+            host.put_setpoint("bench", setpoints[number])
+
+    host.subscribe("state", answer)
+
+    def run() -> float:
+        nonlocal states
+        send(SimulationReset(token=token, q=pose("Q1")))
+        send(ServoStart(token=token, period=every * PERIOD))
+        states = count()
+        return us_per_tick(lambda: send(SimulationStep(token=token, ticks=TICKS)))
+
+    return run
+
+
+def _robot(shaper: str) -> tuple[LoopbackHost, str, Callable[[Command], None]]:
+    """Return a robot, the token of a client that has control, and what sends its commands."""
+    host = LoopbackHost(free_setup(truth=False, shaper=shaper))
+    host.request("bench", encode(TakeControl(client="bench")))
+    lease = host.controller.session.lease
+
+    def send(command: Command) -> None:
+        reply = decode_reply(host.request("bench", encode(command)))
+        assert not isinstance(reply, Refused), reply.why
+
+    return host, lease.token if lease else "", send
 
 
 def plant_tick() -> Run:

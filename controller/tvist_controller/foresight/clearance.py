@@ -1,0 +1,160 @@
+"""Bounds that prove an arm to be clear of itself and the floor, compiled: no stop near a body is decided here.
+
+The distance between two bodies on one chain of joints changes only with the joints between them. If joint j turns at
+the rate q̇_j, it changes at most as fast as |q̇_j| times the smaller of the two bodies' largest distances from the joint:
+both surfaces' nearest points lie on a common normal, to which a turn about an axis gives them the same velocity.
+"""
+
+import math
+
+import numpy as np
+
+from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.trajectory.stop_profile import after, stop_phases
+from tvist_plant.chain import bend, start, step_along
+
+LINK, FIRST, SECOND, RADIUS, BODY = 0, 1, 4, 7, 8
+"""Columns of a body: number of joints before it, the ends of its axis in its link's frame and its radius [m]; their
+number. The floor's row has the link `FLOOR` and its height.
+"""
+FLOOR = -1.0
+ONE, OTHER, ARMS = 0, 1, 2
+"""Columns of a pair: the numbers of its bodies, and for each joint how far a turn of it may bring them [m/rad]."""
+LOOKS = 16
+"""Largest number of postures of a stop that are looked at."""
+
+
+@compiled_for_ticks
+def place(chain: Floats, q: Floats, bodies: Floats, ends: Floats) -> None:
+    """Compute where the axes of bodies end.
+
+    Args:
+        chain: Parameters of the links, see `tvist_plant.chain`, shape (n+1, 22).
+        q: Joint positions, shape (n,) [rad].
+        bodies: See `BODY`, shape (b, 8).
+        ends: Result: both ends of each axis in the base frame, shape (b, 6) [m].
+    """
+    R, o = np.empty((3, 3)), np.empty(3)
+    start(R, o)
+    for link in range(q.shape[0] + 1):
+        if link > 0:
+            step_along(chain[link - 1], R, o)
+            bend(R, q[link - 1])
+        for b in range(bodies.shape[0]):
+            if bodies[b, LINK] == link:
+                for i in range(3):
+                    for end in (FIRST, SECOND):
+                        x, y, z = bodies[b, end], bodies[b, end + 1], bodies[b, end + 2]
+                        ends[b, end - FIRST + i] = o[i] + (R[i, 0] * x + R[i, 1] * y + R[i, 2] * z)
+
+
+@compiled_for_ticks
+def gap(bodies: Floats, ends: Floats, one: int, other: int) -> float:
+    """Return the distance between two bodies, of which the second may be the floor [m]; see `place`."""
+    p, q = ends[one], ends[other]
+    if bodies[other, LINK] == FLOOR:
+        return float(min(p[2], p[5]) - bodies[one, RADIUS] - bodies[other, RADIUS])
+    # The nearest points of two segments, by their shares s and t.
+    ux, uy, uz = p[3] - p[0], p[4] - p[1], p[5] - p[2]
+    vx, vy, vz = q[3] - q[0], q[4] - q[1], q[5] - q[2]
+    wx, wy, wz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+    a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, ux * wx + uy * wy + uz * wz
+    e, f = vx * vx + vy * vy + vz * vz, vx * wx + vy * wy + vz * wz
+    square = a * e - b * b
+    s = min(max((b * f - c * e) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    t = (b * s + f) / e if e > 0.0 else 0.0
+    if t < 0.0 or t > 1.0 or e <= 0.0:
+        t = min(max(t, 0.0), 1.0)
+        s = min(max((b * t - c) / a, 0.0), 1.0) if a > 0.0 else 0.0
+    x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
+    return math.sqrt(x * x + y * y + z * z) - bodies[one, RADIUS] - bodies[other, RADIUS]
+
+
+@compiled_for_ticks
+def has_room(
+    chain: Floats, bodies: Floats, pairs: Floats, ends: Floats, q: Floats, turned: Floats, least: float
+) -> bool:
+    """Return whether all bodies certainly stay farther apart than `least` [m] while the joints turn.
+
+    Args:
+        chain: See `place`; also for bodies, ends and q.
+        bodies: Bodies.
+        pairs: See `ARMS`, shape (k, 2+n).
+        ends: Scratch.
+        q: Joint positions around which they turn.
+        turned: Largest angle of each joint, shape (n,) [rad].
+        least: Distance [m].
+    """
+    place(chain, q, bodies, ends)
+    for p in range(pairs.shape[0]):
+        way = 0.0
+        for j in range(q.shape[0]):
+            way += pairs[p, ARMS + j] * turned[j]
+        # Negated, so that nothing is clear in a posture that is not finite.
+        if not gap(bodies, ends, int(pairs[p, ONE]), int(pairs[p, OTHER])) - way > least:
+            return False
+    return True
+
+
+@compiled_for_ticks
+def stop_has_room(
+    chain: Floats,
+    bodies: Floats,
+    pairs: Floats,
+    ends: Floats,
+    q: Floats,
+    qd: Floats,
+    qdd: Floats,
+    limit: float,
+    jerk: float,
+    least: float,
+) -> bool:
+    """Return whether all bodies certainly stay farther apart than `least` [m] on the way of a stop.
+
+    From each posture that is looked at, time goes on by as much as the bodies then certainly need to meet.
+
+    Args:
+        chain: See `has_room`; also for bodies, pairs, ends and least.
+        bodies: Bodies.
+        pairs: Pairs.
+        ends: Scratch.
+        q: Joint positions at its start, shape (n,) [rad].
+        qd: Velocities, shape (n,) [rad/s].
+        qdd: Accelerations, shape (n,) [rad/s^2].
+        limit: Acceleration limit of every joint [rad/s^2].
+        jerk: Jerk limit [rad/s^3].
+        least: Distance [m].
+    """
+    n, time = q.shape[0], 0.0
+    now, fastest, left = np.empty(n), np.empty(n), np.empty(n)
+    waiting = np.arange(pairs.shape[0])  # pairs that are not known to stay apart until the end
+    count = waiting.shape[0]
+    for _ in range(LOOKS):
+        for j in range(n):
+            phases = stop_phases(qd[j], qdd[j], limit, jerk)
+            turned, v, a = after(qd[j], qdd[j], phases, time)
+            rest = max(phases[0] + phases[2] + phases[3] - time, 0.0)
+            now[j] = q[j] + turned
+            # Until the acceleration is reduced to zero, the velocity grows by no more than this.
+            fastest[j] = abs(v) + 0.5 * a * a / jerk if rest > 0.0 else 0.0
+            left[j] = fastest[j] * min(rest, 0.5 * fastest[j] / limit + (limit + abs(a)) / jerk)
+        place(chain, now, bodies, ends)
+        step, looked, count = math.inf, count, 0
+        for number in range(looked):
+            p = waiting[number]
+            way = speed = 0.0
+            for j in range(n):
+                way += pairs[p, ARMS + j] * left[j]
+                speed += pairs[p, ARMS + j] * fastest[j]
+            room = gap(bodies, ends, int(pairs[p, ONE]), int(pairs[p, OTHER])) - least
+            if not room > 0.0:  # negated, so that nothing is clear in a posture that is not finite
+                return False
+            if not room > way:
+                waiting[count] = p
+                count += 1
+                step = min(step, room / speed)
+        if count == 0:
+            return True
+        time += step
+    return False
