@@ -39,7 +39,7 @@ def test_the_tool_moves_as_differences_of_its_poses_say(arm, offset):
     h = 1e-4
     for _ in range(20):
         q, qd, qdd = random.uniform(-2.0, 2.0, (3, 6))
-        tool = body.tool(q.tolist(), qd.tolist(), qdd.tolist(), list(offset))
+        tool = body.tool(q, qd, qdd, list(offset))
         position, rotation, J = placed(model, q, offset)
         np.testing.assert_allclose(tool.pose[:3], position, atol=1e-12)
         np.testing.assert_allclose(pin.exp3(np.array(tool.pose[3:])), rotation, atol=1e-12)
@@ -84,7 +84,7 @@ def test_the_force_is_that_of_the_formula(arm, offset, plain, monkeypatch):
     for q in (*random.uniform(-2.0, 2.0, (20, 6)), np.array(STRETCHED)):
         torque = random.uniform(-50.0, 50.0, 6)
         wanted = by_numpy(placed(model, q, offset)[2], torque)
-        found = wrench.at_tool(q.tolist(), torque, offset)
+        found = wrench.at_tool(q, torque, offset)
         np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-6 * np.abs(wanted).max())
 
 

@@ -3,7 +3,7 @@
 from functools import cached_property
 
 from tvist_controller.instruments.ratings import BUS_VOLTAGE
-from tvist_controller.instruments.reading import Reading
+from tvist_controller.instruments.reading import SHAPED, UNSHAPED, Reading
 from tvist_controller.instruments.variables import Double, Vector6D
 
 DEVIATION = 0.05
@@ -37,9 +37,9 @@ class JointValues(Reading):
         state, moment = self.state, self.state.target_moment
         if state.unshaped_q is None:
             return moment
-        payload, rigid = self.io.payload, self._rigid
-        unshaped = rigid.moment(self.target_q, self.target_qd, self.target_qdd, payload)
-        shaped = rigid.moment(state.target_q, state.target_qd, state.target_qdd, payload)
+        motion, payload = self._motion, self.io.payload
+        unshaped = self._rigid.moment(*motion[UNSHAPED], payload)
+        shaped = self._rigid.moment(*motion[SHAPED], payload)
         return [m + (u - s) for m, u, s in zip(moment, unshaped, shaped, strict=True)]
 
     @cached_property

@@ -1,16 +1,26 @@
 """Base of all values of a tick."""
 
-from typing import Any
+from functools import cached_property
+from struct import pack
+
+import numpy as np
 
 from tvist_controller.instruments.meters import Meters
 from tvist_controller.instruments.ratings import JointRating
 from tvist_controller.instruments.rigid_body import RigidBody
 from tvist_controller.instruments.variables import Vector6D
 from tvist_controller.instruments.wrench import RUNNING, ToolWrench
+from tvist_plant.model import Floats
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State
 
+ROWS = 10
+"""Number of lists of the state that values are computed from."""
+UNSHAPED, SHAPED = slice(0, 3), slice(3, 6)
+"""Rows of the references before and after shaping: positions, velocities and accelerations."""
+SHAPED_QD, SHAPED_QDD, TARGET_MOMENT, ACTUAL_Q, ACTUAL_QD, ACTUAL_MOMENT = range(4, ROWS)
+"""Rows of single lists."""
 POWERED = frozenset(range(RobotMode.POWER_ON, RobotMode.RUNNING + 1))
 """Robot modes in which the arm has power."""
 
@@ -29,7 +39,6 @@ class Reading:
         ratings: Ratings of the joints.
         current: Currents of the motors [A].
         meters: Temperatures and energies at this tick.
-        kept: Values that interfaces keep from tick to tick.
     """
 
     def __init__(
@@ -41,16 +50,13 @@ class Reading:
         ratings: list[JointRating],
         current: list[float],
         meters: Meters,
-        kept: dict[str, Any],
     ) -> None:
         self.state = state
         """State of the tick, as published."""
         self.io = io
         """Terminals and registers, as published."""
-        self.shared: dict[str, Any] = {}
-        """Data that interfaces derive from this tick and share among all clients."""
-        self.kept = kept
-        """Data that interfaces keep from tick to tick."""
+        self.shared: dict[str, bytes] = {}
+        """Packages that interfaces make of this tick and share among all clients."""
         self._current = current
         self._temperatures = meters.temperatures
         self._power, self._consumed, self._dissipated = meters.power, meters.consumed, meters.dissipated
@@ -81,3 +87,13 @@ class Reading:
     def driven(self) -> bool:
         """Whether the drives hold the arm, with the brakes released."""
         return self.state.robot_mode == RUNNING
+
+    @cached_property
+    def _motion(self) -> Floats:
+        """Lists of the state as one array, which takes less time than one for each, shape (10, n)."""
+        state, joints = self.state, len(self.state.target_q)
+        unshaped = *self.target_q, *self.target_qd, *self.target_qdd
+        shaped = *state.target_q, *state.target_qd, *state.target_qdd, *state.target_moment
+        measured = *state.actual_q, *state.actual_qd, *state.actual_moment
+        data = bytearray(pack(f"{ROWS * joints}d", *unshaped, *shaped, *measured))
+        return np.frombuffer(data).reshape(ROWS, joints)  # one that may be written, as compiled code expects

@@ -5,7 +5,17 @@ from math import sqrt
 
 import numpy as np
 
-from tvist_controller.instruments.reading import Reading
+from tvist_controller.instruments.reading import (
+    ACTUAL_MOMENT,
+    ACTUAL_Q,
+    ACTUAL_QD,
+    SHAPED,
+    SHAPED_QD,
+    SHAPED_QDD,
+    TARGET_MOMENT,
+    UNSHAPED,
+    Reading,
+)
 from tvist_controller.instruments.rigid_body import Tool, add, carried, cross
 from tvist_controller.instruments.variables import Double, Vector3D, Vector6D
 from tvist_controller.instruments.wrench import since_zeroed
@@ -110,7 +120,7 @@ class ToolValues(Reading):
     @cached_property
     def actual_momentum(self) -> Double:
         """Computed: length of the linear momentum of links and declared payload, as measured [kg m/s]."""
-        return self._rigid.momentum(self.state.actual_q, self.state.actual_qd, self.io.payload)
+        return self._rigid.momentum(self._motion[ACTUAL_Q], self._motion[ACTUAL_QD], self.io.payload)
 
     @property
     def elbow_position(self) -> Vector3D:
@@ -157,34 +167,38 @@ class ToolValues(Reading):
 
         The weight of the base itself is not included.
         """
-        return self._rigid.base_wrench(self.target_q, self.target_qd, self.target_qdd, self.io.payload)
+        return self._rigid.base_wrench(*self._motion[UNSHAPED], self.io.payload)
 
     @cached_property
     def _target(self) -> Tool:
-        return self._rigid.tool(self.target_q, self.target_qd, self.target_qdd, self.io.tcp_offset)
+        return self._rigid.tool(*self._motion[UNSHAPED], self.io.tcp_offset)
 
     @cached_property
     def _shaped(self) -> Tool:
-        state = self.state
-        if state.unshaped_q is None:
+        if self.state.unshaped_q is None:
             return self._target
-        return self._rigid.tool(state.target_q, state.target_qd, state.target_qdd, self.io.tcp_offset)
+        return self._rigid.tool(*self._motion[SHAPED], self.io.tcp_offset)
 
     @cached_property
     def _elbow(self) -> tuple[list[float], list[float]]:
-        return self._rigid.elbow(self.state.actual_q, self.state.actual_qd)
+        return self._rigid.elbow(self._motion[ACTUAL_Q], self._motion[ACTUAL_QD])
 
     @cached_property
     def _rotation(self) -> Floats:
-        return self._rigid.flange_rotation(self.state.actual_q)
+        return self._rigid.flange_rotation(self._motion[ACTUAL_Q])
 
     @cached_property
     def _felt(self) -> Floats:
         """External torque on the joints: expected minus measured, shape (n,) [N m]."""
-        return self._wrench.felt(self.state)
+        if not self.driven:
+            return np.zeros(len(self.state.actual_q))
+        motion = self._motion
+        return self._wrench.between(
+            motion[SHAPED_QD], motion[SHAPED_QDD], motion[TARGET_MOMENT], motion[ACTUAL_MOMENT]
+        )
 
     @cached_property
     def _force(self) -> Floats:
         if not self.driven:
             return np.zeros(6)
-        return self._wrench.at_tool(self.state.actual_q, self._felt, self.io.tcp_offset)
+        return self._wrench.at_tool(self._motion[ACTUAL_Q], self._felt, self.io.tcp_offset)
