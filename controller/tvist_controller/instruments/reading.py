@@ -1,6 +1,5 @@
 """Base of all values of a tick."""
 
-from functools import cached_property
 from struct import pack
 
 import numpy as np
@@ -8,18 +7,22 @@ import numpy as np
 from tvist_controller.instruments.meters import Meters
 from tvist_controller.instruments.ratings import JointRating
 from tvist_controller.instruments.rigid_body import RigidBody
-from tvist_controller.instruments.variables import Vector6D
+from tvist_controller.instruments.variables import Vector6D, computed_once
 from tvist_controller.instruments.wrench import RUNNING, ToolWrench
 from tvist_plant.model import Floats
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State
 
-ROWS = 10
-"""Number of lists of the state that values are computed from."""
+JOINT_LISTS = (
+    "target_q", "target_qd", "target_qdd", "shaped_q", "shaped_qd", "shaped_qdd", "shaped_moment", "actual_q",
+    "actual_qd", "actual_moment",
+)  # fmt: skip
+"""Lists of the state that values are computed from."""
+ROWS = len(JOINT_LISTS)
 UNSHAPED, SHAPED = slice(0, 3), slice(3, 6)
 """Rows of the references before and after shaping: positions, velocities and accelerations."""
-SHAPED_QD, SHAPED_QDD, TARGET_MOMENT, ACTUAL_Q, ACTUAL_QD, ACTUAL_MOMENT = range(4, ROWS)
+SHAPED_QD, SHAPED_QDD, SHAPED_MOMENT, ACTUAL_Q, ACTUAL_QD, ACTUAL_MOMENT = range(4, ROWS)
 """Rows of single lists."""
 POWERED = frozenset(range(RobotMode.POWER_ON, RobotMode.RUNNING + 1))
 """Robot modes in which the arm has power."""
@@ -88,12 +91,16 @@ class Reading:
         """Whether the drives hold the arm, with the brakes released."""
         return self.state.robot_mode == RUNNING
 
-    @cached_property
-    def _motion(self) -> Floats:
-        """Lists of the state as one array, which takes less time than one for each, shape (10, n)."""
-        state, joints = self.state, len(self.state.target_q)
+    @computed_once
+    def joint_lists(self) -> bytearray:
+        """`JOINT_LISTS` one behind the other, as doubles in the machine's order."""
+        state = self.state
         unshaped = *self.target_q, *self.target_qd, *self.target_qdd
         shaped = *state.target_q, *state.target_qd, *state.target_qdd, *state.target_moment
         measured = *state.actual_q, *state.actual_qd, *state.actual_moment
-        data = bytearray(pack(f"{ROWS * joints}d", *unshaped, *shaped, *measured))
-        return np.frombuffer(data).reshape(ROWS, joints)  # one that may be written, as compiled code expects
+        return bytearray(pack(f"{ROWS * len(state.target_q)}d", *unshaped, *shaped, *measured))
+
+    @computed_once
+    def _motion(self) -> Floats:
+        """The same as an array, shape (10, n)."""
+        return np.frombuffer(self.joint_lists).reshape(ROWS, len(self._ratings))

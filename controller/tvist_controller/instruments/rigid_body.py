@@ -1,7 +1,6 @@
 """Mechanics of the rigid arm with the declared payload, as the instruments need them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
@@ -17,18 +16,6 @@ from tvist_protocol.values import Payload
 
 ELBOW = 2
 """Index of the joint whose axis is the elbow."""
-
-
-@dataclass(frozen=True)
-class Tool:
-    """Motion of the tool centre point in the base frame."""
-
-    pose: list[float]
-    """x y z [m] and rotation vector [rad]."""
-    speed: list[float]
-    """Linear [m/s] and angular [rad/s] velocity."""
-    acceleration: list[float]
-    """Linear [m/s²] and angular [rad/s²] acceleration."""
 
 
 def add(a: list[float], b: list[float]) -> list[float]:
@@ -100,8 +87,11 @@ class RigidBody:
         still = np.zeros(description.joints)
         self.tool(still, still, still, [0.0] * 6)  # loads compiled code, which takes many ticks
 
-    def tool(self, q: Floats, qd: Floats, qdd: Floats, offset: list[float]) -> Tool:
-        """Compute the motion of the tool centre point.
+    def tool(self, q: Floats, qd: Floats, qdd: Floats, offset: list[float]) -> Floats:
+        """Return the motion of the tool centre point in the base frame, shape (18,).
+
+        Its pose, x y z [m] and rotation vector [rad]; its velocity, linear [m/s] and angular [rad/s]; its acceleration,
+        linear [m/s²] and angular [rad/s²].
 
         Args:
             q: Joint positions, shape (n,) [rad].
@@ -114,8 +104,7 @@ class RigidBody:
             self._offset, self._tool = list(offset), np.concatenate([turned, offset[:3]])
         out = np.empty(18)
         tool_rates(self._chain, self._tool, q, qd, qdd, out)
-        found = out.tolist()
-        return Tool(pose=found[:6], speed=found[6:12], acceleration=found[12:])
+        return out
 
     def flange_rotation(self, q: Floats) -> Floats:
         """Rotation from the flange to the base frame, shape (3, 3)."""

@@ -6,10 +6,14 @@ What no recipe names is not computed.
 from collections.abc import Iterable
 from itertools import chain
 from struct import Struct, calcsize
+from sys import byteorder
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tvist_controller.instruments.snapshot import Snapshot
+from tvist_protocol.io import Io
 from tvist_server.gateways.ur.rtde.codec import HEADER, PackageKind
 from tvist_server.gateways.ur.rtde.outputs import OUTPUTS, PARTS, Part
 from tvist_server.gateways.ur.rtde.recipes import OutputRecipe
@@ -61,44 +65,93 @@ class Board:
 
 
 class _Bytes:
-    """Bytes of the variables that some recipes name, one behind the other.
+    """Bytes of the variables that some recipes name.
 
     Args:
         names: The variables; one may occur several times.
-        snapshot: Tells how many joints the arm has. Vectors of fewer than six are filled with zeros, since clients
-            expect six; robots with more joints are refused before they are served, see `UrPorts`.
+        snapshot: Tells how many joints the arm has.
     """
 
     def __init__(self, names: Iterable[str], snapshot: Snapshot) -> None:
         parts = dict.fromkeys(PARTS[name][0] for name in names)
-        several = [part for part in parts if part.numbers > 1]
-        single = [part for part in parts if part.numbers == 1]
-        self._several, self._single = [part.read for part in several], [part.read for part in single]
-        self._places: dict[Part, int] = {}
-        at, layout = 0, ">"
-        for part in (*several, *single):
-            self._places[part] = at
-            given = len(part.read(snapshot)) if part.numbers > 1 else 1
-            layout += f"{given}{part.letter}{part.size * (part.numbers - given)}x"
-            at += part.size * part.numbers
-        self._pack_into = Struct(layout).pack_into
-        self._buffer = bytearray(calcsize(layout))
+        self._places: dict[Part, _Place] = {}
+        self._of_io = _Packing([part for part in parts if part.of_io], snapshot, 0, self._places)
+        self._others = _Packing(
+            [part for part in parts if not part.of_io], snapshot, self._of_io.end, self._places
+        )
+        self._zero = self._others.end
+        self._buffer = bytearray(self._zero + 1)
         self._numbers = np.frombuffer(self._buffer, np.uint8)
-        self._indices: dict[str, np.ndarray[tuple[int], np.dtype[np.intp]]] = {}
+        self._indices: dict[str, NDArray[np.intp]] = {}
+        self._io: Io | None = None
 
     def write(self, snapshot: Snapshot) -> None:
         """Write the values of a tick."""
-        several = chain.from_iterable([read(snapshot) for read in self._several])
-        self._pack_into(self._buffer, 0, *several, *[read(snapshot) for read in self._single])
+        if snapshot.io is not self._io:
+            self._of_io.write(snapshot, self._buffer)
+            self._io = snapshot.io
+        self._others.write(snapshot, self._buffer)
 
     def of(self, recipe: OutputRecipe) -> bytes:
         """Return the bytes of the variables of a recipe."""
         index = self._indices.get(recipe.text)
         if index is None:
-            index = self._indices[recipe.text] = np.concatenate([self._index(name) for name in recipe.names])
+            places = list(chain.from_iterable(self._places_of(name) for name in recipe.names))
+            index = self._indices[recipe.text] = np.array(places, np.intp)
         return self._numbers.take(index, mode="clip").tobytes()  # the quickest mode; all places are inside
 
-    def _index(self, name: str) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-        part, number = PARTS[name]
-        first = self._places[part] + part.size * number
-        return np.arange(first, first + OUTPUTS[name].size)
+    def _places_of(self, name: str) -> list[int]:
+        """Places of the bytes of a variable.
+
+        A vector that is too short is filled with zeros, since clients expect six entries of an arm with fewer joints.
+        Robots with more joints are refused before they are served, see `UrPorts`.
+        """
+        (part, number), wire = PARTS[name], OUTPUTS[name]
+        place, size = self._places[part], wire.size // wire.length
+        entries = place.entries // part.variables
+        first = [place.first + size * (number * entries + k) for k in range(entries)]
+        turned = place.of_machine and byteorder == "little"
+        order = range(size - 1, -1, -1) if turned else range(size)
+        found = [at + k for at in first for k in order]
+        return found + [self._zero] * (wire.size - len(found))
+
+
+class _Place(NamedTuple):
+    """Where a part is written."""
+
+    first: int
+    """Place of its first byte."""
+    entries: int
+    """Number of its entries."""
+    of_machine: bool
+    """Whether its bytes have the machine's order."""
+
+
+class _Packing:
+    """Writes parts one behind the other, by one call.
+
+    Args:
+        parts: The parts.
+        snapshot: Tells the lengths of lists.
+        first: Place of the first byte.
+        places: Where each part is written is added here.
+    """
+
+    def __init__(self, parts: list[Part], snapshot: Snapshot, first: int, places: dict[Part, _Place]) -> None:
+        found = [(part, part.read(snapshot)) for part in parts]
+        lists = [(part, value) for part, value in found if isinstance(value, list)]
+        others = [(part, value) for part, value in found if not isinstance(value, list)]
+        self._lists, self._others = [part.read for part, _ in lists], [part.read for part, _ in others]
+        self._first, self.end, layout = first, first, ">"
+        for part, value in (*lists, *others):
+            size, raw = calcsize(f">{part.letter}"), isinstance(value, bytes | bytearray)
+            entries = len(value) // size if raw else len(value) if isinstance(value, list) else 1
+            places[part] = _Place(self.end, entries, raw)
+            layout += f"{size * entries}s" if raw else f"{entries}{part.letter}"
+            self.end += size * entries
+        self._pack_into = Struct(layout).pack_into
+
+    def write(self, snapshot: Snapshot, buffer: bytearray) -> None:
+        """Write the values of a tick."""
+        numbers = chain.from_iterable([read(snapshot) for read in self._lists])
+        self._pack_into(buffer, self._first, *numbers, *[read(snapshot) for read in self._others])

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Iterator
 from operator import attrgetter
-from struct import calcsize
 from typing import Any, NamedTuple
 
+from tvist_controller.instruments.reading import JOINT_LISTS
 from tvist_controller.instruments.snapshot import VARIABLES, Snapshot
 from tvist_server.gateways.ur.rtde.registers import KINDS, SINGLE_BITS, registers
 from tvist_server.gateways.ur.rtde.wire import Wire
@@ -16,19 +16,16 @@ OUTPUTS: dict[str, Wire] = {name: Wire[word] for name, word in VARIABLES.items()
 
 
 class Part(NamedTuple):
-    """What is written at once: a variable, or all registers of a bank that have the same type."""
+    """What is read at once: one variable, or several with the same number of entries."""
 
     read: Callable[[Snapshot], Any]
-    """Returns its value: a list if it has several numbers."""
+    """Returns a number, a list of numbers, or doubles as bytes in the machine's order."""
     letter: str
-    """Format of a number in `struct`."""
-    numbers: int
-    """How many numbers clients expect; an arm with fewer joints has fewer."""
-
-    @property
-    def size(self) -> int:
-        """Size of a number [bytes]."""
-        return calcsize(f">{self.letter}")
+    """Format of an entry in `struct`."""
+    variables: int = 1
+    """Number of variables."""
+    of_io: bool = False
+    """Whether it depends on nothing but the terminals and registers, which rarely change."""
 
 
 def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
@@ -43,19 +40,22 @@ def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
 
 def _parts() -> Iterator[tuple[str, tuple[Part, int]]]:
     for name, word in VARIABLES.items():
-        wire = Wire[word]
-        yield name, (Part(attrgetter(name), wire.value[-1], wire.length), 0)
+        yield name, (Part(attrgetter(name), Wire[word].value[-1]), 0)
+    joints = Part(attrgetter("joint_lists"), "d", len(JOINT_LISTS))
+    yield from ((name, (joints, row)) for row, name in enumerate(JOINT_LISTS))
+    tool = Part(attrgetter("target_tool"), "d", 3)
+    yield from (
+        (f"target_TCP_{name}", (tool, row)) for row, name in enumerate(("pose", "speed", "acceleration"))
+    )
     for kind in KINDS:
-        bank = f"{kind}_register"
-        names = [name for name, _ in registers(kind)]
-        whole = Part(
-            attrgetter(f"io.{bank}"), OUTPUTS[names[0]].value, 4 if kind.endswith("_bit") else len(names)
-        )
-        bits = Part(_single_bits(bank), Wire.BOOL.value, len(SINGLE_BITS))
-        for number, name in enumerate(names):
-            single = OUTPUTS[name] is Wire.BOOL
-            yield name, (bits, number - len(names) + len(SINGLE_BITS)) if single else (whole, number)
+        bank, bits = f"{kind}_register", kind.endswith("_bit")
+        words = [name for name, wire in registers(kind) if wire is not Wire.BOOL]
+        whole = Part(attrgetter(f"io.{bank}"), OUTPUTS[words[0]].value, 4 if bits else len(words), of_io=True)
+        yield from ((name, (whole, row)) for row, name in enumerate(words))
+        if bits:
+            single = Part(_single_bits(bank), Wire.BOOL.value, len(SINGLE_BITS), of_io=True)
+            yield from ((f"{bank}_{number}", (single, row)) for row, number in enumerate(SINGLE_BITS))
 
 
 PARTS: dict[str, tuple[Part, int]] = dict(_parts())
-"""Part in which each output variable is written, and its number in there."""
+"""Part with which each output variable is read, and its number in there."""
