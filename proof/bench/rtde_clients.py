@@ -69,9 +69,9 @@ class Client:
         return list(self._reader.feed(data))
 
 
-def main(address: str, port: int, count: int) -> None:
+def main(address: str, port: int, count: int, recipes: int) -> None:
     """Read until stdin ends."""
-    clients = [Client(address, port, recipe(number)) for number in range(count)]
+    clients = [Client(address, port, recipe(number % recipes)) for number in range(count)]
     selector = selectors.DefaultSelector()
     for client in clients:
         selector.register(client.socket, selectors.EVENT_READ, client)

@@ -39,15 +39,15 @@ def test_the_tool_moves_as_differences_of_its_poses_say(arm, offset):
     h = 1e-4
     for _ in range(20):
         q, qd, qdd = random.uniform(-2.0, 2.0, (3, 6))
-        tool = body.tool(q.tolist(), qd.tolist(), qdd.tolist(), list(offset))
+        tool = body.tool(q, qd, qdd, list(offset))
         position, rotation, J = placed(model, q, offset)
-        np.testing.assert_allclose(tool.pose[:3], position, atol=1e-12)
-        np.testing.assert_allclose(pin.exp3(np.array(tool.pose[3:])), rotation, atol=1e-12)
-        np.testing.assert_allclose(tool.speed, J @ qd, atol=1e-12)
-        assert kinematics.tool(q, qd) == (tool.pose, tool.speed)
+        np.testing.assert_allclose(tool[:3], position, atol=1e-12)
+        np.testing.assert_allclose(pin.exp3(tool[3:6]), rotation, atol=1e-12)
+        np.testing.assert_allclose(tool[6:12], J @ qd, atol=1e-12)
+        assert kinematics.tool(q, qd) == (tool[:6].tolist(), tool[6:12].tolist())
         later, earlier = (placed(model, q + s * qd * h + 0.5 * qdd * h * h, offset)[2] for s in (1.0, -1.0))
         expected = (later @ (qd + qdd * h) - earlier @ (qd - qdd * h)) / (2.0 * h)
-        np.testing.assert_allclose(tool.acceleration, expected, atol=2e-6 * max(1.0, np.abs(expected).max()))
+        np.testing.assert_allclose(tool[12:], expected, atol=2e-6 * max(1.0, np.abs(expected).max()))
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.1, 1.0, np.pi - 1e-7, np.pi - 1e-12, np.pi])
@@ -84,7 +84,7 @@ def test_the_force_is_that_of_the_formula(arm, offset, plain, monkeypatch):
     for q in (*random.uniform(-2.0, 2.0, (20, 6)), np.array(STRETCHED)):
         torque = random.uniform(-50.0, 50.0, 6)
         wanted = by_numpy(placed(model, q, offset)[2], torque)
-        found = wrench.at_tool(q.tolist(), torque, offset)
+        found = wrench.at_tool(q, torque, offset)
         np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-6 * np.abs(wanted).max())
 
 

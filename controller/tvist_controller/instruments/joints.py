@@ -1,10 +1,8 @@
 """Values with one entry for each joint."""
 
-from functools import cached_property
-
 from tvist_controller.instruments.ratings import BUS_VOLTAGE
-from tvist_controller.instruments.reading import Reading
-from tvist_controller.instruments.variables import Double, Vector6D
+from tvist_controller.instruments.reading import SHAPED, UNSHAPED, Reading
+from tvist_controller.instruments.variables import Double, Vector6D, computed_once
 
 DEVIATION = 0.05
 """Difference between measured and shaped angle that counts as 1 [rad]."""
@@ -28,7 +26,7 @@ class JointValues(Reading):
         """State: acceleration of the reference after shaping; a variable that only TVIST has [rad/s²]."""
         return self.state.target_qdd
 
-    @cached_property
+    @computed_once
     def target_moment(self) -> Vector6D:
         """Computed: torque that the rigid model with the declared payload needs for the target motion [N m].
 
@@ -37,12 +35,12 @@ class JointValues(Reading):
         state, moment = self.state, self.state.target_moment
         if state.unshaped_q is None:
             return moment
-        payload, rigid = self.io.payload, self._rigid
-        unshaped = rigid.moment(self.target_q, self.target_qd, self.target_qdd, payload)
-        shaped = rigid.moment(state.target_q, state.target_qd, state.target_qdd, payload)
+        motion, payload = self._motion, self.io.payload
+        unshaped = self._rigid.moment(*motion[UNSHAPED], payload)
+        shaped = self._rigid.moment(*motion[SHAPED], payload)
         return [m + (u - s) for m, u, s in zip(moment, unshaped, shaped, strict=True)]
 
-    @cached_property
+    @computed_once
     def target_current(self) -> Vector6D:
         """Computed: target torque over torque constant; zero while the brakes hold the arm [A]."""
         if not self.driven:
@@ -70,7 +68,7 @@ class JointValues(Reading):
         """Computed: measured torque over torque constant; zero while the brakes hold the arm [A]."""
         return self._current
 
-    @cached_property
+    @computed_once
     def actual_current_window(self) -> Vector6D:
         """Constant: allowed difference of the two currents, from a tenth of the joint's largest torque [A]."""
         return [rating.window for rating in self._ratings]
@@ -95,7 +93,7 @@ class JointValues(Reading):
         """Computed: one body per joint in air of 25 °C, heated by its electronics and R i² in about 20 minutes [°C]."""
         return self._temperatures
 
-    @cached_property
+    @computed_once
     def joint_position_deviation_ratio(self) -> Double:
         """Computed: largest difference of measured and shaped angle, divided by 0.05 rad [-]."""
         state = self.state

@@ -1,16 +1,29 @@
 """Base of all values of a tick."""
 
-from typing import Any
+from struct import pack
+
+import numpy as np
 
 from tvist_controller.instruments.meters import Meters
 from tvist_controller.instruments.ratings import JointRating
 from tvist_controller.instruments.rigid_body import RigidBody
-from tvist_controller.instruments.variables import Vector6D
+from tvist_controller.instruments.variables import Vector6D, computed_once
 from tvist_controller.instruments.wrench import RUNNING, ToolWrench
+from tvist_plant.model import Floats
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State
 
+JOINT_LISTS = (
+    "target_q", "target_qd", "target_qdd", "shaped_q", "shaped_qd", "shaped_qdd", "shaped_moment", "actual_q",
+    "actual_qd", "actual_moment",
+)  # fmt: skip
+"""Lists of the state that values are computed from."""
+ROWS = len(JOINT_LISTS)
+UNSHAPED, SHAPED = slice(0, 3), slice(3, 6)
+"""Rows of the references before and after shaping: positions, velocities and accelerations."""
+SHAPED_QD, SHAPED_QDD, SHAPED_MOMENT, ACTUAL_Q, ACTUAL_QD, ACTUAL_MOMENT = range(4, ROWS)
+"""Rows of single lists."""
 POWERED = frozenset(range(RobotMode.POWER_ON, RobotMode.RUNNING + 1))
 """Robot modes in which the arm has power."""
 
@@ -29,7 +42,6 @@ class Reading:
         ratings: Ratings of the joints.
         current: Currents of the motors [A].
         meters: Temperatures and energies at this tick.
-        kept: Values that interfaces keep from tick to tick.
     """
 
     def __init__(
@@ -41,16 +53,13 @@ class Reading:
         ratings: list[JointRating],
         current: list[float],
         meters: Meters,
-        kept: dict[str, Any],
     ) -> None:
         self.state = state
         """State of the tick, as published."""
         self.io = io
         """Terminals and registers, as published."""
-        self.shared: dict[str, Any] = {}
-        """Data that interfaces derive from this tick and share among all clients."""
-        self.kept = kept
-        """Data that interfaces keep from tick to tick."""
+        self.shared: dict[str, bytes] = {}
+        """Packages that interfaces make of this tick and share among all clients."""
         self._current = current
         self._temperatures = meters.temperatures
         self._power, self._consumed, self._dissipated = meters.power, meters.consumed, meters.dissipated
@@ -81,3 +90,17 @@ class Reading:
     def driven(self) -> bool:
         """Whether the drives hold the arm, with the brakes released."""
         return self.state.robot_mode == RUNNING
+
+    @computed_once
+    def joint_lists(self) -> bytearray:
+        """`JOINT_LISTS` one behind the other, as doubles in the machine's order."""
+        state = self.state
+        unshaped = *self.target_q, *self.target_qd, *self.target_qdd
+        shaped = *state.target_q, *state.target_qd, *state.target_qdd, *state.target_moment
+        measured = *state.actual_q, *state.actual_qd, *state.actual_moment
+        return bytearray(pack(f"{ROWS * len(state.target_q)}d", *unshaped, *shaped, *measured))
+
+    @computed_once
+    def _motion(self) -> Floats:
+        """The same as an array, shape (10, n)."""
+        return np.frombuffer(self.joint_lists).reshape(ROWS, len(self._ratings))

@@ -1,7 +1,6 @@
 """Mechanics of the rigid arm with the declared payload, as the instruments need them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
@@ -17,18 +16,6 @@ from tvist_protocol.values import Payload
 
 ELBOW = 2
 """Index of the joint whose axis is the elbow."""
-
-
-@dataclass(frozen=True)
-class Tool:
-    """Motion of the tool centre point in the base frame."""
-
-    pose: list[float]
-    """x y z [m] and rotation vector [rad]."""
-    speed: list[float]
-    """Linear [m/s] and angular [rad/s] velocity."""
-    acceleration: list[float]
-    """Linear [m/s²] and angular [rad/s²] acceleration."""
 
 
 def add(a: list[float], b: list[float]) -> list[float]:
@@ -97,35 +84,37 @@ class RigidBody:
         self._offset: list[float] = []
         self._tool = np.zeros(12)
         self._elbow = ELBOW + 1 if description.joints > ELBOW else 0
-        still = [0.0] * description.joints
+        still = np.zeros(description.joints)
         self.tool(still, still, still, [0.0] * 6)  # loads compiled code, which takes many ticks
 
-    def tool(self, q: list[float], qd: list[float], qdd: list[float], offset: list[float]) -> Tool:
-        """Compute the motion of the tool centre point.
+    def tool(self, q: Floats, qd: Floats, qdd: Floats, offset: list[float]) -> Floats:
+        """Return the motion of the tool centre point in the base frame, shape (18,).
+
+        Its pose, x y z [m] and rotation vector [rad]; its velocity, linear [m/s] and angular [rad/s]; its acceleration,
+        linear [m/s²] and angular [rad/s²].
 
         Args:
-            q: Joint positions [rad].
-            qd: Joint velocities [rad/s].
-            qdd: Joint accelerations [rad/s²].
+            q: Joint positions, shape (n,) [rad].
+            qd: Joint velocities, shape (n,) [rad/s].
+            qdd: Joint accelerations, shape (n,) [rad/s²].
             offset: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
         """
         if offset != self._offset:
             turned = pin.exp3(np.array(offset[3:])).ravel()
             self._offset, self._tool = list(offset), np.concatenate([turned, offset[:3]])
         out = np.empty(18)
-        tool_rates(self._chain, self._tool, np.array(q), np.array(qd), np.array(qdd), out)
-        found = out.tolist()
-        return Tool(pose=found[:6], speed=found[6:12], acceleration=found[12:])
+        tool_rates(self._chain, self._tool, q, qd, qdd, out)
+        return out
 
-    def flange_rotation(self, q: list[float]) -> Floats:
+    def flange_rotation(self, q: Floats) -> Floats:
         """Rotation from the flange to the base frame, shape (3, 3)."""
-        pin.framesForwardKinematics(self._model, self._data, np.array(q))
+        pin.framesForwardKinematics(self._model, self._data, q)
         return np.array(self._data.oMf[self._flange].rotation)
 
-    def elbow(self, q: list[float], qd: list[float]) -> tuple[list[float], list[float]]:
+    def elbow(self, q: Floats, qd: Floats) -> tuple[list[float], list[float]]:
         """Position [m] and velocity [m/s] of the elbow's axis, or of the flange if the arm has no elbow."""
         model, data = self._model, self._data
-        pin.forwardKinematics(model, data, np.array(q), np.array(qd))
+        pin.forwardKinematics(model, data, q, qd)
         if self._elbow:
             velocity = pin.getVelocity(model, data, self._elbow, pin.LOCAL_WORLD_ALIGNED)
             return data.oMi[self._elbow].translation.tolist(), velocity.linear.tolist()
@@ -133,24 +122,22 @@ class RigidBody:
         velocity = pin.getFrameVelocity(model, data, self._flange, pin.LOCAL_WORLD_ALIGNED)
         return placement.translation.tolist(), velocity.linear.tolist()
 
-    def momentum(self, q: list[float], qd: list[float], payload: Payload) -> float:
+    def momentum(self, q: Floats, qd: Floats, payload: Payload) -> float:
         """Magnitude of the momentum of the links and the payload, |Σ m v| [kg m/s]."""
         self._load(payload)
-        momentum = pin.computeCentroidalMomentum(self._model, self._data, np.array(q), np.array(qd))
+        momentum = pin.computeCentroidalMomentum(self._model, self._data, q, qd)
         return hypot(*momentum.linear.tolist())
 
-    def moment(self, q: list[float], qd: list[float], qdd: list[float], payload: Payload) -> list[float]:
+    def moment(self, q: Floats, qd: Floats, qdd: Floats, payload: Payload) -> list[float]:
         """Torques that a motion needs, one for each joint [N m]."""
         self._load(payload)
-        torque: list[float] = pin.rnea(
-            self._model, self._data, np.array(q), np.array(qd), np.array(qdd)
-        ).tolist()
+        torque: list[float] = pin.rnea(self._model, self._data, q, qd, qdd).tolist()
         return torque
 
-    def base_wrench(self, q: list[float], qd: list[float], qdd: list[float], payload: Payload) -> list[float]:
+    def base_wrench(self, q: Floats, qd: Floats, qdd: Floats, payload: Payload) -> list[float]:
         """Force [N] and torque [N m] of the arm on its base, base frame; without the base's own weight."""
         self._load(payload)
-        pin.rnea(self._model, self._data, np.array(q), np.array(qd), np.array(qdd))
+        pin.rnea(self._model, self._data, q, qd, qdd)
         wrench = -self._data.oMi[1].act(self._data.f[1]).vector
         return [float(value) for value in wrench]
 

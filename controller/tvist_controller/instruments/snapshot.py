@@ -1,7 +1,5 @@
 """One tick of a robot as UR's interfaces report it, under RTDE's names."""
 
-from typing import Any
-
 from tvist_controller.instruments.joints import JointValues
 from tvist_controller.instruments.meters import Meters
 from tvist_controller.instruments.ratings import joint_ratings
@@ -38,7 +36,6 @@ class Instruments:
         self._constants = [rating.torque_constant for rating in self._ratings]
         self._idle = [0.0] * description.joints
         self._meters = Meters(self._ratings)
-        self._kept: dict[str, Any] = {}
 
     def snapshot(self, state: State, io: Io) -> Snapshot:
         """Return the values of a tick.
@@ -53,6 +50,4 @@ class Instruments:
             current = [m / constant for m, constant in zip(moment, self._constants, strict=True)]
             mechanical = sum([m * v for m, v in zip(moment, state.actual_qd, strict=True)])
         self._meters.update(state.tick, current, mechanical, powered=mode in POWERED)
-        return Snapshot(
-            state, io, self._rigid, self._wrench, self._ratings, current, self._meters, self._kept
-        )
+        return Snapshot(state, io, self._rigid, self._wrench, self._ratings, current, self._meters)

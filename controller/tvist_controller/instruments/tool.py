@@ -1,13 +1,22 @@
 """Values of tool and payload: poses, forces, momentum."""
 
-from functools import cached_property
 from math import sqrt
 
 import numpy as np
 
-from tvist_controller.instruments.reading import Reading
-from tvist_controller.instruments.rigid_body import Tool, add, carried, cross
-from tvist_controller.instruments.variables import Double, Vector3D, Vector6D
+from tvist_controller.instruments.reading import (
+    ACTUAL_MOMENT,
+    ACTUAL_Q,
+    ACTUAL_QD,
+    SHAPED,
+    SHAPED_MOMENT,
+    SHAPED_QD,
+    SHAPED_QDD,
+    UNSHAPED,
+    Reading,
+)
+from tvist_controller.instruments.rigid_body import add, carried, cross
+from tvist_controller.instruments.variables import Double, Vector3D, Vector6D, computed_once
 from tvist_controller.instruments.wrench import since_zeroed
 from tvist_plant.model import Floats
 from tvist_plant.plant import GRAVITY
@@ -39,19 +48,27 @@ class ToolValues(Reading):
     @property
     def target_TCP_pose(self) -> Vector6D:
         """Computed: kinematics of the target angles with the TCP offset [m, rad]."""
-        return self._target.pose
+        pose: list[float] = self._target[:6].tolist()
+        return pose
 
     @property
     def target_TCP_speed(self) -> Vector6D:
         """Computed: kinematics of target angles and velocities with the TCP offset [m/s, rad/s]."""
-        return self._target.speed
+        speed: list[float] = self._target[6:12].tolist()
+        return speed
 
     @property
     def target_TCP_acceleration(self) -> Vector6D:
         """Computed: kinematics of target angles, velocities and accelerations with the TCP offset [m/s², rad/s²]."""
-        return self._target.acceleration
+        acceleration: list[float] = self._target[12:].tolist()
+        return acceleration
 
-    @cached_property
+    @property
+    def target_tool(self) -> bytes:
+        """Those three one behind the other, as doubles in the machine's order."""
+        return self._target.tobytes()
+
+    @computed_once
     def actual_TCP_acceleration(self) -> Vector6D:
         """Computed: the accelerometer's value without gravity, in the base frame and at the TCP [m/s², rad/s²].
 
@@ -59,13 +76,13 @@ class ToolValues(Reading):
         """
         linear: list[float] = (self._rotation @ np.array(self.state.actual_tool_accelerometer)).tolist()
         linear[2] -= GRAVITY
-        alpha, offset = self._shaped.acceleration[3:], self.io.tcp_offset
+        alpha, offset = self._shaped[15:].tolist(), self.io.tcp_offset
         if any(offset[:3]):
             arm: list[float] = (self._rotation @ np.array(offset[:3])).tolist()
             linear = add(linear, carried(self.state.actual_TCP_speed[3:], alpha, arm))
         return linear + alpha
 
-    @cached_property
+    @computed_once
     def actual_TCP_force(self) -> Vector6D:
         """Computed: force at the TCP that explains the measured torques, through the Jacobian [N, N m].
 
@@ -76,7 +93,7 @@ class ToolValues(Reading):
         force: list[float] = self._force.tolist()
         return since_zeroed(force, self.io.tcp_force_zero)
 
-    @cached_property
+    @computed_once
     def tcp_force_scalar(self) -> Double:
         """Computed: length of the TCP force's linear part [N]."""
         x, y, z, *_ = self.actual_TCP_force
@@ -87,7 +104,7 @@ class ToolValues(Reading):
         """Computed: the TCP force again, since it is computed from currents here [N, N m]."""
         return self.actual_TCP_force
 
-    @cached_property
+    @computed_once
     def ft_raw_wrench(self) -> Vector6D:
         """Computed: wrench that a sensor between flange and payload would measure, in the flange frame [N, N m].
 
@@ -101,16 +118,16 @@ class ToolValues(Reading):
         torque = add(turns, add(cross(payload.com, carries), cross(self.io.tcp_offset, pushes)))
         return add(carries, pushes) + torque
 
-    @cached_property
+    @computed_once
     def collision_detection_ratio(self) -> Double:
         """Computed: largest share of a joint's torque limit by which measured torque differs from expected [-]."""
         felt: list[float] = self._felt.tolist()
         return max(abs(torque) / rating.torque for torque, rating in zip(felt, self._ratings, strict=True))
 
-    @cached_property
+    @computed_once
     def actual_momentum(self) -> Double:
         """Computed: length of the linear momentum of links and declared payload, as measured [kg m/s]."""
-        return self._rigid.momentum(self.state.actual_q, self.state.actual_qd, self.io.payload)
+        return self._rigid.momentum(self._motion[ACTUAL_Q], self._motion[ACTUAL_QD], self.io.payload)
 
     @property
     def elbow_position(self) -> Vector3D:
@@ -151,40 +168,44 @@ class ToolValues(Reading):
         """Constant: zero; the base stands [m/s², rad/s²]."""
         return [0.0] * 6
 
-    @cached_property
+    @computed_once
     def target_base_wrench(self) -> Vector6D:
         """Computed: force and torque at the base of the arm with the declared payload, for the target motion [N, N m].
 
         The weight of the base itself is not included.
         """
-        return self._rigid.base_wrench(self.target_q, self.target_qd, self.target_qdd, self.io.payload)
+        return self._rigid.base_wrench(*self._motion[UNSHAPED], self.io.payload)
 
-    @cached_property
-    def _target(self) -> Tool:
-        return self._rigid.tool(self.target_q, self.target_qd, self.target_qdd, self.io.tcp_offset)
+    @computed_once
+    def _target(self) -> Floats:
+        return self._rigid.tool(*self._motion[UNSHAPED], self.io.tcp_offset)
 
-    @cached_property
-    def _shaped(self) -> Tool:
-        state = self.state
-        if state.unshaped_q is None:
+    @computed_once
+    def _shaped(self) -> Floats:
+        if self.state.unshaped_q is None:
             return self._target
-        return self._rigid.tool(state.target_q, state.target_qd, state.target_qdd, self.io.tcp_offset)
+        return self._rigid.tool(*self._motion[SHAPED], self.io.tcp_offset)
 
-    @cached_property
+    @computed_once
     def _elbow(self) -> tuple[list[float], list[float]]:
-        return self._rigid.elbow(self.state.actual_q, self.state.actual_qd)
+        return self._rigid.elbow(self._motion[ACTUAL_Q], self._motion[ACTUAL_QD])
 
-    @cached_property
+    @computed_once
     def _rotation(self) -> Floats:
-        return self._rigid.flange_rotation(self.state.actual_q)
+        return self._rigid.flange_rotation(self._motion[ACTUAL_Q])
 
-    @cached_property
+    @computed_once
     def _felt(self) -> Floats:
         """External torque on the joints: expected minus measured, shape (n,) [N m]."""
-        return self._wrench.felt(self.state)
+        if not self.driven:
+            return np.zeros(len(self.state.actual_q))
+        motion = self._motion
+        return self._wrench.between(
+            motion[SHAPED_QD], motion[SHAPED_QDD], motion[SHAPED_MOMENT], motion[ACTUAL_MOMENT]
+        )
 
-    @cached_property
+    @computed_once
     def _force(self) -> Floats:
         if not self.driven:
             return np.zeros(6)
-        return self._wrench.at_tool(self.state.actual_q, self._felt, self.io.tcp_offset)
+        return self._wrench.at_tool(self._motion[ACTUAL_Q], self._felt, self.io.tcp_offset)

@@ -126,34 +126,45 @@ class ToolWrench:
         self._friction = np.array(drives.coulomb_friction)
         self._width, self._linear = drives.friction_width, drives.linear_friction
         still = np.zeros(description.joints)
-        self.at_tool(still.tolist(), still, (0.0,) * 6)  # loads compiled code, which takes many ticks
+        self.at_tool(still, still, (0.0,) * 6)  # loads compiled code, which takes many ticks
 
     def felt(self, state: State) -> Floats:
+        """Return the external torque on the joints in a tick, shape (n,) [N m]; zero with the brakes on."""
+        if state.robot_mode != RUNNING:
+            return np.zeros(len(state.actual_q))
+        lists = state.target_qd, state.target_qdd, state.target_moment, state.actual_moment
+        return self.between(*map(np.array, lists))
+
+    def between(self, velocity: Floats, acceleration: Floats, moment: Floats, measured: Floats) -> Floats:
         """Return the external torque on the joints, shape (n,) [N m].
 
         It is the torque of drives that follow their target (rigid arm with the declared payload, rotors and
         friction), minus the measured torque.
-        """
-        if state.robot_mode != RUNNING:
-            return np.zeros(len(state.actual_q))
-        velocity = np.array(state.target_qd) / self._width
-        friction = self._friction * (velocity if self._linear else np.tanh(velocity))
-        expected = np.array(state.target_moment) + self._rotor * np.array(state.target_qdd) + friction
-        return np.array(expected - np.array(state.actual_moment))
 
-    def at_tool(self, q: Sequence[float], torque: Floats, offset: Sequence[float]) -> Floats:
+        Args:
+            velocity: Of the target, shape (n,) [rad/s].
+            acceleration: Of the target, shape (n,) [rad/s²].
+            moment: Torque that the rigid arm needs for the target, shape (n,) [N m].
+            measured: Measured torque, shape (n,) [N m].
+        """
+        share = velocity / self._width
+        friction = self._friction * (share if self._linear else np.tanh(share))
+        torque: Floats = moment + self._rotor * acceleration + friction - measured
+        return torque
+
+    def at_tool(self, q: Floats, torque: Floats, offset: Sequence[float]) -> Floats:
         """Return the force at the tool centre point that causes these joint torques, shape (6,) [N, N m], base frame.
 
         F with Jᵀ F = τ by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) if the manipulability
         w is below w₀ (Nakamura and Hanafusa, 1986). Components that affect no joint are zero.
 
         Args:
-            q: Joint positions [rad].
+            q: Joint positions, shape (n,) [rad].
             torque: External torque on the joints, shape (n,) [N m].
             offset: Tool centre point in the flange frame [m, rad].
         """
         force = np.empty(6)
-        force_at(self._chain, np.array(offset[:3]), np.array(q), torque, force)
+        force_at(self._chain, np.array(offset[:3]), q, torque, force)
         return force
 
     def of(self, state: State, offset: Sequence[float]) -> list[float]:
@@ -165,5 +176,5 @@ class ToolWrench:
         """
         if state.robot_mode != RUNNING:
             return [0.0] * 6
-        wrench: list[float] = self.at_tool(state.actual_q, self.felt(state), offset).tolist()
+        wrench: list[float] = self.at_tool(np.array(state.actual_q), self.felt(state), offset).tolist()
         return wrench

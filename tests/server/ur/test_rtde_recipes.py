@@ -9,10 +9,12 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.controller.robots import UR5E, cut
 
+from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.inputs import INPUTS
 from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
-from tvist_server.gateways.ur.rtde.recipes import Encoded, InputRecipe, OutputRecipe, split
+from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
 from tvist_server.gateways.ur.rtde.table import page
 from tvist_server.gateways.ur.rtde.wire import Wire
 
@@ -35,6 +37,13 @@ BANKS = {
     for side in ("input", "output")
     for kind, word in (("bit", "UINT32"), ("int", "INT32"), ("double", "DOUBLE"))
 }
+
+
+def alone(names, snapshot, head=b"\x01"):
+    """The package for a client that is the only one."""
+    board, recipe = Board(), OutputRecipe(tuple(names))
+    board.begin("client", recipe)
+    return board.package(recipe, snapshot, head)
 
 
 @pytest.fixture(scope="module")
@@ -69,10 +78,10 @@ def test_a_package_holds_the_values_of_the_snapshot(snapshots, names):
     recipe = OutputRecipe(tuple(names))
     assert recipe.valid
     assert recipe.words == [client.OUTPUT_TYPES[name] for name in names]
-    found = client.decoded(recipe.package(snapshot, b"\x01"), names)
+    found = client.decoded(alone(names, snapshot), names)
     for name, value in found.items():
         assert value == getattr(snapshot, name), name
-    bare = client.decoded(recipe.package(snapshot, b""), names, version=1)
+    bare = client.decoded(alone(names, snapshot, b""), names, version=1)
     assert bare == found
 
 
@@ -80,33 +89,56 @@ def test_the_longest_list_of_names_there_is_fits(snapshot):
     """Every variable at once: the list is longer than the 2048 bytes that are documented."""
     names = sorted(client.OUTPUT_TYPES)
     assert len(",".join(names)) > 9000
-    found = client.decoded(OutputRecipe(tuple(names)).package(snapshot, b"\x01"), names)
+    found = client.decoded(alone(names, snapshot), names)
     assert found["timestamp"] == snapshot.timestamp
     assert all(math.isfinite(value) for value in found.values() if not isinstance(value, list))
 
 
 def test_equal_recipes_share_one_package(snapshots):
-    names = ("timestamp", "actual_q")
-    first, second = (OutputRecipe(names).package(snapshots[3], b"\x01") for _ in range(2))
+    board, recipes = Board(), [OutputRecipe(("timestamp", "actual_q")) for _ in range(2)]
+    for number, recipe in enumerate(recipes):
+        board.begin(number, recipe)
+    first, second = (board.package(recipe, snapshots[3], b"\x01") for recipe in recipes)
     assert first is second
-    assert OutputRecipe(names).package(snapshots[4], b"\x01") != first
+    assert board.package(recipes[0], snapshots[4], b"\x01") != first
 
 
-def test_recipes_that_differ_share_what_they_have_in_common(snapshots):
-    OutputRecipe(("timestamp", "actual_q")).package(snapshots[6], b"\x01")
-    before = Encoded.of(snapshots[6])["actual_q"]
-    OutputRecipe(("actual_q", "actual_qd")).package(snapshots[6], b"\x01")
-    assert Encoded.of(snapshots[6])["actual_q"] is before
+@given(st.lists(st.tuples(st.integers(0, 3), st.none() | names_of_outputs), min_size=1, max_size=12))
+def test_who_else_reads_what_changes_nothing(snapshots, changes):
+    board, recipes = Board(), {}
+    for snapshot, (number, names) in zip(snapshots, changes, strict=False):
+        if names is None:
+            board.end(number)
+            recipes.pop(number, None)
+        else:
+            recipes[number] = OutputRecipe(tuple(names))
+            board.begin(number, recipes[number])
+        for recipe in recipes.values():
+            assert board.package(recipe, snapshot, b"\x01") == alone(recipe.names, snapshot)
+
+
+def test_what_nobody_reads_is_not_computed(ur5e, monkeypatch):
+    robot = ur5e()
+    computed = []
+    monkeypatch.setattr(type(robot.instruments._rigid), "momentum", lambda *_: computed.append(1) or 0.0)
+    board, few, more = Board(), OutputRecipe(("actual_q",)), OutputRecipe(("actual_momentum",))
+    board.begin("one", few)
+    board.package(few, robot.tick(), b"")
+    assert not computed
+    board.begin("other", more)
+    for recipe in (few, more, few):
+        board.package(recipe, robot.tick(), b"")
+    assert len(computed) == 3
+    board.end("other")
+    board.package(few, robot.tick(), b"")
+    assert len(computed) == 3
 
 
 @given(st.lists(st.dictionaries(st.sampled_from(sorted(BANKS)), st.integers(0, 47)), max_size=6), st.data())
 def test_registers_are_those_of_the_tick_however_they_change(ur5e_at_rest, changes, data):
     robot, registers = ur5e_at_rest, [name for name in client.OUTPUT_TYPES if "_register" in name]
     names = data.draw(st.lists(st.sampled_from(registers), min_size=1, max_size=20))
-    recipe, present = (
-        OutputRecipe(tuple(names)),
-        {name: getattr(robot.io, name) for name in robot.io.__struct_fields__},
-    )
+    present = {name: getattr(robot.io, name) for name in robot.io.__struct_fields__}
     for change in changes:
         for bank, place in change.items():
             values = list(present[bank])
@@ -114,17 +146,19 @@ def test_registers_are_those_of_the_tick_however_they_change(ur5e_at_rest, chang
             present[bank] = values
         robot.io = type(robot.io)(**present)
         snapshot = robot.tick()
-        found = client.decoded(recipe.package(snapshot, b"\x01"), names)
+        found = client.decoded(alone(names, snapshot), names)
         assert found == {name: getattr(snapshot, name) for name in names}
 
 
 @pytest.mark.parametrize("joints", [1, 3, 6])
-def test_vectors_have_six_entries_however_few_the_arm_has(joints):
-    values = [0.5 + k for k in range(joints)]
-    six = struct.unpack(">6d", Wire.VECTOR6D.encode(values))
-    assert list(six) == (values + [0.0] * 6)[:6]
-    whole = struct.unpack(">6i", Wire.VECTOR6INT32.encode([253] * joints))
-    assert list(whole) == ([253] * joints + [0] * 6)[:6]
+def test_vectors_have_six_entries_however_few_the_arm_has(ur5e, joints):
+    arm = UR5E if joints == 6 else cut(joints)
+    snapshot = ur5e(arm, q=arm.poses["Q3"]).tick()
+    names = ["joint_mode", "actual_q", "elbow_position", "timestamp"]
+    found = client.decoded(alone(names, snapshot), names)
+    assert found["actual_q"] == (snapshot.actual_q + [0.0] * 6)[:6]
+    assert found["joint_mode"] == ([253] * joints + [0] * 6)[:6]
+    assert (found["elbow_position"], found["timestamp"]) == (snapshot.elbow_position, snapshot.timestamp)
 
 
 @pytest.mark.parametrize("names", [(), ("",), ("nonsense",), ("actual_q", "actual_qdd"), ("actual_Q",)])

@@ -12,6 +12,7 @@ from tvist_protocol.commands import SetSpeed
 from tvist_protocol.io import Registers, SetIo, SetRegisters
 from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.input_owners import InputOwners
+from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.codec import PackageReader
 from tvist_server.gateways.ur.rtde.session import RtdeSession, ticks_between
 
@@ -66,7 +67,7 @@ class Client:
 
 @pytest.fixture
 def robot(robot):
-    robot.inputs = InputOwners()
+    robot.inputs, robot.outputs = InputOwners(), Board()
     return robot
 
 

@@ -181,27 +181,30 @@ class Connection(asyncio.BufferedProtocol):
         if transport is not None and (self._lossless or transport.get_write_buffer_size() < HEARS):
             self.send(message)
 
-    def sample(self, snapshot: Snapshot) -> None:
-        """Send the sample of a tick; in real time it is dropped if earlier bytes are still waiting, never queued."""
+    def sample(self, snapshot: Snapshot) -> bytes:
+        """Return the sample of a tick, which `put` sends; empty if there is none."""
         session, transport = self.session, self._transport
         if session is None or transport is None or transport.is_closing():
-            return
+            return b""
         try:
             data = session.sample(snapshot)
         except Exception:
             log.exception("a UR interface failed and disconnected its client")
             transport.abort()
-            return
+            return b""
         if session.over:
             transport.close()
-        if not data:
-            return
+        return data
+
+    def put(self, sample: bytes) -> None:
+        """Send a sample; in real time it is dropped if earlier bytes are still waiting, never queued."""
+        transport = self._transport
         if self._lossless:
-            self.send(data)
-        elif transport.get_write_buffer_size():
+            self.send(sample)
+        elif transport is None or transport.get_write_buffer_size():
             self.dropped += 1
         else:
-            transport.write(data)
+            transport.write(sample)
 
     def event(self, event: Event) -> None:
         """Pass an event to the session."""

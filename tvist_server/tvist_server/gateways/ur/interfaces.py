@@ -52,6 +52,8 @@ LEAD = 20
 """Largest lead in lockstep; the further a step runs ahead of published states, the later clients get answers."""
 PAUSE = 0.02
 """Time between two checks for room, in lockstep [s]."""
+UNREAD = 10
+"""States that are handed over at once while there is no client: they count for temperatures and energies alone."""
 
 
 class UrInterfaces(Gateway):
@@ -103,8 +105,10 @@ class UrInterfaces(Gateway):
         self._adopted: HostLease | None = None
         """Lease that this process holds in the name of a host."""
         self._lockstep = lockstep
-        # Each of these counters is written by one thread only.
-        self._handed, self._taken = 0, 0
+        self._news = deque[Message]()
+        """What was published and waits for the interfaces' thread."""
+        self._woken = False
+        """Whether that thread is about to look at it."""
         self._room = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._servers: list[asyncio.Server] = []
@@ -173,24 +177,30 @@ class UrInterfaces(Gateway):
                 self._early.append(message)
         elif isinstance(message, State):
             if self._has_room():
-                self._handed += 1
-                self._soon(lambda: self._on_state(message))
+                self._news.append(message)
+                if self._connections or len(self._news) >= UNREAD:
+                    self._wake()
             else:
                 self.dropped += 1
-        elif isinstance(message, Io):
-            self._soon(lambda: self._on_io(message))
-        elif isinstance(message, Event):
-            self._soon(lambda: self._on_event(message))
+        elif isinstance(message, Io | Event):
+            self._news.append(message)
+            self._wake()
 
     def _has_room(self) -> bool:
         """Return whether one more state may wait; in lockstep, wait until there is room."""
         most = LEAD if self._lockstep else MAX_PENDING
-        while self._handed - self._taken >= most:
+        while len(self._news) >= most:
             if not self._lockstep or self._loop is None:
                 return False
             self._room.clear()
             self._room.wait(PAUSE)
         return True
+
+    def _wake(self) -> None:
+        """Have the interfaces' thread look, unless it is about to."""
+        if not self._woken:
+            self._woken = True
+            self._soon(self._look)
 
     async def shut(self) -> None:
         """Let no more clients in, and disconnect the present ones."""
@@ -215,20 +225,28 @@ class UrInterfaces(Gateway):
 
     # ------------------------------------------------------------------ in the interfaces' thread
 
-    def _on_state(self, state: State) -> None:
-        self._taken += 1
-        self._room.set()
-        self._see(state)
+    def _look(self) -> None:
+        """Take what waits by now; what comes meanwhile wakes this thread again, so that clients get their turn."""
+        self._woken = False
+        for _ in range(len(self._news)):
+            message = self._news.popleft()
+            if self._lockstep:
+                self._room.set()
+            if isinstance(message, State):
+                self._see(message)
+            elif isinstance(message, Io):
+                self._on_io(message)
+            elif isinstance(message, Event):
+                self._on_event(message)
 
     def _see(self, state: State) -> None:
-        if self._io is not None:
-            if self.robot.latest is not None:
-                # Break the reference cycle between a snapshot and what was computed from it, which only the collector
-                # would free.
-                self.robot.latest.shared.clear()
-            snapshot = self.robot.latest = self._instruments.snapshot(state, self._io)
-            for connection in tuple(self._connections):
-                connection.sample(snapshot)
+        if self._io is None:
+            return
+        snapshot = self.robot.latest = self._instruments.snapshot(state, self._io)
+        # All is made before any of it is sent: the readers' process then stays awake for all, and wakes up once.
+        for connection, data in [(one, one.sample(snapshot)) for one in tuple(self._connections)]:
+            if data:
+                connection.put(data)
 
     def _on_io(self, io: Io) -> None:
         self._io = io
@@ -255,6 +273,7 @@ class UrInterfaces(Gateway):
         self._adopted.adopt(token, self)
 
     def _session(self, interface: InterfaceName, control: ConnectionControl, send: Send) -> PortSession:
+        self._look()  # the client has to find the robot as it is now
         if interface == "gripper" and self._gripper is not None:
             return GripperSession(
                 self._gripper, send, lambda answer: self._soon(lambda: control.hear(answer))

@@ -1,21 +1,61 @@
 """Output variables, which clients read: the annotated properties of a snapshot, and the registers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from operator import attrgetter
-from typing import Any
+from typing import Any, NamedTuple
 
+from tvist_controller.instruments.reading import JOINT_LISTS
 from tvist_controller.instruments.snapshot import VARIABLES, Snapshot
-from tvist_server.gateways.ur.rtde.registers import KINDS, registers
-from tvist_server.gateways.ur.rtde.wire import Encode, Wire
+from tvist_server.gateways.ur.rtde.registers import KINDS, SINGLE_BITS, registers
+from tvist_server.gateways.ur.rtde.wire import Wire
 
-Read = Callable[[Snapshot], Any]
-"""Function that returns the value of a variable."""
-
-READERS: dict[str, tuple[Read, Encode]] = {
-    name: (attrgetter(name), Wire[word].encode) for name, word in VARIABLES.items()
-}
-"""Functions that read and encode each variable but the registers, of which `EncodedRegisters` encodes whole banks."""
 OUTPUTS: dict[str, Wire] = {name: Wire[word] for name, word in VARIABLES.items()} | {
     name: wire for kind in KINDS for name, wire in registers(kind)
 }
 """Type of every output variable by name."""
+
+
+class Part(NamedTuple):
+    """What is read at once: one variable, or several with the same number of entries."""
+
+    read: Callable[[Snapshot], Any]
+    """Returns a number, a list of numbers, or doubles as bytes in the machine's order."""
+    letter: str
+    """Format of an entry in `struct`."""
+    variables: int = 1
+    """Number of variables."""
+    of_io: bool = False
+    """Whether it depends on nothing but the terminals and registers, which rarely change."""
+
+
+def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
+    """Return a function that returns the bits of a bank that are variables of their own."""
+
+    def read(snapshot: Snapshot) -> list[bool]:
+        words: list[int] = getattr(snapshot.io, bank)
+        return [bool(words[number // 32] >> number % 32 & 1) for number in SINGLE_BITS]
+
+    return read
+
+
+def _parts() -> Iterator[tuple[str, tuple[Part, int]]]:
+    for name, word in VARIABLES.items():
+        yield name, (Part(attrgetter(name), Wire[word].value[-1]), 0)
+    joints = Part(attrgetter("joint_lists"), "d", len(JOINT_LISTS))
+    yield from ((name, (joints, row)) for row, name in enumerate(JOINT_LISTS))
+    tool = Part(attrgetter("target_tool"), "d", 3)
+    yield from (
+        (f"target_TCP_{name}", (tool, row)) for row, name in enumerate(("pose", "speed", "acceleration"))
+    )
+    for kind in KINDS:
+        bank, bits = f"{kind}_register", kind.endswith("_bit")
+        words = [name for name, wire in registers(kind) if wire is not Wire.BOOL]
+        whole = Part(attrgetter(f"io.{bank}"), OUTPUTS[words[0]].value, 4 if bits else len(words), of_io=True)
+        yield from ((name, (whole, row)) for row, name in enumerate(words))
+        if bits:
+            single = Part(_single_bits(bank), Wire.BOOL.value, len(SINGLE_BITS), of_io=True)
+            yield from ((f"{bank}_{number}", (single, row)) for row, number in enumerate(SINGLE_BITS))
+
+
+PARTS: dict[str, tuple[Part, int]] = dict(_parts())
+"""Part with which each output variable is read, and its number in there."""

@@ -103,11 +103,12 @@ class RtdeSession(PortSession):
         if tick < self._next:
             return b""
         self._next += every * ((tick - self._next) // every + 1)
-        return self._outputs.package(snapshot, self._head)
+        return self._robot.outputs.package(self._outputs, snapshot, self._head)
 
     def closed(self) -> None:
-        """Release the input variables of the connection, so that other clients can set them."""
+        """Release the input variables of the connection, so that other clients can set them, and read no more."""
         self._robot.inputs.release(self)
+        self._robot.outputs.end(self)
 
     # ------------------------------------------------------------------ answers
 
@@ -138,6 +139,7 @@ class RtdeSession(PortSession):
         self._outputs_wrong = not recipe.valid
         self._outputs = recipe if recipe.valid else None
         self._every, self._next = ticks_between(frequency), None
+        self._read()
         number = OUTPUT_ID if recipe.valid else _FALSE
         head = b"" if self._version == 1 else number
         self._send(words(PackageKind.SETUP_OUTPUTS, head, recipe.words))
@@ -177,12 +179,21 @@ class RtdeSession(PortSession):
     def _start(self, _payload: bytes) -> None:
         """Start to send outputs. This is refused if the last output recipe was invalid."""
         self._started, self._next = not self._outputs_wrong, None
+        self._read()
         self._said.clear()
         self._send(package(PackageKind.START, _TRUE if self._started else _FALSE))
 
     def _pause(self, _payload: bytes) -> None:
         self._started = False
+        self._read()
         self._send(package(PackageKind.PAUSE, _TRUE))
+
+    def _read(self) -> None:
+        """Have the variables of the recipe computed as long as the client reads them."""
+        if self._started and self._outputs is not None:
+            self._robot.outputs.begin(self, self._outputs)
+        else:
+            self._robot.outputs.end(self)
 
     def _take_text(self, _payload: bytes) -> None:
         """Ignore a text message: on a robot of UR's, it would appear in the log of the teach pendant."""

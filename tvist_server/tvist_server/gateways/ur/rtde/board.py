@@ -1,0 +1,157 @@
+"""What the RTDE clients of a robot read: every value is written once a tick, and every recipe gathers its bytes there.
+
+What no recipe names is not computed.
+"""
+
+from collections.abc import Iterable
+from itertools import chain
+from struct import Struct, calcsize
+from sys import byteorder
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tvist_controller.instruments.snapshot import Snapshot
+from tvist_protocol.io import Io
+from tvist_server.gateways.ur.rtde.codec import HEADER, PackageKind
+from tvist_server.gateways.ur.rtde.outputs import OUTPUTS, PARTS, Part
+from tvist_server.gateways.ur.rtde.recipes import OutputRecipe
+
+
+class Board:
+    """Makes data packages, each once for all clients with the same recipe."""
+
+    def __init__(self) -> None:
+        self._recipes: dict[object, OutputRecipe] = {}
+        self._bytes: _Bytes | None = None
+        """Bytes of the last tick; None if the recipes have changed since."""
+        self._snapshot: Snapshot | None = None
+        """Snapshot of the last tick."""
+        self._packages: dict[tuple[bytes, str], bytes] = {}
+        """Packages of the last tick by head and names."""
+
+    def begin(self, client: object, recipe: OutputRecipe) -> None:
+        """Note that a client reads a recipe, which is valid, instead of what it read before."""
+        self._recipes[client] = recipe
+        self._bytes = self._snapshot = None
+
+    def end(self, client: object) -> None:
+        """Note that a client reads nothing more."""
+        if self._recipes.pop(client, None) is not None:
+            self._bytes = self._snapshot = None
+
+    def package(self, recipe: OutputRecipe, snapshot: Snapshot, head: bytes) -> bytes:
+        """Return the data package of a tick.
+
+        Args:
+            recipe: A recipe that a client reads.
+            snapshot: Values of the tick.
+            head: Bytes in front of the variables: the recipe's id in protocol version 2, nothing in version 1.
+        """
+        if self._bytes is None:
+            self._bytes = _Bytes((name for one in self._recipes.values() for name in one.names), snapshot)
+        if snapshot is not self._snapshot:
+            self._bytes.write(snapshot)
+            self._packages.clear()
+            self._snapshot = snapshot
+        key = head, recipe.text
+        package = self._packages.get(key)
+        if package is None:
+            size = HEADER.size + len(head) + recipe.size
+            package = HEADER.pack(size, PackageKind.DATA) + head + self._bytes.of(recipe)
+            self._packages[key] = package
+        return package
+
+
+class _Bytes:
+    """Bytes of the variables that some recipes name.
+
+    Args:
+        names: The variables; one may occur several times.
+        snapshot: Tells how many joints the arm has.
+    """
+
+    def __init__(self, names: Iterable[str], snapshot: Snapshot) -> None:
+        parts = dict.fromkeys(PARTS[name][0] for name in names)
+        self._places: dict[Part, _Place] = {}
+        self._of_io = _Packing([part for part in parts if part.of_io], snapshot, 0, self._places)
+        self._others = _Packing(
+            [part for part in parts if not part.of_io], snapshot, self._of_io.end, self._places
+        )
+        self._zero = self._others.end
+        self._buffer = bytearray(self._zero + 1)
+        self._numbers = np.frombuffer(self._buffer, np.uint8)
+        self._indices: dict[str, NDArray[np.intp]] = {}
+        self._io: Io | None = None
+
+    def write(self, snapshot: Snapshot) -> None:
+        """Write the values of a tick."""
+        if snapshot.io is not self._io:
+            self._of_io.write(snapshot, self._buffer)
+            self._io = snapshot.io
+        self._others.write(snapshot, self._buffer)
+
+    def of(self, recipe: OutputRecipe) -> bytes:
+        """Return the bytes of the variables of a recipe."""
+        index = self._indices.get(recipe.text)
+        if index is None:
+            places = list(chain.from_iterable(self._places_of(name) for name in recipe.names))
+            index = self._indices[recipe.text] = np.array(places, np.intp)
+        return self._numbers.take(index, mode="clip").tobytes()  # the quickest mode; all places are inside
+
+    def _places_of(self, name: str) -> list[int]:
+        """Places of the bytes of a variable.
+
+        A vector that is too short is filled with zeros, since clients expect six entries of an arm with fewer joints.
+        Robots with more joints are refused before they are served, see `UrPorts`.
+        """
+        (part, number), wire = PARTS[name], OUTPUTS[name]
+        place, size = self._places[part], wire.size // wire.length
+        entries = place.entries // part.variables
+        first = [place.first + size * (number * entries + k) for k in range(entries)]
+        turned = place.of_machine and byteorder == "little"
+        order = range(size - 1, -1, -1) if turned else range(size)
+        found = [at + k for at in first for k in order]
+        return found + [self._zero] * (wire.size - len(found))
+
+
+class _Place(NamedTuple):
+    """Where a part is written."""
+
+    first: int
+    """Place of its first byte."""
+    entries: int
+    """Number of its entries."""
+    of_machine: bool
+    """Whether its bytes have the machine's order."""
+
+
+class _Packing:
+    """Writes parts one behind the other, by one call.
+
+    Args:
+        parts: The parts.
+        snapshot: Tells the lengths of lists.
+        first: Place of the first byte.
+        places: Where each part is written is added here.
+    """
+
+    def __init__(self, parts: list[Part], snapshot: Snapshot, first: int, places: dict[Part, _Place]) -> None:
+        found = [(part, part.read(snapshot)) for part in parts]
+        lists = [(part, value) for part, value in found if isinstance(value, list)]
+        others = [(part, value) for part, value in found if not isinstance(value, list)]
+        self._lists, self._others = [part.read for part, _ in lists], [part.read for part, _ in others]
+        self._first, self.end, layout = first, first, ">"
+        for part, value in (*lists, *others):
+            size, raw = calcsize(f">{part.letter}"), isinstance(value, bytes | bytearray)
+            entries = len(value) // size if raw else len(value) if isinstance(value, list) else 1
+            places[part] = _Place(self.end, entries, raw)
+            layout += f"{size * entries}s" if raw else f"{entries}{part.letter}"
+            self.end += size * entries
+        self._pack_into = Struct(layout).pack_into
+
+    def write(self, snapshot: Snapshot, buffer: bytearray) -> None:
+        """Write the values of a tick."""
+        numbers = chain.from_iterable([read(snapshot) for read in self._lists])
+        self._pack_into(buffer, self._first, *numbers, *[read(snapshot) for read in self._others])
