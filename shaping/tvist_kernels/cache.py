@@ -13,7 +13,6 @@ import contextlib
 import hashlib
 import multiprocessing
 import os
-import pickle
 import sys
 import uuid
 import warnings
@@ -27,15 +26,17 @@ import numba
 from numba.core import config
 from numba.core.caching import CompileResultCacheImpl, _Cache, _cache_log
 from numba.core.registry import cpu_target
-from numba.core.serialize import dumps
 from numba.misc.appdirs import AppDirs
 
 from tvist_kernels import trust
+from tvist_kernels.machine_code import from_bytes, to_bytes
 from tvist_kernels.sources import digest
 
 DIGITS = 16
 """Hexadecimal digits of each hash in a file's name."""
 CHECKSUM_BYTES = 32
+FORMAT = 2
+"""Changes with what `machine_code` writes."""
 
 kernels: "list[KernelCache]" = []
 """Those of all functions that this process has imported so far."""
@@ -90,21 +91,20 @@ class KernelCache(_Cache):
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
         """Return the kernel for types of arguments; None if there is none on disk, or the file is damaged."""
-        target_context.refresh()
         name = self._file(sig, target_context)
         for folder in self._folders if self._enabled else ():
             content = _read(folder / name) or b""
             checksum, code = content[:CHECKSUM_BYTES], content[CHECKSUM_BYTES:]
             if hashlib.sha256(code).digest() == checksum:
                 _cache_log("[cache] data loaded from %r", str(folder / name))  # with NUMBA_DEBUG_CACHE=1
-                return self._content.rebuild(target_context, pickle.loads(code))  # noqa: S301  ours, or root's
+                return from_bytes(target_context, code)
         return None
 
     def save_overload(self, sig: object, data: Any) -> None:
         """Write a kernel into the first folder that can be written in; if there is none, note it in `unkept`."""
         if not self._enabled or not self._content.check_cachable(data):
             return
-        code = dumps(self._content.reduce(data))
+        code = to_bytes(data)
         name = self._file(sig, data.target_context)
         failed: dict[str, str] = {}
         for folder in self._folders:
@@ -179,7 +179,8 @@ def folders(sources: Path) -> list[Path]:
 
 def _machine(target_context: Any) -> str:
     """Hash of the processor with its features, and of what compiles and loads for it."""
-    versions = (sys.version, numba.__version__, llvmlite.__version__)
+    python = (sys.implementation.cache_tag, getattr(sys, "abiflags", ""))
+    versions = (FORMAT, python, numba.__version__, llvmlite.__version__)
     return _short(repr((target_context.codegen().magic_tuple(), versions)))
 
 

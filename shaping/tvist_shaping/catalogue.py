@@ -6,7 +6,6 @@ from types import MappingProxyType
 
 from tvist_shaping import exact, impulses, unity
 from tvist_shaping.errors import UnknownShaperError
-from tvist_shaping.makers import si_of
 from tvist_shaping.shaper import Shaper
 
 SHAPERS: Mapping[str, Shaper] = MappingProxyType(
@@ -61,8 +60,12 @@ SHAPERS: Mapping[str, Shaper] = MappingProxyType(
                 exact.EI.duration_periods,
                 exact.EI.zeta_max,
             ),
-            si_of(
-                0.75, 1.25, name="si", description="specified insensitivity: the shortest that tolerates 25 %"
+            Shaper(
+                "si",
+                "specified insensitivity: the shortest that tolerates 25 %",
+                impulses.SI.at,
+                float(impulses.SI.periods[-1]),
+                train=impulses.SI,
             ),
             Shaper(
                 "zvdd",

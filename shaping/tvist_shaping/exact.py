@@ -116,8 +116,12 @@ def exact(humps: int, V: float) -> Tabulated:
 
 
 EI, EI2, EI3 = (
-    Tabulated(shaper.follow, shaper.start, zeta_max, f"take {name}, which leaves less")
-    for humps, name, zeta_max in ((1, "ei", 0.52), (2, "ei2", 0.32), (3, "ei3", 0.2))
+    Tabulated(shaper.follow, shaper.start, zeta_max, f"take {name}, which leaves less", duration_periods)
+    for humps, name, zeta_max, duration_periods in (
+        (1, "ei", 0.52, 1.0),
+        (2, "ei2", 0.32, 1.5),
+        (3, "ei3", 0.2, 2.0),
+    )
     for shaper in (HumpShaper(humps, V),)
 )
 

@@ -7,6 +7,7 @@ takes a microsecond per tick.
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 
@@ -38,45 +39,53 @@ class Tabulated:
         start: Floats,
         zeta_max: float,
         instead: str,
+        duration_periods: float | None = None,
     ) -> None:
-        """Solve at the nodes, and compute the polynomials.
+        """Solve at the nodes, and compute the polynomials; when first evaluated, if the longest duration is given.
 
         Args:
             follow: (ζ, the unknowns at a slightly lower ζ) -> the unknowns, A [-] and times in damped periods [-].
             start: Unknowns without damping.
             zeta_max: Highest damping ratio [-].
             instead: What to use beyond it, in words.
+            duration_periods: Longest duration over all ζ, if it is known [-].
 
         Raises:
             ConvergenceError: There is no solution up to zeta_max.
         """
-        self.zeta_max, self._instead = zeta_max, instead
-        nodes = NODES
-        last = self._tabulate(follow, start, nodes)
-        while np.abs(self._coefficients[-3:]).max() > SMALL and nodes < MOST_NODES:
-            nodes *= 2
-            last = self._tabulate(follow, start, nodes)
-        ends = [float(follow(end, x)[2][-1]) for end, x in ((0.0, start), (zeta_max, last))]
-        between = [float(self._at(zeta)[1][-1]) for zeta in np.linspace(0.0, zeta_max, 33)[1:-1]]
-        self.duration_periods = round(max(*ends, *between), 9)
+        self._follow, self._start, self.zeta_max, self._instead = follow, start, zeta_max, instead
+        self.duration_periods = self.longest() if duration_periods is None else duration_periods
 
-    def _tabulate(
-        self, follow: Callable[[float, Floats], tuple[Floats, Floats, Floats]], start: Floats, number: int
-    ) -> Floats:
-        """Compute the polynomials from the solutions at a number of nodes; the unknowns at the last."""
+    def longest(self) -> float:
+        """Return the longest duration over all ζ, to within 1e-9 damped periods [-]."""
+        ends = ((0.0, self._start), (self.zeta_max, self._polynomials[1]))
+        durations = [float(self._follow(end, x)[2][-1]) for end, x in ends]
+        zetas = np.linspace(0.0, self.zeta_max, 33)[1:-1]
+        return round(max(*durations, *(float(self._at(zeta)[1][-1]) for zeta in zetas)), 9)
+
+    @cached_property
+    def _polynomials(self) -> tuple[Floats, Floats]:
+        """Coefficients of amplitudes and times, shape (nodes, 2N), and the unknowns at the last node."""
+        nodes = NODES
+        coefficients, last = self._tabulate(nodes)
+        while np.abs(coefficients[-3:]).max() > SMALL and nodes < MOST_NODES:
+            nodes *= 2
+            coefficients, last = self._tabulate(nodes)
+        return coefficients, last
+
+    def _tabulate(self, number: int) -> tuple[Floats, Floats]:
+        """Compute the polynomials from the solutions at a number of nodes."""
         k, zeta_max = np.arange(number), self.zeta_max
         nodes = np.cos((k + 0.5) * math.pi / number)[::-1]
-        values, last, x, zeta = [], start, start, 0.0
-        slope = np.zeros(start.size)
+        values, last, x, zeta = [], self._start, self._start, 0.0
+        slope = np.zeros(last.size)
         for node in nodes:
             step, zeta = 0.5 * zeta_max * (1.0 + float(node)) - zeta, 0.5 * zeta_max * (1.0 + float(node))
-            x, A, periods = follow(zeta, last + step * slope)
+            x, A, periods = self._follow(zeta, last + step * slope)
             slope, last = (x - last) / step, x
             values.append(np.concatenate([A, periods]))
         terms = np.cos(np.outer(np.arccos(nodes), k))  # T_k at the nodes, which are orthogonal
-        self._coefficients = (terms.T @ np.array(values)) * np.where(k == 0, 1.0, 2.0)[:, None] / number
-        self._k, self._N = k, values[0].size // 2
-        return last
+        return (terms.T @ np.array(values)) * np.where(k == 0, 1.0, 2.0)[:, None] / number, last
 
     def __call__(self, f_d: float, zeta: float) -> Impulses:
         """Evaluate the impulses.
@@ -97,7 +106,7 @@ class Tabulated:
 
     def _at(self, zeta: float) -> tuple[Floats, Floats]:
         angle = math.acos(min(max(2.0 * zeta / self.zeta_max - 1.0, -1.0), 1.0))
-        values = np.cos(angle * self._k) @ self._coefficients
-        A, periods = values[: self._N], values[self._N :]
+        coefficients = self._polynomials[0]
+        A, periods = np.split(np.cos(angle * np.arange(len(coefficients))) @ coefficients, 2)
         periods[0] = 0.0
         return A / A.sum(), periods

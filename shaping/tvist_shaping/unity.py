@@ -47,8 +47,11 @@ class UnityShaper:
 ZETA_MAX = 0.5
 """Highest damping ratio [-]."""
 UM_ZV, UM_ZVD = (
-    Tabulated(shaper.follow, shaper.start, ZETA_MAX, f"take {name}")
-    for name, shaper in (("zv", UnityShaper(derivative=False)), ("zvd", UnityShaper(derivative=True)))
+    Tabulated(shaper.follow, shaper.start, ZETA_MAX, f"take {name}", duration_periods)
+    for name, shaper, duration_periods in (
+        ("zv", UnityShaper(derivative=False), 0.353461707),
+        ("zvd", UnityShaper(derivative=True), 0.790878917),
+    )
 )
 
 
