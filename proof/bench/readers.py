@@ -16,7 +16,8 @@ async def helper(module: str, *arguments: str) -> AsyncIterator[Process]:
         arguments: Arguments of the module.
     """
     command = [sys.executable, "-m", f"proof.bench.{module}", *arguments]
-    process = await create_subprocess_exec(*command, stdin=PIPE, stdout=PIPE)
+    # In a session of its own, Control+C leaves it to whoever measures.
+    process = await create_subprocess_exec(*command, stdin=PIPE, stdout=PIPE, start_new_session=True)
     try:
         yield process
         if process.returncode is None:

@@ -24,9 +24,8 @@ log = logging.getLogger(__name__)
 LONGEST_SLEEP = 0.1
 """Longest sleep of the tick thread before it checks whether it should end [s]."""
 HAND_ON_EVERY = 0.0009
-"""Shortest time between two calls of the function that hands on the robots' messages [s]. A call costs two thread
-switches, about as much as a tick. A single robot hands on every tick at once; several robots hand on together what
-they produced within a millisecond.
+"""Longest time for which robots that tick one after another keep their messages [s]. To hand them on costs two thread
+switches, about as much as a tick, so they are handed on together before the thread sleeps.
 """
 LONGEST_TICK = 10.0
 """Longest wait at the end for a tick in progress [s]: a call of somebody's own arm may never return."""
@@ -205,7 +204,7 @@ class Realtime(Clock):
         finally:
             self._asked.set()
         robots, overloads, now, sleep = self._robots, self._overloads, time.monotonic, time.sleep
-        alone, handed_on = len(robots) == 1, -HAND_ON_EVERY
+        kept: float | None = None  # since when messages wait to be handed on
         schedule, pace = Schedule(len(robots), self._period, now()), robots[0].pace
         begin, silent = schedule.begin if pace is None else Followed(self._period, now()).begin, False
         while self._running:
@@ -215,6 +214,10 @@ class Realtime(Clock):
                     continue
                 silent = False
             elif (wait := schedule.due - now()) > 0.0:
+                if kept is not None:
+                    kept = None
+                    self._hand_on()
+                    continue
                 sleep(min(wait, LONGEST_SLEEP))
                 if wait > LONGEST_SLEEP:
                     continue
@@ -230,8 +233,9 @@ class Realtime(Clock):
             robot.jobs.do_waiting()
             robot.host.tick()
             robot.lateness.worked(now() - begun)
-            if alone or begun - handed_on >= HAND_ON_EVERY:
-                handed_on = begun
+            kept = begun if kept is None else kept
+            if pace is not None or begun - kept >= HAND_ON_EVERY:
+                kept = None
                 self._hand_on()
         for robot in robots:
             robot.jobs.do_waiting()

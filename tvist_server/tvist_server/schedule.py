@@ -4,10 +4,6 @@ from heapq import heapreplace
 
 CATCH_UP = 50
 """Number of periods made up for after a delay; further ones are skipped, which limits the length of the burst."""
-MOMENTS = 4
-"""Number of moments within a period at which robots are due. Waking up with cold caches costs half as much as a tick,
-so more moments would allow fewer robots.
-"""
 
 
 class Followed:
@@ -28,12 +24,13 @@ class Followed:
 
 
 class Schedule:
-    """Absolute deadlines, a period apart for each robot, and staggered so that robots do not wait for each other.
+    """Absolute deadlines, a period apart for each robot, for which the thread wakes up once a period.
 
-    Up to `MOMENTS` robots are spread evenly over the period, so that a slow tick of one robot delays the next robot
-    only if it takes longer than that distance. With more robots, those with the same moment tick one after another. A
-    tick that begins a period late or more is counted as missed and made up for at once, and the deadlines stay where
-    they were, so there is no drift even after a week.
+    To wake up, with cold caches, costs a good part of a tick. So those robots whose deadlines follow within a period
+    tick one after another in the same go. Their deadlines are spread evenly over the period, so that a robot is late
+    only if those before it took more than their share; one that comes before its deadline is not late. A tick that
+    begins a period late or more is counted as missed and made up for at once, and the deadlines stay where they were,
+    so there is no drift even after a week.
 
     Args:
         robots: Number of robots.
@@ -43,16 +40,12 @@ class Schedule:
 
     def __init__(self, robots: int, period: float, start: float) -> None:
         self._period = period
-        moments = min(robots, MOMENTS)
         # A sorted list is a valid heap.
-        self._due = sorted(
-            (start + period * (1.0 + robot % moments / moments), robot) for robot in range(robots)
-        )
-
-    @property
-    def due(self) -> float:
-        """Time at which the next tick is due [s]."""
-        return self._due[0][0]
+        self._deadlines = [(start + period * (1.0 + robot / robots), robot) for robot in range(robots)]
+        # Half a share short of a period: the first robot's next tick waits for its deadline.
+        self._together = period * (1.0 - 0.5 / robots)
+        self.due = self._deadlines[0][0]
+        """Time from which the next tick may begin [s]."""
 
     def begin(self, now: float) -> tuple[int, float, int]:
         """Take the next tick, which begins now.
@@ -61,12 +54,15 @@ class Schedule:
             Index of the robot whose tick it is, how late it begins [s], and how many of the robot's ticks were
             missed.
         """
-        deadline, robot = self._due[0]
+        deadline, robot = self._deadlines[0]
         period = self._period
-        late = now - deadline
+        late = max(0.0, now - deadline)
         missed = left_out = 0
         if late >= period:
             left_out = max(0, int(late / period) - CATCH_UP)
             missed = 1 + left_out
-        heapreplace(self._due, (deadline + period * (1 + left_out), robot))
+        heapreplace(self._deadlines, (deadline + period * (1 + left_out), robot))
+        following = self._deadlines[0][0]
+        if following >= self.due + self._together:
+            self.due = following
         return robot, late, missed
