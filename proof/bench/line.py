@@ -26,7 +26,7 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping import TvistFilter, shaper
 
 OF_TICKS = 20
-SHAPERS = ("zv", "auto")
+SHAPERS = ("zv", "auto", "elastic")
 """Filters with which the line is measured; the first one is that of a robot without options."""
 MUJOCO_STEP = 0.00025
 """Step at which MuJoCo agrees with our plant [s]."""
