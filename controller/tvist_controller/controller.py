@@ -285,17 +285,11 @@ class Controller(WholeRobot):
         return self.report, events
 
     def _report(self, sample: Sample) -> Report:
-        motion = self.motion
+        motion, line = self.motion, self.cycle.line
         return self._reporter.report(
-            self.tick_number,
-            sample,
-            self.cycle.line.filter.tvist,
-            self.cycle.line.drives.delay,
-            modes=self.modes.now,
-            speed=motion.motions.speed,
-            setpoint_sequence=motion.streams.sequence,
-            missed_ticks=self.counters.missed_ticks,
-        )
+            self.tick_number, sample, line.filter.tvist, line.drives.delay, self.modes.now, motion.motions.speed,
+            motion.streams.sequence, self.counters.missed_ticks,
+        )  # fmt: skip
 
     def _look_again(self) -> None:
         """Let the next tick see what has timed out, and what modes have become: a command may have changed both."""

@@ -130,18 +130,18 @@ class Host:
 
     def tick(self) -> None:
         """Compute one control period."""
-        if self._experience is not None and self.controller.cycle.mode.at_rest:
-            self._learn(self._experience)
-        self.controller.begin_tick()
+        controller, experience = self.controller, self._experience
+        if experience is not None and controller.cycle.mode.at_rest:
+            self._learn(experience)
+        controller.begin_tick()
         news = self._carry_out_orders()
-        io = self.controller.changed_io()
+        io = controller.changed_io()
         if io is not None:
             for sink in self._sinks:
                 sink.io(io)
-        report, events = self.controller.complete_tick()
-        if self._experience is not None:
-            controller = self.controller
-            self._experience.watch(
+        report, events = controller.complete_tick()
+        if experience is not None:
+            experience.watch(
                 report.sample,
                 controller.lessons.beliefs,
                 controller.cycle.corrections.repetition,
@@ -153,7 +153,7 @@ class Host:
                 sink.event(event)
             sink.report(report)
         self._tell_truth()
-        if self.controller.session.lease is not self.standing.lease:
+        if controller.session.lease is not self.standing.lease:
             self.standing = self._standing()
         for one in news:
             self.socket(one)

@@ -27,7 +27,7 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping import TvistFilter, shaper
 
 OF_TICKS = 20
-SHAPERS = ("zv", "auto")
+SHAPERS = ("zv", "auto", "elastic")
 """Filters with which the line is measured; the first one is that of a robot without options."""
 STREAMS = (500, 125)
 """Rates of set-points with which it is measured [Hz]."""

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from tvist_shaping._types import Floats
 from tvist_shaping.steady import Design, ShortDesign, SteadyFilter
+from tvist_shaping.taps import length
 
 AT_TARGET = 3
 """Number of modes, from the lowest on, that have a zero-vibration shaper in a motion with a known end."""
@@ -86,6 +87,7 @@ class AimedFilter(SteadyFilter):
             return
         self.f_d, self.zeta = self.estimator.settle(self._angles(np.asarray(q, dtype=float)))
         done = self.design.at_target(self.f_d, self.zeta, self._taps)
+        self._length = length(self._taps)
         self.fault, self.clipped = None, not done or self.estimator.clipped
         self._aimed = True
 
@@ -112,3 +114,4 @@ class PlannedFilter(AimedFilter):
         if quiet:
             self._taps[:] = 0.0
             self._taps[0] = 1.0
+            self._length = 0

@@ -143,8 +143,8 @@ class DelayLine:
             ShapingError: q has another shape.
         """
         sample = self._sample(q)
-        self.head = (self.head + 1) % self.capacity
-        self.ring[self.head] = sample
+        head = self.head = (self.head + 1) % self.capacity
+        self.ring[head] = sample
         bits = sample.tobytes()  # the fastest comparison
         self.still = self.still + 1 if bits == self._bits else 1
         self._bits = bits

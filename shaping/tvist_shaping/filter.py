@@ -11,7 +11,7 @@ from tvist_shaping.errors import FilterError, ShaperFailureError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.failures import FAILURES, ROUNDING, failure
-from tvist_shaping.filter_kernels import eased, shape, shape_all
+from tvist_shaping.filter_kernels import eased, shape, shape_all, weigh
 from tvist_shaping.impulse_train import UNSHAPED, Impulses, product
 from tvist_shaping.own import longest as longest_of
 from tvist_shaping.shaper import Shaper
@@ -105,7 +105,7 @@ class TvistFilter(Filter):
         # One tick more than max_delay, for rounding of τ/h; the others are for interpolation.
         super().__init__(shaper.name, estimator, joints, period, math.ceil(max_delay / period) + 5)
         self._reach = math.ceil(longest / period) + 3  # three are for interpolation
-        self._longest = longest
+        self._longest, self._most = longest, longest * (1.0 + ROUNDING)
         self.shaper = shaper
         self.max_delay = max_delay
         self._impulses: Impulses | None = UNSHAPED
@@ -208,7 +208,7 @@ class TvistFilter(Filter):
             impulses = give(f_d.item(), zeta.item())
         else:
             impulses = product([give(f, z) for f, z in zip(f_d.tolist(), zeta.tolist(), strict=True)])
-        if impulses.tau.item(-1) > self._longest * (1.0 + ROUNDING):
+        if impulses.tau.item(-1) > self._most:
             raise ShaperFailureError(
                 self.name, f"gives impulses that last {impulses.duration:g} s, beyond {self._longest:g} s"
             )
@@ -216,13 +216,24 @@ class TvistFilter(Filter):
 
     def _weigh(self) -> None:
         """Compute this tick's impulses for the modes at the last shaped reference (z⁻¹ in Figure 8), and apply them."""
-        modes, line = self._modes(), self._line
-        if self._train is not None and shape(
-            *modes, self.shaper.zeta_max, self._longest * (1.0 + ROUNDING), self.period,
-            self._train, self._work, line.ring, line.head, line.scratch, self._q_star,
-        ):  # fmt: skip
+        line, estimator, train = self._line, self.estimator, self._train
+        if train is not None and type(estimator) is Polynomial:
+            mode = np.empty((2, 1))
+            found = weigh(
+                self._angles(self._q_star), *estimator.coefficients, self.shaper.zeta_max, self._most, self.period,
+                train, self._work, line.ring, line.head, line.scratch, self._q_star, mode,
+            )  # fmt: skip
+            modes, done = (mode[0], mode[1]), found >= 0
+            estimator.saturating = found in {1, -1}
+        else:
+            modes = self._modes()
+            done = train is not None and shape(
+                *modes, self.shaper.zeta_max, self._most, self.period,
+                train, self._work, line.ring, line.head, line.scratch, self._q_star,
+            )  # fmt: skip
+        if done:
             self.f_d, self.zeta = modes
-            self.clipped, self.fault, self._impulses = self.estimator.clipped, None, None
+            self.clipped, self.fault, self._impulses = estimator.clipped, None, None
             return
         self._suppress(modes)
         line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)
@@ -236,7 +247,7 @@ class TvistFilter(Filter):
             return super().filter_all(samples)
         out, modes = np.empty_like(samples), np.array([self.f_d, self.zeta])
         done, estimator.saturating = shape_all(
-            samples, *estimator.coefficients, self.shaper.zeta_max, self._longest * (1.0 + ROUNDING), self.period,
+            samples, *estimator.coefficients, self.shaper.zeta_max, self._most, self.period,
             train, self._work, line.ring, line.head, line.scratch, self._q_star, modes, out,
         )  # fmt: skip
         if done:

@@ -81,6 +81,60 @@ def shape(
 
 
 @compiled
+def weigh(
+    q: Floats,
+    joints: Integers,
+    trigonometric: bool,
+    centre: Floats,
+    scale: Floats,
+    multiples: Integers,
+    coefficients: Floats,
+    ranges: Floats,
+    zeta_max: float,
+    longest: float,
+    period: float,
+    train: Floats,
+    impulses: Floats,
+    ring: Floats,
+    head: int,
+    scratch: Floats,
+    q_star: Floats,
+    modes: Floats,
+) -> int:
+    """Estimate the paper's mode at the last shaped sample, and apply its impulses to a delay line.
+
+    Args:
+        q: Joint angles that this sample represents, shape (n,) [rad].
+        joints: Indices of the joints that the estimator knows, shape (k,).
+        trigonometric: Whether its basis is trigonometric.
+        centre: Its centre [rad], shape (k,).
+        scale: Its scale [rad], shape (k,).
+        multiples: Multiples of the angles in each term, shape (rows, k).
+        coefficients: Coefficients of f_d and ζ, shape (2, terms).
+        ranges: Range of f_d and range of ζ, shape (2, 2).
+        zeta_max: Exclusive upper limit of ζ [-].
+        longest: Longest delay [s].
+        period: Tick [s].
+        train: Amplitudes without damping [-] and times in damped periods [-], shape (2, N).
+        impulses: Result: impulses of the mode, shape (3, N).
+        ring: `DelayLine.ring`.
+        head: `DelayLine.head`.
+        scratch: `DelayLine.scratch`.
+        q_star: The sample, replaced by the next one if the mode is in range, shape (width,).
+        modes: Result: the mode, shape (2, 1).
+
+    Returns:
+        1 if the estimate was clamped, 0 if not; the same minus 2 if the mode is out of range.
+    """
+    clamped = evaluate(q, joints, trigonometric, centre, scale, multiples, coefficients, ranges, modes)
+    found = 1 if clamped else 0
+    shaped = shape(
+        modes[0], modes[1], zeta_max, longest, period, train, impulses, ring, head, scratch, q_star
+    )
+    return found if shaped else found - 2
+
+
+@compiled
 def shape_all(
     samples: Floats,
     joints: Integers,
@@ -106,40 +160,39 @@ def shape_all(
 
     Args:
         samples: References, shape (T, joints) [rad].
-        joints: Indices of the joints that the estimator knows, shape (k,).
-        trigonometric: Whether its basis is trigonometric.
-        centre: Its centre [rad], shape (k,).
-        scale: Its scale [rad], shape (k,).
-        multiples: Multiples of the angles in each term, shape (rows, k).
-        coefficients: Coefficients of f_d and ζ, shape (2, terms).
-        ranges: Range of f_d and range of ζ, shape (2, 2).
-        zeta_max: Exclusive upper limit of ζ [-].
-        longest: Longest delay [s].
-        period: Tick [s].
-        train: Amplitudes without damping [-] and times in damped periods [-], shape (2, N).
-        impulses: Result: impulses of the last mode, shape (3, N).
-        ring: `DelayLine.ring`; changed.
-        head: `DelayLine.head`.
-        scratch: `DelayLine.scratch`.
-        q_star: Last shaped sample; changed, shape (joints,) [rad].
-        modes: Result: the last modes, shape (2, 1).
+        joints: See `weigh`, as for the next fifteen, of which `ring` is changed.
+        trigonometric: Whether the basis is trigonometric.
+        centre: Centre.
+        scale: Scale.
+        multiples: Multiples of the angles.
+        coefficients: Coefficients.
+        ranges: Ranges.
+        zeta_max: Upper limit of ζ.
+        longest: Longest delay.
+        period: Tick.
+        train: Impulses without damping.
+        impulses: Impulses of the last mode.
+        ring: Ring of the delay line.
+        head: Its head.
+        scratch: Its scratch.
+        q_star: Last shaped sample.
+        modes: The last mode.
         out: Result: shaped samples, shape (T, joints) [rad].
 
     Returns:
         Number of samples shaped before the first mode out of range, and whether the last estimate was clamped.
     """
-    clamped = False
+    found = 0
     for i in range(samples.shape[0]):
         head = head + 1 if head + 1 < ring.shape[0] else 0
         for j in range(samples.shape[1]):
             ring[head, j] = samples[i, j]
-        clamped = evaluate(
-            q_star, joints, trigonometric, centre, scale, multiples, coefficients, ranges, modes
-        )
-        if not shape(
-            modes[0], modes[1], zeta_max, longest, period, train, impulses, ring, head, scratch, q_star
-        ):
-            return i, clamped
+        found = weigh(
+            q_star, joints, trigonometric, centre, scale, multiples, coefficients, ranges, zeta_max, longest, period,
+            train, impulses, ring, head, scratch, q_star, modes,
+        )  # fmt: skip
+        if found < 0:
+            return i, found == -1
         for j in range(samples.shape[1]):
             out[i, j] = q_star[j]
-    return samples.shape[0], clamped
+    return samples.shape[0], found == 1

@@ -51,7 +51,7 @@ class SmoothingFilter(Filter):
         super().__init__(name, estimator, joints, period, len(weights) + 4)
         self.weights, self.feed_forward = weights, feed_forward
         self._delays = np.arange(len(weights), dtype=float)
-        self._reach = len(weights)
+        self._reach, self._delay = len(weights), length(weights) * period
         self._tick = 0
         self.reset(self._q_star)
 
@@ -61,7 +61,7 @@ class SmoothingFilter(Filter):
     @property
     def delay(self) -> float:
         """Time of the last weight [s], by which the shaped reference ends later."""
-        return length(self.weights) * self.period
+        return self._delay
 
     @property
     def mean_delay(self) -> float:

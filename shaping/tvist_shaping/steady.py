@@ -146,7 +146,6 @@ class ShortDesign(Design):
         self.name, self.modes, self.mean_delay = name, wanted.modes, mean_delay
         self.wanted, self.period = wanted, period
         self.taps = math.ceil(wanted.longest / period) + 1
-        self._residual = np.array(wanted.residual, dtype=float)
         self._programme = Programme.of(wanted, self.taps)
         self._length, self._solved = 0.0, False
 
@@ -179,9 +178,10 @@ class ShortDesign(Design):
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:
         """Compute taps whose length follows the residual; see `Design.go_on`."""
         self._solve(f_d, zeta, taps)
-        change = seconds * min(max(GAIN * self._excess(), -QUICKEST), QUICKEST)
+        excess = self._excess()
+        change = seconds * min(max(GAIN * excess, -QUICKEST), QUICKEST)
         self._length = min(max(self._length + change, self.wanted.shortest), self.wanted.longest)
-        return self._solved and (self._length < self.wanted.longest or self._excess() <= 0.0)
+        return self._solved and (self._length < self.wanted.longest or excess <= 0.0)
 
     def _part(self) -> None:
         self._programme = self._programme.fork()
@@ -194,7 +194,10 @@ class ShortDesign(Design):
 
     def _excess(self) -> float:
         """Logarithm of the ratio of the residual to the permitted one, 0 if they are equal."""
-        return 0.5 * math.log(float(((self._programme.remains / self._residual) ** 2).sum()) + 1e-12)
+        square = 0.0
+        for remains, permitted in zip(self._programme.remains.tolist(), self.wanted.residual, strict=True):
+            square += (remains / permitted) * (remains / permitted)
+        return 0.5 * math.log(square + 1e-12)
 
 
 class SteadyFilter(Filter):
@@ -249,6 +252,7 @@ class SteadyFilter(Filter):
         self._designed, self._taps = np.zeros((2, design.taps))
         self._past, self._sums = np.zeros((3, smooth, design.taps)), np.zeros((3, design.taps))
         self._row, self._tick = 0, 0
+        self._length = 0
         self.reset(self._q_star)
         self._check_made()
 
@@ -258,7 +262,7 @@ class SteadyFilter(Filter):
     @property
     def delay(self) -> float:
         """Time of the last tap [s], by which the shaped reference ends later."""
-        return length(self._taps) * self.period
+        return self._length * self.period
 
     @property
     def mean_delay(self) -> float:
@@ -284,16 +288,20 @@ class SteadyFilter(Filter):
         self._ask(self.estimator.settle(self._angles(self._q_star)), None)
         self._past[:] = self._designed
         self._sums[:] = self._designed * self._smooth
-        self._taps[:] = self._designed
+        self._take(self._designed)
         self._row, self._tick = 0, 0
 
     def _weigh(self) -> None:
         if self._tick % EVERY == 0:
             self._ask(self._modes(), EVERY * self.period)
         self._tick += 1
-        average(self._designed, self._past, self._sums, self._row, self._taps)
+        self._length = average(self._designed, self._past, self._sums, self._row, self._taps)
         self._row = (self._row + 1) % self._smooth
         self._line.gather(self._taps, self._delays, self._q_star)
+
+    def _take(self, taps: Floats) -> None:
+        """Use taps from now on."""
+        self._taps[:], self._length = taps, length(taps)
 
     def _ask(self, modes: tuple[Floats, Floats], seconds: float | None) -> None:
         """Compute taps for these modes, some time after the last ones; None for a start at rest."""

@@ -12,6 +12,9 @@ import numpy as np
 from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
 
+MATTERS = 1e-12
+"""A tap below this does not count [-]."""
+
 
 @compiled
 def mean_delay(f_d: Floats, zeta: Floats) -> float:
@@ -70,7 +73,7 @@ def product_taps(f_d: Floats, zeta: Floats, mean: float, period: float, taps: Fl
 
 
 @compiled
-def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> None:
+def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> int:
     """Update three consecutive running means, over the last tap vectors of each.
 
     Args:
@@ -79,6 +82,9 @@ def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> 
         sums: Sums of these inputs, shape (3, N); changed.
         row: Oldest row of each.
         out: The third mean, shape (N,), with sum 1.
+
+    Returns:
+        Number of taps up to the last one that matters, as `length` does.
     """
     ticks, N = past.shape[1], taps.shape[0]
     out[:] = taps
@@ -96,10 +102,14 @@ def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> 
     total = 0.0
     for n in range(N):
         total += out[n]
+    last = 0
     for n in range(N):
         out[n] /= total
+        if abs(out[n]) > MATTERS:
+            last = n
+    return last
 
 
 def length(taps: Floats) -> int:
     """Number of taps up to the last one that matters."""
-    return int(np.flatnonzero(np.abs(taps) > 1e-12)[-1])
+    return int(np.flatnonzero(np.abs(taps) > MATTERS)[-1])

@@ -9,7 +9,7 @@ from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, cal
 
 from tvist_controller.calibrations import load
 from tvist_controller.line.differentiator import Target
-from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.line.elastic_feed_forward import MOST, ROTOR, ElasticFeedForward
 from tvist_controller.line.elastic_model import ElasticModel
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.kinematics import ForwardKinematics
@@ -76,7 +76,7 @@ def test_one_joint_leads_by_its_inertia_times_acceleration_over_stiffness():
     earlier = time - H
     assert command.q[0] - earlier**3 == pytest.approx(inertia * 6.0 * earlier / stiffness, rel=1e-9)
     assert command.qd[0] - 3.0 * earlier**2 == pytest.approx(inertia * 6.0 / stiffness, rel=1e-6)
-    assert feed.qdd[0] == pytest.approx(6.0 * earlier, abs=1e-6)
+    assert feed.motors[1, 0] == pytest.approx(6.0 * earlier, abs=1e-6)
 
 
 def test_nothing_of_springs_and_gains_in_the_robot_file_is_used():
@@ -182,10 +182,11 @@ def left_with(change) -> float:
 
 def test_the_bending_of_links_is_indispensable_and_rotor_inertia_need_not_be_exact():
     def rigid_links(elastic):
-        elastic._model.stiffness[elastic._model.flexes] = 1e12
+        _, _, _, flexes, springs, *_ = elastic._parts
+        springs[0, flexes] = 1e12
 
     def other_rotors(elastic):
-        elastic._rotor *= 1.2
+        elastic._drives[ROTOR] *= 1.2
 
     known = left_with(lambda _: None)
     assert left_with(rigid_links) > 4.0 * known
@@ -369,7 +370,7 @@ def test_a_lead_that_the_torque_does_not_permit_is_limited_and_told():
 
 def test_friction_that_is_less_at_breakaway_takes_as_much_of_the_torque_as_in_motion():
     law = np.array([[10.0], [0.5], [0.05], [0.03], [1e-9]]) * np.ones(6)
-    assert stage(law=law)._most == pytest.approx(0.95 * LIMIT - 10.0)
+    assert stage(law=law)._drives[MOST] == pytest.approx(0.95 * LIMIT - 10.0)
 
 
 def watched_commands(robot):

@@ -5,6 +5,7 @@ import pytest
 from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, cut
 
 from tvist_controller.line.inverse_dynamics import SLEW
+from tvist_controller.line.line_tick import Q
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import Payload, load
 from tvist_plant.flexible_arm import FlexibleArm
@@ -37,8 +38,8 @@ def commands_of(cycle):
     """Commands to the drives from now on, and the references that they belong to."""
     found, made = [], cycle.line.drives.command
 
-    def watched(target, *arguments, **options):
-        found.append((made(target, *arguments, **options), target))
+    def watched(signals, *arguments, **options):
+        found.append((made(signals, *arguments, **options), signals[Q]))
         return found[-1][0]
 
     cycle.line.drives.command = watched
@@ -115,7 +116,7 @@ def test_the_arm_starts_in_static_equilibrium():
 
 def leads(found):
     """Angles by which the motors lead, their velocities and accelerations, from tick to tick."""
-    lead = np.array([command.q - target.q for command, target in found])
+    lead = np.array([command.q - q for command, q in found])
     return lead, np.diff(lead, axis=0) / H, np.diff(lead, 2, axis=0) / H**2
 
 

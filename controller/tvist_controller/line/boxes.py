@@ -30,6 +30,8 @@ class Boxes(Struct, frozen=True, eq=False):
     """Joint controllers: what the drives are sent for a target."""
     plant: Plant
     """The arm."""
+    kernel_parts: tuple[Floats, float, Floats, Floats]
+    """Links, gravity, scratch and joint controllers, as `line_tick` takes them."""
 
     @classmethod
     def of(
@@ -43,19 +45,16 @@ class Boxes(Struct, frozen=True, eq=False):
         compensate_sag: bool = False,
     ) -> Self:
         """Return the boxes of a robot; see `ControlCycle` for the arguments."""
+        dynamics = InverseDynamics(description, declared)
+        drives = DriveFeedForward(description, PERIOD, compensate_sag=compensate_sag)
         return cls(
             LineFilter(tvist, arm_limits(description)),
             ShapedReference(q, PERIOD),
-            InverseDynamics(description, declared),
-            DriveFeedForward(description, PERIOD, compensate_sag=compensate_sag),
+            dynamics,
+            drives,
             plant,
+            (dynamics.chain, dynamics.gravitation, dynamics.scratch, drives.rows),
         )
-
-    @property
-    def kernel_parts(self) -> tuple[Floats, float, Floats, Floats]:
-        """Links, gravity, scratch and joint controllers, as `line_tick` takes them."""
-        dynamics = self.dynamics
-        return dynamics.chain, dynamics.gravitation, dynamics.scratch, self.drives.rows
 
     def rest_at(self, q: Floats) -> Floats:
         """Restart at rest at joint positions q, shape (n,) [rad], and return the signals there, see `to_drives`."""
@@ -76,8 +75,7 @@ class Boxes(Struct, frozen=True, eq=False):
         Args:
             reference: Reference of this tick before shaping, shape (n,) [rad].
         """
-        window = self.shaped.joints.window
         signals = np.empty((SIGNALS, len(reference)))
-        chain, gravitation, scratch, rows = self.kernel_parts
-        to_drives(*window, reference, PERIOD, chain, gravitation, scratch, rows, signals)
+        before, middle, last = self.shaped.joints.window
+        to_drives(before, middle, last, reference, PERIOD, *self.kernel_parts, signals)
         return signals

@@ -4,11 +4,10 @@ from typing import TypeVar
 
 from tvist_controller.line.boxes import Boxes
 from tvist_controller.line.correction import Corrections
-from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.guard import Guard, Obstacle
 from tvist_controller.line.line_mode import LineMode, check_change
-from tvist_controller.line.line_tick import TORQUE, Q
 from tvist_controller.line.sample import Sample
 from tvist_controller.trajectory import Rest, StuckError, Trajectory
 from tvist_plant.description import Payload, RobotDescription
@@ -78,16 +77,12 @@ class ControlCycle:
         line = self.line
         # Trajectory generator: the reference x is q, or the parameter of a path. Filter: the shaped reference x*.
         x, x_star, refused = self._references()
-        reference = line.shaped.posture(x)
-        line.shaped.push(
-            x_star, reference if x_star is x else None
-        )  # unshaped, x* is x, and its posture known
+        reference, mode = line.shaped.take(x, x_star), self.mode
         line.dynamics.advance()  # a newly declared payload is phased in
         # Differentiator, inverse dynamics and joint controllers: q*, q̇*, q̈* a tick earlier, τ* and the plain command
         signals = line.to_drives(reference)
-        target, mode = Target(*signals[Q:TORQUE]), self.mode
         command = line.drives.command(
-            target, signals, line.dynamics.payload_parameters,
+            signals, line.dynamics.payload_parameters,
             may_begin=mode.shaped and not line.filter.fading, may_go_on=mode is not LineMode.BYPASSED,
         )  # fmt: skip
         motors, corrections = line.drives.reference, self.corrections
@@ -100,7 +95,7 @@ class ControlCycle:
                 motors = motors.corrected(command, corrections.acceleration)
         measured = line.plant.step(command)
         self.sample = Sample(
-            mode, reference, line.shaped.joints.window, target, signals, command, measured, motors, refused,
+            mode, reference, line.shaped.joints.window, signals, command, measured, motors, refused
         )  # fmt: skip
         self._settle()  # last, so that the tick that comes to rest is still reported as one of the motion
         return self.sample
@@ -175,10 +170,12 @@ class ControlCycle:
 
     def _settle(self) -> None:
         """Rest if the motion is over: its trajectory has finished, and the shaped reference rests on its end."""
-        trajectory, mode, line, reference = self.trajectory, self.mode, self.line, self.sample.reference
-        over = trajectory.finished or (mode is LineMode.RUNNING_OUT and trajectory.standing)
-        if mode.at_rest or not over:
+        trajectory, mode = self.trajectory, self.mode
+        if mode.at_rest or not (
+            trajectory.finished or (mode is LineMode.RUNNING_OUT and trajectory.standing)
+        ):
             return
+        line, reference = self.line, self.sample.reference
         if (mode.shaped and not line.filter.settled) or not self.sample.target.rests_at(reference, PERIOD):
             return
         on_path = line.shaped.posture_of is not None
@@ -211,10 +208,9 @@ class ControlCycle:
         self.corrections.drop()
         self.placements += 1
         signals = line.rest_at(q)
-        target = Target(*signals[Q:TORQUE])
-        command = line.drives.command(target, signals, line.dynamics.payload_parameters)
+        command = line.drives.command(signals, line.dynamics.payload_parameters)
         if measured is None and isinstance(plant, Placeable):
             measured = plant.reset(command, payload=carried, seed=seed)
         assert measured is not None, "what cannot be placed is measured"
-        self.sample = Sample(self.mode, q, line.shaped.joints.window, target, signals, command, measured)
+        self.sample = Sample(self.mode, q, line.shaped.joints.window, signals, command, measured)
         return self.sample

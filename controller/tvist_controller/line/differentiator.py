@@ -87,6 +87,13 @@ def differentiate(before: Floats, middle: Floats, last: Floats, period: float, r
         rates[1, j] = (rise - fall) / (period * period)
 
 
+def middle_of(window: tuple[Floats, Floats, Floats], period: float) -> Target:
+    """Return the state of motion at the middle one of three references; arguments as in `differentiate`."""
+    rates = np.empty((2, len(window[1])))
+    differentiate(*window, period, rates)
+    return Target(window[1], rates[0], rates[1])
+
+
 class Differentiator:
     """Central differences: q̇ᵢ = (qᵢ₊₁ - qᵢ₋₁)/2h and q̈ᵢ = (qᵢ₊₁ - 2qᵢ + qᵢ₋₁)/h².
 
@@ -103,7 +110,9 @@ class Differentiator:
 
     def reset(self, q: Floats) -> None:
         """Restart at rest."""
-        self._before = self._middle = self._last = np.array(q, dtype=float)
+        at = np.array(q, dtype=float)
+        self.window: tuple[Floats, Floats, Floats] = (at, at, at)
+        """The last three references, the oldest first, each of shape (n,) [rad]; arrays that never change."""
 
     def fork(self) -> Self:
         """Return an independent copy of the present state."""
@@ -116,30 +125,18 @@ class Differentiator:
 
     def push(self, q: Floats) -> None:
         """Take the reference of this tick."""
-        self._before, self._middle, self._last = self._middle, self._last, q
-
-    @property
-    def window(self) -> tuple[Floats, Floats, Floats]:
-        """The last three references, the oldest first, each of shape (n,) [rad]."""
-        return self._before, self._middle, self._last
+        _, middle, last = self.window
+        self.window = (middle, last, q)
 
     @property
     def published(self) -> Target:
         """State of motion one tick before the newest reference, where central differences are accurate to order h²."""
-        return Target(*self.rows)
-
-    @property
-    def rows(self) -> Floats:
-        """Position, velocity and acceleration of `published`, shape (3, n)."""
-        rows = np.empty((3, len(self._middle)))
-        rows[0] = self._middle
-        differentiate(self._before, self._middle, self._last, self._period, rows[1:])
-        return rows
+        return middle_of(self.window, self._period)
 
     @property
     def position(self) -> Floats:
         """The newest reference, shape (n,) [rad]."""
-        return self._last
+        return self.window[2]
 
     @property
     def newest(self) -> Target:
@@ -147,11 +144,11 @@ class Differentiator:
 
         A motion continued from these derivatives has the second difference q̈ at its first tick.
         """
-        return self._state(self._before, self._middle, self._last)
+        return self._state(*self.window)
 
     def after(self, q: Floats) -> Target:
         """Return what `newest` will be after this next reference."""
-        return self._state(self._middle, self._last, q)
+        return self._state(self.window[1], self.window[2], q)
 
     def _state(self, before: Floats, middle: Floats, last: Floats) -> Target:
         rates = np.empty((2, len(last)))

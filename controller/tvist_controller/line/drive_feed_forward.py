@@ -2,13 +2,13 @@
 
 from typing import Self
 
+import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.joint_controllers import JointControllers
-from tvist_controller.line.line_tick import Q_R, STATIC, TORQUE
+from tvist_controller.line.line_tick import Q_R, QD, QD_R, QDD, STATIC, TORQUE, TORQUE_FF, Q
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 
@@ -19,12 +19,8 @@ FADE = 150
 class MotorReference(Struct, frozen=True, eq=False, gc=False):
     """Motion of the motors that elastic feed-forward asks for."""
 
-    qd: Floats
-    """Velocity q̇* + ẇ, shape (n,) [rad/s]."""
-    qdd: Floats
-    """Acceleration q̈* + ẅ, shape (n,) [rad/s^2]."""
-    torque: Floats
-    """Torque, shape (n,) [N m]."""
+    rows: Floats
+    """Velocity q̇* + ẇ [rad/s], acceleration q̈* + ẅ [rad/s^2] and torque [N m], shape (3, n)."""
     limited: bool
     """Whether ẅ was limited to the torque that the drives have left."""
 
@@ -35,9 +31,9 @@ class MotorReference(Struct, frozen=True, eq=False, gc=False):
             command: The corrected command.
             acceleration: Acceleration of the correction, of the first joints [rad/s^2].
         """
-        qdd = self.qdd.copy()
-        qdd[: len(acceleration)] += acceleration
-        return replace(self, qd=command.qd, qdd=qdd, torque=command.torque)
+        rows = np.array([command.qd, self.rows[1], command.torque])
+        rows[1, : len(acceleration)] += acceleration
+        return type(self)(rows, self.limited)
 
 
 class DriveFeedForward:
@@ -104,7 +100,6 @@ class DriveFeedForward:
 
     def command(
         self,
-        target: Target,
         signals: Floats,
         carried: Floats,
         *,
@@ -114,24 +109,28 @@ class DriveFeedForward:
         """Drive command for a target.
 
         Args:
-            target: Shaped reference and its derivatives.
-            signals: Torques of the rigid arm for it and the command of the paper's joint controllers, see `line_tick`.
+            signals: The target, the torques of the rigid arm for it and the command of the paper's joint controllers,
+                see `line_tick`.
             carried: Inertial parameters of the payload, see `InverseDynamics.payload_parameters`.
             may_begin: Whether the reference is smooth enough to begin with elastic feed-forward.
             may_go_on: Whether it is smooth enough to go on with it, as a stop is. A guided motion that is not shaped
                 may jump in acceleration, which motors cannot lead.
         """
-        self._fade(may_begin if self._share == 0 else may_go_on)
-        elastic, plain = self._elastic, DriveCommand(*signals[Q_R:])
+        if self._elastic is not None or self.wanted is not None:
+            self._fade(may_begin if self._share == 0 else may_go_on)
+        elastic, plain = self._elastic, DriveCommand(signals[Q_R], signals[QD_R], signals[TORQUE_FF])
         if elastic is None or self._share == 0:
             self.reference = None
             return plain
         command = elastic.command(
-            target, signals[TORQUE], carried, self._joints.sag(signals[STATIC]), smooth=may_begin
-        )
+            Target(signals[Q], signals[QD], signals[QDD]), signals[TORQUE], carried,
+            self._joints.sag(signals[STATIC]), smooth=may_begin,
+        )  # fmt: skip
+        motors = elastic.motors
         if self._share < FADE:
             command = self._blend(plain, command)
-        self.reference = MotorReference(command.qd, elastic.qdd, command.torque, elastic.limited)
+            motors = np.array([command.qd, motors[1], command.torque])
+        self.reference = MotorReference(motors, elastic.limited)
         return command
 
     @property

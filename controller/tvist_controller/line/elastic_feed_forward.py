@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.differentiator import Floats, Target
-from tvist_controller.line.elastic_lead import lead_of
+from tvist_controller.line.elastic_lead import Integers, lead_of
 from tvist_controller.line.elastic_model import ElasticModel
 from tvist_controller.line.motor_command import motor_command
 from tvist_plant.description import RobotDescription
@@ -15,6 +16,91 @@ LEAST_ROOM = 0.05
 """Share of a drive's torque limit that the lead may always need, however much the target needs [-]."""
 SETTLED = 1e-8
 """A lead below this counts as none [rad]."""
+ROTOR, FRICTION, MOST, LEAST, DRIVES = range(5)
+"""Rows of the parameters of the drives, see `lead_of` and `motor_command`; their number."""
+
+
+@compiled_for_ticks
+def keep(q: Floats, qd: Floats, qdd: Floats, torque: Floats, late: Floats) -> None:
+    """Keep a target and its torque for the next tick, arguments as in `command_motors`."""
+    for j in range(q.shape[0]):
+        late[0, j], late[1, j], late[2, j], late[3, j] = q[j], qd[j], qdd[j], torque[j]
+
+
+@compiled_for_ticks
+def command_motors(
+    q: Floats,
+    qd: Floats,
+    qdd: Floats,
+    torque: Floats,
+    late: Floats,
+    chain: Floats,
+    joints: Integers,
+    flexes: Integers,
+    springs: Floats,
+    bent: Floats,
+    before: Floats,
+    motion: Floats,
+    scratch: Floats,
+    jacobian: Floats,
+    loads: Floats,
+    leads: Floats,
+    drives: Floats,
+    law: Floats,
+    width: float,
+    linear: bool,
+    with_torques: bool,
+    smooth: bool,
+    ticks: int,
+    period: float,
+    motors: Floats,
+) -> bool:
+    """Compute the lead for a target, then what the motors get for the target of the tick before.
+
+    Args:
+        q: See `lead_of`, as for the next three.
+        qd: Velocity.
+        qdd: Acceleration.
+        torque: Torque of the rigid arm.
+        late: Target of the tick before and the torque that it needs, replaced by the present ones, shape (4, n).
+        chain: See `lead_of`, as for the next two.
+        joints: Indices of the joints.
+        flexes: Indices of the bending.
+        springs: Stiffness of each spring [N m/rad], and its damping time divided by the tick [-], shape (2, N).
+        bent: See `lead_of`, as for the next five.
+        before: Deflections of the tick before.
+        motion: Scratch.
+        scratch: Scratch.
+        jacobian: Scratch.
+        loads: Loads of the springs.
+        leads: What is wanted and what is led, see `follow`, shape (2, 3, n) [rad].
+        drives: Parameters of the drives, in the order of `ROTOR` and so on, shape (4, n).
+        law: See `motor_command`, as for the next two.
+        width: Width of the friction.
+        linear: Whether friction is linear.
+        with_torques: Whether torques count with the lead.
+        smooth: Whether the reference is, see `lead_of`.
+        ticks: Number of targets before this one.
+        period: Tick [s].
+        motors: Result, see `motor_command`.
+
+    Returns:
+        Whether the lead was limited.
+    """
+    n = q.shape[0]
+    needed = np.empty(n)
+    lead_of(
+        chain, q, qd, qdd, joints, flexes, springs[0], springs[1], bent, before, ticks == 0, smooth, period,
+        motion, scratch, jacobian, loads, leads[0], torque, drives[ROTOR], with_torques, needed,
+    )  # fmt: skip
+    if ticks == 0:
+        keep(q, qd, qdd, needed, late)
+    limited = motor_command(
+        late[0], late[1], late[2], late[3], leads[0], leads[1], ticks, drives[MOST], drives[LEAST],
+        drives[ROTOR], drives[FRICTION], width, linear, with_torques, period, law, motors,
+    )  # fmt: skip
+    keep(q, qd, qdd, needed, late)
+    return limited
 
 
 class ElasticFeedForward:
@@ -47,42 +133,47 @@ class ElasticFeedForward:
         drives, limits = description.drives, np.array(description.limits.torque)
         self.delay = period
         """Time by which commands are later than their targets [s]."""
-        self._period, self._torques = period, torques
-        self._model, self._springs = model, model.loads()
-        self._damping = model.damping_time / period
-        self._rotor = np.array(drives.rotor_inertia)
+        self._period = period
+        self._springs, n = model.loads(), description.joints
         friction = np.array(drives.coulomb_friction)
         self._law = np.zeros((0, 0)) if law is None else law
         largest = friction
         if law is not None:
             largest = law[0] * np.maximum(law[1], 1.0) + law[4] * np.array(description.limits.velocity)
-        self._most, self._least = TORQUE_SHARE * limits - largest, LEAST_ROOM * limits
-        self._linear, self._width = drives.linear_friction, drives.friction_width
-        self._friction = friction / self._width if self._linear else drives.friction_feedforward * friction
-        self._wanted, self._led = np.zeros((2, 3, description.joints))
-        self._before, self._loads = np.zeros(model.size), np.zeros((2, model.size))
-        self._bent = np.zeros((3, len(model.flexes)))
+        linear, width = drives.linear_friction, drives.friction_width
+        self._drives = np.zeros((DRIVES, n))
+        self._drives[ROTOR] = drives.rotor_inertia
+        self._drives[FRICTION] = friction / width if linear else drives.friction_feedforward * friction
+        self._drives[MOST], self._drives[LEAST] = TORQUE_SHARE * limits - largest, LEAST_ROOM * limits
+        self._leads = np.zeros((2, 3, n))
+        springs, damping = self._springs, model.damping_time / period
+        self._parts = (
+            np.zeros((4, n)), springs.chain, model.joints, model.flexes, np.array([model.stiffness, damping]),
+            np.zeros((3, len(model.flexes))), np.zeros(model.size), springs.motion, springs.scratch,
+            springs.jacobian, np.zeros((2, model.size)), self._leads, self._drives, self._law, width, linear, torques,
+        )  # fmt: skip
+        """Arguments of `command_motors` after the target and its torque."""
         self._ticks = 0
-        self._late: tuple[Target, Floats, Floats | None] | None = None
-        """Target of the tick before, its torque with that of the rotors, and its sag."""
-        self.qdd: Floats = np.zeros(description.joints)
-        """Acceleration q̈* + ẅ of the last command, shape (n,) [rad/s^2]."""
+        self._sag: Floats | None = None
+        """Sag of the target before."""
+        self.motors: Floats = np.zeros((3, n))
+        """Velocity [rad/s], acceleration [rad/s^2] and torque [N m] of the last command, shape (3, n)."""
         self.limited = False
         """Whether the lead's acceleration was limited at the last tick."""
 
     def reset(self) -> None:
         """Restart with the lead of the next targets."""
-        self._late, self._ticks, self.limited = None, 0, False
+        self._ticks, self.limited = 0, False
 
     @property
     def settled(self) -> bool:
         """Whether the motors do not lead, and have not led for some ticks."""
-        return self._late is None or float(np.abs(self._led).max()) < SETTLED
+        return self._ticks == 0 or float(np.abs(self._leads[1]).max()) < SETTLED
 
     def rehearse(self) -> None:
         """Compute commands at rest, since the first ones load compiled code, which takes many ticks."""
-        still = np.zeros((3, len(self._rotor)))
-        for _ in range(len(self._led) + 2):
+        still = np.zeros_like(self.motors)
+        for _ in range(len(still) + 2):
             self.command(Target(*still), still[0], np.zeros(10))
         self.reset()
 
@@ -104,24 +195,14 @@ class ElasticFeedForward:
             sag: A further lead, by the twist of the gears under gravity, shape (n,) [rad].
             smooth: Whether the reference is, so that its sixth derivative says how bending links accelerate.
         """
-        model, springs, first = self._model, self._springs, self._late is None
-        springs.carry(carried)
-        needed, command, qdd = np.empty(len(torque)), np.empty((3, len(torque))), np.empty(len(torque))
-        lead_of(
-            springs.chain, target.q, target.qd, target.qdd, model.joints, model.flexes, model.stiffness, self._damping,
-            self._bent, self._before, first, smooth, self._period, springs.motion, springs.scratch, springs.jacobian,
-            self._loads, self._wanted, torque, self._rotor, self._torques, needed,
-        )  # fmt: skip
-        late, its_torque, its_sag = self._late or (target, needed, sag)
-        self._late = (target, needed, sag)
-        self.limited = motor_command(
-            late.q, late.qd, late.qdd, its_torque, self._wanted, self._led, self._ticks, self._most, self._least,
-            self._rotor, self._friction, self._width, self._linear, self._torques, self._period, self._law,
-            command, qdd,
-        )  # fmt: skip
-        self.qdd, self._ticks = qdd, self._ticks + 1
-        q, qd, motor_torque = command
+        self._springs.carry(carried)
+        motors = np.empty((4, len(torque)))
+        self.limited = command_motors(
+            target.q, target.qd, target.qdd, torque, *self._parts, smooth, self._ticks, self._period, motors
+        )
+        its_sag, self._sag = sag if self._ticks == 0 else self._sag, sag
+        self.motors, self._ticks = motors[1:], self._ticks + 1
         if sag is not None and its_sag is not None:
-            q += its_sag
-            qd += (sag - its_sag) / self._period
-        return DriveCommand(q=q, qd=qd, torque=motor_torque)
+            motors[0] += its_sag
+            motors[1] += (sag - its_sag) / self._period
+        return DriveCommand(motors[0], motors[1], motors[3])

@@ -43,8 +43,10 @@ class LineFilter:
     @property
     def fault(self) -> str | None:
         """Name of a shaper that could compute no weights at the last tick, with the reason; None if there is none."""
-        fade = self._fade
-        filters = (self.tvist,) if fade is None else (self.tvist, fade.old, fade.new)
+        fade, tvist = self._fade, self.tvist
+        if fade is None and tvist.fault is None:  # as at nearly every tick
+            return None
+        filters = (tvist,) if fade is None else (tvist, fade.old, fade.new)
         return next((f"shaper {one.name} {one.fault}" for one in filters if one.fault is not None), None)
 
     @property

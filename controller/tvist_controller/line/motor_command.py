@@ -58,8 +58,7 @@ def motor_command(
     with_torques: bool,
     period: float,
     law: Floats,
-    command: Floats,
-    acceleration: Floats,
+    motors: Floats,
 ) -> bool:
     """Let the motors lead, and compute what the drives get for the tick before.
 
@@ -80,8 +79,8 @@ def motor_command(
         with_torques: Whether the torques count with the lead.
         period: Tick [s].
         law: Identified friction, see `friction_at`, which then counts instead; shape (0, 0) if there is none.
-        command: Result: positions [rad], velocities [rad/s] and torques [N m] of the motors, shape (3, n).
-        acceleration: Result: that of the motors, shape (n,) [rad/s^2].
+        motors: Result: positions [rad], velocities [rad/s], accelerations [rad/s^2] and torques [N m] of the motors,
+            shape (4, n).
 
     Returns:
         Whether the lead was limited.
@@ -98,14 +97,14 @@ def motor_command(
         limited = follow(wanted, led, room, period)
     for j in range(n):
         rise = (led[0, j] - 2.0 * led[1, j] + led[2, j]) / (period * period)
-        command[0, j] = q[j] + led[1, j]
-        command[1, j] = qd[j] + (led[0, j] - led[2, j]) / (2.0 * period)
-        speed = command[1, j] if with_torques else qd[j]
+        motors[0, j] = q[j] + led[1, j]
+        motors[1, j] = qd[j] + (led[0, j] - led[2, j]) / (2.0 * period)
+        motors[2, j] = qdd[j] + rise
+        speed = motors[1, j] if with_torques else qd[j]
         if law.shape[0] > 0:
-            command[2, j] = torque[j] + friction_at(law, j, speed)
+            motors[3, j] = torque[j] + friction_at(law, j, speed)
         else:
-            command[2, j] = torque[j] + friction[j] * (speed if linear else np.tanh(speed / width))
+            motors[3, j] = torque[j] + friction[j] * (speed if linear else np.tanh(speed / width))
         if with_torques:
-            command[2, j] += rotor[j] * rise
-        acceleration[j] = qdd[j] + rise
+            motors[3, j] += rotor[j] * rise
     return limited

@@ -6,7 +6,7 @@ from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.drive_feed_forward import MotorReference
 from tvist_controller.line.guard import Obstacle
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.line.line_tick import TORQUE
+from tvist_controller.line.line_tick import QD, QDD, TORQUE, Q
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import Measurement
 
@@ -20,8 +20,6 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
     """q before shaping, shape (n,) [rad]."""
     window: tuple[Floats, Floats, Floats]
     """The last three shaped references, the newest last, each of shape (n,) [rad]."""
-    target: Target
-    """q* and its derivatives at the previous tick, since central differences cost one tick of delay."""
     signals: Floats
     """All signals before the arm, shape (9, n), see `line_tick`."""
     command: DriveCommand
@@ -32,6 +30,11 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
     """Motion of the motors that elastic feed-forward asks for; None without it."""
     refused: Obstacle | None = None
     """Why a reference was not played, so that a stop was made instead; None if it was played."""
+
+    @property
+    def target(self) -> Target:
+        """q* and its derivatives at the previous tick, since central differences cost one tick of delay."""
+        return Target(self.signals[Q], self.signals[QD], self.signals[QDD])
 
     @property
     def torque(self) -> Floats:

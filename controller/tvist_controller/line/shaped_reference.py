@@ -50,26 +50,31 @@ class ShapedReference:
         """State of motion of the joints there, see `Differentiator.newest`."""
         return self.joints.newest
 
+    def take(self, x: Floats, x_star: Floats) -> Floats:
+        """Take the samples of this tick, shape (m,) or (n,) [rad].
+
+        Args:
+            x: Sample before shaping.
+            x_star: Shaped sample, which is x itself where nothing is shaped.
+
+        Returns:
+            Joint positions before shaping, shape (n,) [rad].
+        """
+        if self.posture_of is None:
+            self.joints.push(x_star)
+            return x
+        q = self.posture_of(x)
+        self.along.push(x_star)
+        self.joints.push(q if x_star is x else self.posture_of(x_star))
+        return q
+
     def posture(self, sample: Floats) -> Floats:
         """Return the joint positions that a sample stands for, shape (n,) [rad]."""
         return sample if self.posture_of is None else self.posture_of(sample)
 
-    def push(self, sample: Floats, posture: Floats | None = None) -> None:
-        """Take the sample of this tick.
-
-        Args:
-            sample: Sample, shape (m,) or (n,) [rad].
-            posture: The joint positions that it stands for, if they are known, shape (n,) [rad].
-        """
-        if self.posture_of is None:
-            self.joints.push(sample)
-            return
-        self.along.push(sample)
-        self.joints.push(self.posture_of(sample) if posture is None else posture)
-
-    def update(self, sample: Floats, posture: Floats | None = None) -> Target:
-        """Take the sample of this tick, as `push` does, and return the target of the previous tick."""
-        self.push(sample, posture)
+    def update(self, sample: Floats) -> Target:
+        """Take the shaped sample of this tick, and return the target of the previous tick."""
+        self.take(sample, sample)
         return self.joints.published
 
     def fork(self) -> Self:

@@ -3,7 +3,7 @@
 import numpy as np
 from msgspec import Struct
 
-from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.differentiator import Floats, middle_of
 from tvist_controller.line.kinematics import ForwardKinematics
 from tvist_controller.line.sample import Sample
 from tvist_controller.reporting.state_layout import Layout, width, write_state
@@ -13,6 +13,7 @@ from tvist_protocol.stream import State
 
 Key = tuple[object, ...]
 NOTHING: Floats = np.empty((0, 0))
+NOWHERE: Floats = np.empty(0)
 
 
 class Layouts:
@@ -36,8 +37,9 @@ class Report(Struct, gc=False):
     """Number of the tick."""
     sample: Sample
     """Signals along the control line."""
-    unshaped: Floats | None
-    """q, q̇ and q̈ without the filter at the tick of the target, shape (3, n); None if the target is that."""
+    unshaped: tuple[Floats, Floats, Floats] | None
+    """Three references without the filter around the tick of the target, the newest last; None if the target is that.
+    """
     modes: tuple[int, int, int]
     """Robot mode, safety mode and runtime state."""
     speed: float
@@ -83,16 +85,17 @@ class Report(Struct, gc=False):
             self.unshaped is None, motors is not None and motors.limited, motors is None, len(f_d),
         )  # fmt: skip
         template, places, integers = self.layouts.of(key, self)
-        leading = NOTHING if motors is None else np.array([motors.qd, motors.qdd, motors.torque])
-        unshaped = NOTHING if self.unshaped is None else self.unshaped
+        unshaped = self.unshaped or (NOWHERE, NOWHERE, NOWHERE)
         return write_state(
-            template, places, integers, tick, sequence or 0, tick * PERIOD, self.speed, self.delay, sample.signals,
-            unshaped, measured.q, measured.qd, measured.moment, measured.accelerometer,
-            self.kinematics.chain, self.kinematics.offset, f_d, self.zeta, leading,
+            template, places, integers, tick, sequence or 0, PERIOD, self.speed, self.delay, sample.signals,
+            *unshaped, measured.q, measured.qd, measured.moment, measured.accelerometer,
+            self.kinematics.chain, self.kinematics.offset, f_d, self.zeta,
+            NOTHING if motors is None else motors.rows,
         ).tobytes()  # fmt: skip
 
     def _make(self) -> State:
-        sample, unshaped, motors = self.sample, self.unshaped, self.sample.motors
+        sample, motors = self.sample, self.sample.motors
+        unshaped = None if self.unshaped is None else middle_of(self.unshaped, PERIOD)
         target, measured = sample.target, sample.measured
         motion = self.kinematics.motion(measured.q, measured.qd).tolist()
         robot_mode, safety_mode, runtime = self.modes
@@ -120,11 +123,11 @@ class Report(Struct, gc=False):
             shaper_delay=self.delay,
             missed_ticks=self.missed,
             shaper_clipped=self.clipped,
-            unshaped_q=None if unshaped is None else unshaped[0].tolist(),
-            unshaped_qd=None if unshaped is None else unshaped[1].tolist(),
-            unshaped_qdd=None if unshaped is None else unshaped[2].tolist(),
-            motor_qd=None if motors is None else motors.qd.tolist(),
-            motor_qdd=None if motors is None else motors.qdd.tolist(),
-            motor_moment=None if motors is None else motors.torque.tolist(),
+            unshaped_q=None if unshaped is None else unshaped.q.tolist(),
+            unshaped_qd=None if unshaped is None else unshaped.qd.tolist(),
+            unshaped_qdd=None if unshaped is None else unshaped.qdd.tolist(),
+            motor_qd=None if motors is None else motors.rows[0].tolist(),
+            motor_qdd=None if motors is None else motors.rows[1].tolist(),
+            motor_moment=None if motors is None else motors.rows[2].tolist(),
             motor_limited=motors is not None and motors.limited,
         )

@@ -35,7 +35,6 @@ class Reporter:
         sample: Sample,
         tvist: Filter,
         drive_delay: float,
-        *,
         modes: tuple[int, int, int],
         speed: float,
         setpoint_sequence: int | None,

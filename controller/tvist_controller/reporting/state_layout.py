@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.differentiator import Floats, differentiate
 from tvist_controller.line.kinematics import tool_motion
 from tvist_controller.line.line_tick import TORQUE
 from tvist_protocol.codec import encode
@@ -101,11 +101,13 @@ def write_state(
     integers: Integers,
     tick: int,
     sequence: int,
-    timestamp: float,
+    period: float,
     speed: float,
     delay: float,
     signals: Floats,
-    unshaped: Floats,
+    before: Floats,
+    middle: Floats,
+    last: Floats,
     q: Floats,
     qd: Floats,
     moment: Floats,
@@ -124,11 +126,13 @@ def write_state(
         integers: Place and encoded size of the tick and of the set-point's sequence number, shape (2, 2).
         tick: Number of the tick.
         sequence: Sequence number of the set-point, if there is one.
-        timestamp: Time of the tick [s].
+        period: Tick [s].
         speed: Share of the programmed speed [-].
         delay: Delay of the shaper and of the drives [s].
         signals: Signals before the arm, shape (9, n), see `line_tick`.
-        unshaped: Target without the filter, if there is one, shape (3, n) or (0, n).
+        before: First of three references without the filter, shape (n,) [rad]; (0,) if the target is what they tell.
+        middle: Second reference, that of the target.
+        last: Third reference.
         q: Measured angles, shape (n,) [rad].
         qd: Measured velocities, shape (n,) [rad/s].
         moment: Measured torques, shape (n,) [N m].
@@ -140,9 +144,15 @@ def write_state(
         motors: Velocities, accelerations and torques of the motors, if there are any, shape (3, n) or (0, n).
     """
     numbers = np.empty(places.shape[0])
-    numbers[0] = timestamp
+    numbers[0] = tick * period
     end = gather(numbers, speed, delay, signals, q, qd, moment, accelerometer, chain, tool, f_d, zeta)
-    end = append(numbers, end, unshaped)
+    unshaped: int = middle.shape[0]
+    if unshaped > 0:
+        for j in range(unshaped):
+            numbers[end + j] = middle[j]
+        rates = numbers[end + unshaped : end + 3 * unshaped].reshape(2, unshaped)
+        differentiate(before, middle, last, period, rates)
+        end += 3 * unshaped
     append(numbers, end, motors)
     out, bits = template.copy(), numbers.view(np.uint64)
     for i in range(places.shape[0]):

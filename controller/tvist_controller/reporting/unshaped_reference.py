@@ -1,8 +1,7 @@
 """The reference before shaping, with its derivatives at the tick of the target: what the arm would do unshaped."""
 
-from tvist_controller.line.differentiator import Differentiator, Floats
+from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
-from tvist_plant.plant import PERIOD
 
 REACH = 3
 """Number of references that a central difference of second order uses."""
@@ -12,16 +11,16 @@ class UnshapedReference:
     """Central differences of the reference before shaping, as long as they are not those of the shaped one."""
 
     def __init__(self) -> None:
-        self._apart: Differentiator | None = None
-        """State of motion of the reference, if one of its last samples was not the shaped one; else None."""
+        self._apart: tuple[Floats, Floats, Floats] | None = None
+        """The last three references, if one of the last samples was not the shaped one; else None."""
         self._alike = 0
 
     def join(self) -> None:
         """Continue from the shaped reference, since the arm was put at rest; the reference may have jumped."""
         self._apart, self._alike = None, 0
 
-    def of(self, sample: Sample) -> Floats | None:
-        """Take a tick, and return q, q̇ and q̈ before shaping at the tick of its target, shape (3, n).
+    def of(self, sample: Sample) -> tuple[Floats, Floats, Floats] | None:
+        """Take a tick, and return the three references before shaping around the tick of its target, the newest last.
 
         A motion that bypasses the filter continues the shaped reference, so from its beginning both are the same; the
         derivatives do not know of the reference's jump.
@@ -41,10 +40,7 @@ class UnshapedReference:
         if self._alike == REACH:
             self.join()
             return None
-        apart = self._apart
-        if apart is None:
-            apart = self._apart = Differentiator(middle, PERIOD)
-            apart.push(before)
-            apart.push(middle)
-        apart.push(reference)
-        return apart.rows
+        if self._apart is not None:
+            _, before, middle = self._apart
+        self._apart = before, middle, reference
+        return self._apart

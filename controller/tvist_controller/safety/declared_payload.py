@@ -61,7 +61,7 @@ class DeclaredPayload:
         if self._held:
             self.begin_anew()
         why = self._monitor.update(
-            sample.target, sample.fed_forward, sample.measured.moment, at_rest=sample.mode.at_rest
+            sample.signals, sample.command.torque, sample.measured.moment, at_rest=sample.mode.at_rest
         )
         if why is not None:
             self._emit("warning", code="payload_mismatch", why=why)

@@ -4,8 +4,9 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.inverse_dynamics import SLEW
+from tvist_controller.line.line_tick import QD, QDD, Q
 from tvist_plant.chain import BODY, SCRATCH, chain_of, torques
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, carries_weight, rigid_model
@@ -172,12 +173,12 @@ class PayloadMonitor:
         return float(self._yr[memory] / self._yy[memory]), float(self._bound[memory] / self._yy[memory])
 
     def update(
-        self, target: Target, expected: Floats, moment: Floats, *, at_rest: bool = False
+        self, signals: Floats, expected: Floats, moment: Floats, *, at_rest: bool = False
     ) -> str | None:
         """Take one tick in which the drives hold the arm.
 
         Args:
-            target: Shaped reference at the tick.
+            signals: Signals before the arm with the target, see `line_tick`, shape (9, n).
             expected: Feed-forward torque for it, with rotors and friction, shape (n,) [N m].
             moment: Motor torques measured at the end of the tick, shape (n,) [N m].
             at_rest: Whether the shaped reference rests, on which a robot that follows its payload depends.
@@ -193,7 +194,7 @@ class PayloadMonitor:
         if self._ticks < EVERY:
             return None
         square, product, bound = correlate(
-            self._chain, target.q, target.qd, target.qdd, self._scratch, self._friction, self._sum
+            self._chain, signals[Q], signals[QD], signals[QDD], self._scratch, self._friction, self._sum
         )
         self._ticks, self._sum[:] = 0, 0.0
         fade = self._fade

@@ -80,20 +80,21 @@ class Protection:
         self._cycle = cycle
         self._overload = Overload(cycle.description.limits.torque)
 
-    def dangers(self, sample: Sample) -> list[Danger]:
+    def dangers(self, sample: Sample) -> Sequence[Danger]:
         """Return the dangers after a tick, usually none.
 
         Args:
             sample: Signals along the control line.
         """
+        joint, fault = self._overload.joint(sample.measured.moment), self._cycle.line.filter.fault
+        if joint is None and fault is None:
+            return ()
         found: list[Danger] = []
-        joint = self._overload.joint(sample.measured.moment)
         if joint is not None:
             name, limit = self._cycle.description.robot.joints[joint], self._overload.limits[joint]
             moment = sample.measured.moment[joint]
             why = f"torque of joint {name} is {moment:.0f} N m, beyond its limit of {limit:g} for more than 10 ms"
             found.append(Danger(why, "limit_torque"))
-        fault = self._cycle.line.filter.fault
         if fault is not None:  # the filter continues with old weights, because its shaper's function fails
             found.append(Danger(fault, None))
         return found

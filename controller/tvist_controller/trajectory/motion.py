@@ -117,7 +117,7 @@ class PlannedMotion(Trajectory):
 
     def next(self) -> Floats:
         """Advance by one tick and return the parameter, which is exactly the path's end from the end time on."""
-        if self.steady:
+        if self._pace.steady(self.speed):
             self._ticks += 1
         else:
             time = self.time
@@ -125,9 +125,8 @@ class PlannedMotion(Trajectory):
             curve = [self._paced(end) for end in ends]
             step = self._pace.advance(self.speed, curve)
             self._since, self._ticks = time + step, 0
-        if self.finished:
-            return self.path.end
-        return np.array(self.law.at(self.time)[0])
+        time = self.time
+        return self.path.end if time >= self.duration else np.array(self.law.at(time)[0])
 
     def go_on(self, longer: "PlannedMotion") -> None:
         """Go on as a longer motion, which is the same until now and for some ticks more, along a `SplineCurve`."""
