@@ -1,4 +1,4 @@
-"""What streams and their look-ahead compute at every tick, compiled: against its own Python source, and against others."""
+"""What streams and their look-ahead compute at every tick, compiled, against its own Python source and others."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,9 @@ def test_a_stream_is_played_alike_in_python_to_the_bit(period, share, in_python)
     """Within its limits, at them and beyond."""
     from tvist_controller.trajectory import MotionLimits, SetpointStream
 
-    wanted = there_and_back(MotionLimits(share * PAPER.velocity, share * PAPER.acceleration, share * PAPER.jerk))
+    wanted = there_and_back(
+        MotionLimits(share * PAPER.velocity, share * PAPER.acceleration, share * PAPER.jerk)
+    )
     arrivals = network(wanted, period, 1.2, seed=3, jitter=1.2, loss=0.02)
     room = StreamTorqueRoom(UR5E, InverseDynamics(UR5E, UR5E.payload))
 
@@ -74,11 +76,13 @@ def test_the_room_of_the_torque_is_that_of_numpy_to_the_bit(arm, in_python):
             found = room.acceleration(q, qd)
             assert found == max(wanted, 1.0)
             assert found == in_python(lambda room=room, q=q, qd=qd: room.acceleration(q, qd))
-            qdd = qdd * found
-            fits = bool((dynamics.effort(q, qd, qdd) <= most).all())
+            pushed = qdd * found
+            fits = bool((dynamics.effort(q, qd, pushed) <= most).all())
             if beyond:
-                fits &= bool((dynamics.effort(q, qd, 2.0 * qdd) <= np.array(description.limits.torque)).all())
-            assert room.allows(q, qd, qdd) == (fits or np.abs(qdd).max() <= 1.0)
+                fits &= bool(
+                    (dynamics.effort(q, qd, 2.0 * pushed) <= np.array(description.limits.torque)).all()
+                )
+            assert room.allows(q, qd, pushed) == (fits or np.abs(pushed).max() <= 1.0)
 
 
 def test_a_payload_that_is_phased_in_may_be_either():
@@ -133,13 +137,19 @@ def test_gaps_are_coals_and_shrink_no_faster_than_the_bound(payload, in_python):
         assert (np.abs(there - here) <= pairs[:, 2:] @ np.abs(turned) + 1e-9)[both].all()
 
 
-@pytest.mark.parametrize("arm", [UR5E, load("one-joint"), chain(7)], ids=["ur5e", "one-joint", "seven joints"])
+@pytest.mark.parametrize(
+    "arm", [UR5E, load("one-joint"), chain(7)], ids=["ur5e", "one-joint", "seven joints"]
+)
 def test_a_stop_that_is_proved_clear_is_found_clear(arm, in_python):
     random = np.random.default_rng(7)
     model, joints = CollisionModel(arm, arm.payload), arm.joints
     proved = clear = 0
     for _ in range(150):
-        q, qd, qdd = random.uniform(-2, 2, joints), random.uniform(-2, 2, joints), random.uniform(-9, 9, joints)
+        q, qd, qdd = (
+            random.uniform(-2, 2, joints),
+            random.uniform(-2, 2, joints),
+            random.uniform(-9, 9, joints),
+        )
         state, limit = Target(q, qd, qdd), float(random.choice([2.0, 9.0, 40.0]))
         spacious = model.stop_is_spacious(state, limit, 2000.0)
         stop = JointStop(q, qd, qdd, acceleration=limit, jerk=2000.0, period=H)
