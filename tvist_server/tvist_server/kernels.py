@@ -12,11 +12,11 @@ from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.loopback import LoopbackHost
 from tvist_kernels.cache import kernels, unkept
 from tvist_protocol.codec import decode_reply, encode
-from tvist_protocol.commands import Command, MoveJ, SetShaper, Stop, TakeControl
+from tvist_protocol.commands import Command, MoveJ, ServoStart, ServoStop, SetShaper, Stop, TakeControl
 from tvist_protocol.kinematics import ForwardKinematics
 from tvist_protocol.motions import MoveL
 from tvist_protocol.replies import Accepted, Refused, Reply, ToolPose
-from tvist_protocol.simulation import SimulationStep
+from tvist_protocol.simulation import SimulationStep, StepSetpoint
 from tvist_server.config_file import from_mapping
 from tvist_server.gateways.starting import Tell
 
@@ -120,6 +120,10 @@ def _line() -> None:
         SetShaper(token=token, name="auto"), MoveJ(token=token, q=bent), step,
         SetShaper(token=token, name="none", modes=2), back, step,
     ]  # fmt: skip
+    here = StepSetpoint(sequence=0, q=back.q)
+    for period in (0.002, 0.008):
+        stream = SimulationStep(token=token, ticks=10, setpoints=(here,))
+        commands += [ServoStart(token=token, period=period), stream, ServoStop(token=token), step]
     for command in commands:
         reply = ask(command)
         assert not isinstance(reply, Refused), reply

@@ -78,6 +78,7 @@ class ServedRobot:
         self.setup = setup = self.controller.setup
         if self._realtime:
             rehearse(self.controller.cycle)
+            self.controller.motion.ahead.rehearse()
         info_of(self.controller)  # computes the slowest part of the description once, before the first tick
         self.recorder = None
         if record is not None:

@@ -19,6 +19,7 @@ from typing import Any
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
+from tvist_controller.line.rehearsal import rehearse
 from tvist_controller.setup import Setup
 from tvist_server.assembly import protected
 from tvist_server.config import ConfigError, ServeConfig
@@ -271,7 +272,10 @@ def _rehearse(setup: Setup) -> None:
     """
     setup = replace(setup, plant=None)
     Planner(setup).rehearse()
-    Host(Controller(setup)).tick()
+    controller = Controller(setup)
+    Host(controller).tick()
+    rehearse(controller.cycle)
+    controller.motion.ahead.rehearse()
 
 
 def _listed(names: Sequence[str], part: range) -> str:

@@ -68,7 +68,7 @@ def gap(bodies: Floats, ends: Floats, one: int, other: int) -> float:
         t = min(max(t, 0.0), 1.0)
         s = min(max((b * t - c) / a, 0.0), 1.0) if a > 0.0 else 0.0
     x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
-    return math.sqrt(x * x + y * y + z * z) - bodies[one, RADIUS] - bodies[other, RADIUS]
+    return float(math.sqrt(x * x + y * y + z * z) - bodies[one, RADIUS] - bodies[other, RADIUS])
 
 
 @compiled_for_ticks

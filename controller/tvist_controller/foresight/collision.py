@@ -1,6 +1,5 @@
 """Collisions of the arm with itself and the floor: capsules of the robot file, distances by coal."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -17,7 +16,6 @@ from tvist_controller.foresight.clearance import (
     FLOOR,
     LINK,
     RADIUS,
-    SECOND,
     has_room,
     stop_has_room,
 )
@@ -87,7 +85,8 @@ class CollisionModel:
         for number in range(len(self._names)):
             self._bound(number)
         self._with_payload = np.array(
-            [PAYLOAD in (self._names[pair.first], self._names[pair.second]) for pair in self._pairs], dtype=bool
+            [PAYLOAD in (self._names[pair.first], self._names[pair.second]) for pair in self._pairs],
+            dtype=bool,
         )
         self._loaded = False
         self._bounds = self._bound_pairs()
@@ -283,7 +282,9 @@ class CollisionModel:
         ends = np.array([body.placement.translation - axis, body.placement.translation + axis])
         row[LINK], row[FIRST:RADIUS], row[RADIUS] = link, (ends @ turned).ravel(), radius
         own = radius + float(np.linalg.norm(ends, axis=1).max())
-        along = np.cumsum([np.linalg.norm(placement.translation) for placement in self._model.jointPlacements])
+        along = np.cumsum(
+            [np.linalg.norm(placement.translation) for placement in self._model.jointPlacements]
+        )
         self._far[number] = own + np.abs(along[link] - along[1:])
 
     def _bound_pairs(self) -> tuple[Floats, Floats, Floats, Floats]:

@@ -1,8 +1,5 @@
 """Check of streams of set-points and of guided motions: a reference is played only if a clear stop exists from it."""
 
-from collections.abc import Callable
-from functools import partial
-
 import numpy as np
 
 from tvist_controller.foresight.collision import CollisionModel, Meeting
@@ -44,7 +41,7 @@ class LookAhead(Guard):
     ) -> None:
         self._reach = reach
         self._collisions, self._stops, self._torque = collisions, stops, room
-        self._before: tuple[Target, Callable[[], JointStop]] | None = None
+        self._before: tuple[Target, float | JointStop] | None = None
         self.met: Meeting | None = None
         """Meeting that the latest refused reference would have led to."""
         self._outside: str | None = None
@@ -52,7 +49,7 @@ class LookAhead(Guard):
 
     def begin(self, state: Target) -> None:
         """Start from rest."""
-        self._before = state, self._within(state, GENTLEST_STOP)
+        self._before = state, GENTLEST_STOP
         self.met = self._outside = self._stuck = None
 
     def __call__(self, state: Target) -> JointStop | None:
@@ -65,12 +62,13 @@ class LookAhead(Guard):
 
     def take(self, state: Target, stop: JointStop) -> None:
         """Set the stop from the state of the newest reference, which is known to be clear."""
-        self._before = state, lambda: stop
+        self._before = state, stop
 
     def fallback(self) -> JointStop:
         """Return the stop from the state of the last reference played, which is known to be clear."""
         assert self._before is not None, "begin comes first"
-        return self._before[1]()
+        state, stop = self._before
+        return stop if isinstance(stop, JointStop) else self._stops.stop(state, stop)
 
     def give_up(self, why: str) -> JointStop:
         """Return the stop as in `fallback`, since no reference follows for this reason."""
@@ -107,21 +105,18 @@ class LookAhead(Guard):
         found = self._collisions.on_way(way, before=before)
         return None if found is None else found[1]
 
-    def _within(self, state: Target, acceleration: float) -> Callable[[], JointStop]:
-        """Return a function that makes the stop when it is needed."""
-        return partial(self._stops.stop, state, acceleration)
-
-    def _permitted(self, state: Target) -> Callable[[], JointStop] | None:
-        """Return a function that makes a clear stop; None if there is none."""
+    def _permitted(self, state: Target) -> float | JointStop | None:
+        """Return a clear stop, or the acceleration of one that is made when it is needed; None if there is none."""
         stops = self._stops
         allowed = MARGIN * self._torque.acceleration(state.q, state.qd)
         acceleration = min(max(allowed, GENTLEST_STOP), stops.highest)
-        inside = self._reach is None or self._is_inside(state.q, self.turned(state.qd, state.qdd, acceleration))
+        inside = self._reach is None or self._is_inside(
+            state.q, self.turned(state.qd, state.qdd, acceleration)
+        )
         if inside and self._collisions.stop_is_spacious(state, acceleration, stops.jerk):
-            return self._within(state, acceleration)
+            return acceleration
         stop = stops.stop(state, acceleration)
-        found = stop if self.clear(stop) else stops.by_joints(state, None, self.clear)
-        return None if found is None else lambda: found
+        return stop if self.clear(stop) else stops.by_joints(state, None, self.clear)
 
     def _is_inside(self, q: Floats, turned: Floats) -> bool:
         """Return whether the joints can certainly turn by these angles around q inside their range."""

@@ -56,17 +56,17 @@ def keeps_torque(
     """Return whether a state of motion keeps within torques, shape (n,) [N m]; see `tvist_plant.chain.torques`."""
     found = np.empty(q.shape[0])
     torques(chain, q, qd, qdd, gravity, scratch, found)
+    keeps = True
     for j in range(q.shape[0]):
-        if not abs(found[j]) <= most[j]:
-            return False
-    return True
+        keeps = keeps and abs(found[j]) <= most[j]
+    return keeps
 
 
 @compiled_for_ticks
 def torque_room(
     chain: Floats, q: Floats, qd: Floats, gravity: float, scratch: Floats, most: Floats, share: float
 ) -> float:
-    """Return the largest acceleration of all joints at once that keeps torques, shape (n,) [N m], whatever its direction.
+    """Return the largest acceleration of all joints at once, in any direction, that keeps torques, shape (n,) [N m].
 
     Args:
         chain: As in `tvist_plant.chain.torques`; also q, qd, gravity and scratch.

@@ -4,10 +4,12 @@ import numpy as np
 
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.limits import StreamTorqueRoom, arm_limits
+from tvist_controller.trajectory import SetpointStream
 from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import Measurement, PlantTruth
+from tvist_plant.plant import PERIOD, Measurement, PlantTruth
 
 
 class Still:
@@ -51,3 +53,12 @@ def rehearse(cycle: ControlCycle) -> None:
     other.line.filter.rehearse(q)  # a transition between filters has kernels of its own
     for _ in range(3):
         other.step()
+    limits, room = arm_limits(description), StreamTorqueRoom(description, other.line.dynamics)
+    for period in (
+        PERIOD,
+        4.0 * PERIOD,
+    ):  # the curves through set-points at the line's own rate and at a lower one
+        stream = SetpointStream(q, period, limits, PERIOD, torque=room)
+        for number in range(4):
+            stream.offer(number, q)
+            stream.next()

@@ -179,8 +179,7 @@ class SetpointStream(Trajectory):
         if not self._complete(origin + after + self._look_ahead - 1):
             return self._wait()
         self._pause = None
-        q, qd = self._curve(self._points, offset - after + 1.0, play_out.rate / self._period)
-        self._speed = max(map(abs, qd.tolist()))
+        q, qd, self._speed = self._curve(self._points, offset - after + 1.0, play_out.rate / self._period)
         return q, qd
 
     def _complete(self, needed: int) -> bool:
