@@ -32,6 +32,7 @@ from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.program_request import ProgramRequests
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.session import RtdeSession
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.ur_ports import InterfaceName
@@ -92,7 +93,7 @@ class UrInterfaces(Gateway):
         self._requests = ProgramRequests()
         external = ExternalControl(programs, self._requests.fetch)
         self.robot = UrRobot(description, name, self._tell, external, self._scripts.tell, self._refusals.tell)
-        self._instruments = Instruments(description)
+        self._instruments, self._board = Instruments(description), Board()
         self._io: Io | None = None
         self._early = deque[Tick](maxlen=FIRST)
         """States from before the interfaces open, since temperatures and energies begin with the first tick."""
@@ -303,6 +304,8 @@ class UrInterfaces(Gateway):
             return GripperSession(
                 self._gripper, send, lambda answer: self._soon(lambda: control.hear(answer))
             )
+        if interface == "rtde":
+            return RtdeSession(self.robot, control, send, self._board)
         return _session(interface, self.robot, control, send)
 
     def _lease(self, host: str) -> HostLease:
@@ -333,8 +336,6 @@ def _session(interface: InterfaceName, robot: UrRobot, control: ConnectionContro
     match interface:
         case "dashboard":
             return DashboardSession(robot, control, send)
-        case "rtde":
-            return RtdeSession(robot, control, send)
         case "interpreter":
             return InterpreterSession(robot, control, send)
         case "realtime" | "realtime_read_only":
