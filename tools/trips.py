@@ -27,6 +27,7 @@ from tvist_server.config import ServeConfig
 from tvist_server.gateways.base import Gateway, Message
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
+from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.session import RtdeSession
 from tvist_server.robot import ServedRobot
 
@@ -165,7 +166,7 @@ def rtde() -> Trip:
     interfaces = UrInterfaces(robot.reception, robot.setup.description, "ur5e", "127.0.0.1", {})
     lease = HostLease(robot.reception, "127.0.0.1", lambda call: call())
     lease.adopt(bench.token, bench)
-    session = RtdeSession(interfaces.robot, ConnectionControl(lease), lambda _: None)
+    session = RtdeSession(interfaces.robot, ConnectionControl(lease), lambda _: None, Board())
     instruments = Instruments(robot.setup.description)
     bench.tick()
 

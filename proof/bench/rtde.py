@@ -12,7 +12,12 @@ from tvist_plant.plant import PERIOD
 from tvist_server.ur_ports import UrPorts
 
 CLIENTS = 10
-"""Number of RTDE clients at 500 Hz, each with a different recipe."""
+"""Number of RTDE clients at 500 Hz."""
+KINDS = (
+    ("rtde_us_per_client_and_tick", CLIENTS, "ten with different recipes"),
+    ("rtde_us_per_client_of_one_recipe", 1, "ten with the same recipe"),
+)
+"""Figures: key, number of recipes, and who reads."""
 ROUNDS = 5
 """Number of rounds of measurements."""
 SHORTEST = 2.0
@@ -30,28 +35,29 @@ async def rtde(seconds: float, tell: Callable[[str], None]) -> dict[str, Figure]
         tell: Called with a description of each measurement before it starts.
     """
     port, bare_port = str(free_port()), str(free_port())
-    part, several = max(SHORTEST, seconds / ROUNDS), str(CLIENTS)
-    ours, theirs = [], []
+    part = max(SHORTEST, seconds / ROUNDS)
+    found: dict[str, Figure] = {}
     async with served(_options(port)) as server, helper("bare_send", ADDRESS, bare_port) as sender:
         await server.robot.state()
-        for number in range(ROUNDS):
-            tell(
-                f"round {number + 1} of {ROUNDS}: a robot and a bare sender, without and with {CLIENTS} clients"
-            )
-            _, alone = await punctuality(server, part)
-            async with readers("rtde_clients", ADDRESS, port, several) as said:
-                _, share = await punctuality(server, part)
-            assert all(one["received"] for one in said), "a client has received nothing"
-            ours.append(share - alone)
-            alone = await _share(sender.pid, part)
-            async with readers("rtde_clients", ADDRESS, bare_port, several):
-                theirs.append(await _share(sender.pid, part) - alone)
-    scale = 1e6 * PERIOD / CLIENTS
-    found = figure(
-        "an RTDE client, of ten with different recipes", "µs per tick", [scale * share for share in ours],
-        "a bare send() of as many bytes", [scale * share for share in theirs],
-    )  # fmt: skip
-    return {"rtde_us_per_client_and_tick": found}
+        for key, recipes, what in KINDS:
+            shared = str(CLIENTS), str(recipes)
+            ours, theirs = [], []
+            for number in range(ROUNDS):
+                tell(f"round {number + 1} of {ROUNDS}: a robot and a bare sender, without and with {what}")
+                _, alone = await punctuality(server, part)
+                async with readers("rtde_clients", ADDRESS, port, *shared) as said:
+                    _, share = await punctuality(server, part)
+                assert all(one["received"] for one in said), "a client has received nothing"
+                ours.append(share - alone)
+                alone = await _share(sender.pid, part)
+                async with readers("rtde_clients", ADDRESS, bare_port, *shared):
+                    theirs.append(await _share(sender.pid, part) - alone)
+            scale = 1e6 * PERIOD / CLIENTS
+            found[key] = figure(
+                f"an RTDE client, of {what}", "µs per tick", [scale * share for share in ours],
+                "a bare send() of as many bytes", [scale * share for share in theirs],
+            )  # fmt: skip
+    return found
 
 
 async def _share(pid: int, seconds: float) -> float:

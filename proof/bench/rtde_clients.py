@@ -1,6 +1,6 @@
-"""Clients of RTDE that read at 500 Hz, each with a recipe of its own, all in this process.
+"""Clients of RTDE that read at 500 Hz, all in this process.
 
-    python -m proof.bench.rtde_clients ADDRESS PORT COUNT
+    python -m proof.bench.rtde_clients ADDRESS PORT COUNT RECIPES
 
 A line on stdout says that all of them read. They read until stdin ends; then another line gives the number of
 packages that each received.

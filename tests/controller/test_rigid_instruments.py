@@ -5,8 +5,16 @@ import pinocchio as pin
 import pytest
 
 from tvist_controller.instruments import wrench as module
+from tvist_controller.instruments.joint_lists import (
+    ACTUAL_MOMENT,
+    ACTUAL_Q,
+    ROWS,
+    SHAPED_MOMENT,
+    SHAPED_QD,
+    SHAPED_QDD,
+)
 from tvist_controller.instruments.rigid_body import RigidBody
-from tvist_controller.instruments.wrench import DAMPING, NEAR_SINGULAR, ToolWrench, determinant
+from tvist_controller.instruments.wrench import DAMPING, NEAR_SINGULAR, determinant
 from tvist_controller.line.kinematics import ForwardKinematics, rotation_vector
 from tvist_plant.chain import chain_of
 from tvist_plant.description import Payload, load
@@ -39,7 +47,7 @@ def test_the_tool_moves_as_differences_of_its_poses_say(arm, offset):
     h = 1e-4
     for _ in range(20):
         q, qd, qdd = random.uniform(-2.0, 2.0, (3, 6))
-        tool = body.tool(q, qd, qdd, list(offset))
+        tool = body.tool(np.array([q, qd, qdd]), list(offset))
         position, rotation, J = placed(model, q, offset)
         np.testing.assert_allclose(tool[:3], position, atol=1e-12)
         np.testing.assert_allclose(pin.exp3(tool[3:6]), rotation, atol=1e-12)
@@ -80,11 +88,12 @@ def test_the_force_is_that_of_the_formula(arm, offset, plain, monkeypatch):
         for name, function in vars(module).copy().items():
             if hasattr(function, "py_func"):
                 monkeypatch.setattr(module, name, function.py_func)
-    model, wrench, random = rigid_model(arm, Payload()), ToolWrench(arm), np.random.default_rng(4)
+    model, random = rigid_model(arm, Payload()), np.random.default_rng(4)
+    links = chain_of(model, model.getFrameId(FLANGE))
     for q in (*random.uniform(-2.0, 2.0, (20, 6)), np.array(STRETCHED)):
-        torque = random.uniform(-50.0, 50.0, 6)
+        torque, found = random.uniform(-50.0, 50.0, 6), np.empty(6)
         wanted = by_numpy(placed(model, q, offset)[2], torque)
-        found = wrench.at_tool(q, torque, offset)
+        module.force_at(links, np.array(offset[:3]), q, torque, found)
         np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-6 * np.abs(wanted).max())
 
 
@@ -110,3 +119,21 @@ def test_a_determinant_is_numpy_s():
         assert determinant(A.copy()) == pytest.approx(np.linalg.det(A), rel=1e-9)
     assert determinant(np.zeros((3, 3))) == 0.0
     assert determinant(np.ones((4, 4))) == 0.0
+
+
+def test_an_estimate_is_that_of_its_formula_to_the_last_bit(arm):
+    wrench, random = module.ToolWrench(arm), np.random.default_rng(5)
+    drives, offset = arm.drives, [0.1, -0.2, 0.3, 0.4, -1.0, 2.0]
+    for _ in range(30):
+        motion = random.uniform(-3.0, 3.0, (ROWS, 6))
+        found = wrench.estimate(motion, offset)
+        share = motion[SHAPED_QD] / drives.friction_width
+        friction = np.array(drives.coulomb_friction) * (share if drives.linear_friction else np.tanh(share))
+        expected = motion[SHAPED_MOMENT] + np.array(drives.rotor_inertia) * motion[SHAPED_QDD] + friction
+        torque, force = expected - motion[ACTUAL_MOMENT], np.empty(6)
+        assert found[6:].tolist() == torque.tolist()
+        module.force_at(wrench._chain, np.array(offset[:3]), motion[ACTUAL_Q], torque, force)
+        assert found[:6].tolist() == force.tolist()
+        plain, slip = np.empty(12), share if drives.linear_friction else np.tanh(share)
+        module.estimate.py_func(wrench._chain, np.array(offset[:3]), motion, wrench._drives, slip, plain)
+        assert plain.tolist() == found.tolist()

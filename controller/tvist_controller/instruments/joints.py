@@ -1,7 +1,8 @@
 """Values with one entry for each joint."""
 
+from tvist_controller.instruments.joint_lists import SHAPED, UNSHAPED
 from tvist_controller.instruments.ratings import BUS_VOLTAGE
-from tvist_controller.instruments.reading import SHAPED, UNSHAPED, Reading
+from tvist_controller.instruments.reading import Reading
 from tvist_controller.instruments.variables import Double, Vector6D, computed_once
 
 DEVIATION = 0.05
@@ -36,8 +37,8 @@ class JointValues(Reading):
         if state.unshaped_q is None:
             return moment
         motion, payload = self._motion, self.io.payload
-        unshaped = self._rigid.moment(*motion[UNSHAPED], payload)
-        shaped = self._rigid.moment(*motion[SHAPED], payload)
+        unshaped = self._rigid.moment(motion[UNSHAPED], payload)
+        shaped = self._rigid.moment(motion[SHAPED], payload)
         return [m + (u - s) for m, u, s in zip(moment, unshaped, shaped, strict=True)]
 
     @computed_once

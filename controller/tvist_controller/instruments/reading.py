@@ -1,9 +1,6 @@
 """Base of all values of a tick."""
 
-from struct import pack
-
-import numpy as np
-
+from tvist_controller.instruments.joint_lists import as_rows, joint_lists
 from tvist_controller.instruments.meters import Meters
 from tvist_controller.instruments.ratings import JointRating
 from tvist_controller.instruments.rigid_body import RigidBody
@@ -14,16 +11,6 @@ from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State
 
-JOINT_LISTS = (
-    "target_q", "target_qd", "target_qdd", "shaped_q", "shaped_qd", "shaped_qdd", "shaped_moment", "actual_q",
-    "actual_qd", "actual_moment",
-)  # fmt: skip
-"""Lists of the state that values are computed from."""
-ROWS = len(JOINT_LISTS)
-UNSHAPED, SHAPED = slice(0, 3), slice(3, 6)
-"""Rows of the references before and after shaping: positions, velocities and accelerations."""
-SHAPED_QD, SHAPED_QDD, SHAPED_MOMENT, ACTUAL_Q, ACTUAL_QD, ACTUAL_MOMENT = range(4, ROWS)
-"""Rows of single lists."""
 POWERED = frozenset(range(RobotMode.POWER_ON, RobotMode.RUNNING + 1))
 """Robot modes in which the arm has power."""
 
@@ -93,14 +80,10 @@ class Reading:
 
     @computed_once
     def joint_lists(self) -> bytearray:
-        """`JOINT_LISTS` one behind the other, as doubles in the machine's order."""
-        state = self.state
-        unshaped = *self.target_q, *self.target_qd, *self.target_qdd
-        shaped = *state.target_q, *state.target_qd, *state.target_qdd, *state.target_moment
-        measured = *state.actual_q, *state.actual_qd, *state.actual_moment
-        return bytearray(pack(f"{ROWS * len(state.target_q)}d", *unshaped, *shaped, *measured))
+        """Lists of the state that values are computed from, see `joint_lists`."""
+        return joint_lists(self.state)
 
     @computed_once
     def _motion(self) -> Floats:
         """The same as an array, shape (10, n)."""
-        return np.frombuffer(self.joint_lists).reshape(ROWS, len(self._ratings))
+        return as_rows(self.joint_lists)

@@ -84,26 +84,23 @@ class RigidBody:
         self._offset: list[float] = []
         self._tool = np.zeros(12)
         self._elbow = ELBOW + 1 if description.joints > ELBOW else 0
-        still = np.zeros(description.joints)
-        self.tool(still, still, still, [0.0] * 6)  # loads compiled code, which takes many ticks
+        self.tool(np.zeros((3, description.joints)), [0.0] * 6)  # loads compiled code, which takes many ticks
 
-    def tool(self, q: Floats, qd: Floats, qdd: Floats, offset: list[float]) -> Floats:
+    def tool(self, motion: Floats, offset: list[float]) -> Floats:
         """Return the motion of the tool centre point in the base frame, shape (18,).
 
         Its pose, x y z [m] and rotation vector [rad]; its velocity, linear [m/s] and angular [rad/s]; its acceleration,
         linear [m/s²] and angular [rad/s²].
 
         Args:
-            q: Joint positions, shape (n,) [rad].
-            qd: Joint velocities, shape (n,) [rad/s].
-            qdd: Joint accelerations, shape (n,) [rad/s²].
+            motion: Joint positions [rad], velocities [rad/s] and accelerations [rad/s²], shape (3, n).
             offset: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
         """
         if offset != self._offset:
             turned = pin.exp3(np.array(offset[3:])).ravel()
             self._offset, self._tool = list(offset), np.concatenate([turned, offset[:3]])
         out = np.empty(18)
-        tool_rates(self._chain, self._tool, q, qd, qdd, out)
+        tool_rates(self._chain, self._tool, motion[0], motion[1], motion[2], out)
         return out
 
     def flange_rotation(self, q: Floats) -> Floats:
@@ -128,16 +125,19 @@ class RigidBody:
         momentum = pin.computeCentroidalMomentum(self._model, self._data, q, qd)
         return hypot(*momentum.linear.tolist())
 
-    def moment(self, q: Floats, qd: Floats, qdd: Floats, payload: Payload) -> list[float]:
-        """Torques that a motion needs, one for each joint [N m]."""
+    def moment(self, motion: Floats, payload: Payload) -> list[float]:
+        """Torques that a motion needs, one for each joint [N m]; the motion as for `tool`."""
         self._load(payload)
-        torque: list[float] = pin.rnea(self._model, self._data, q, qd, qdd).tolist()
+        torque: list[float] = pin.rnea(self._model, self._data, motion[0], motion[1], motion[2]).tolist()
         return torque
 
-    def base_wrench(self, q: Floats, qd: Floats, qdd: Floats, payload: Payload) -> list[float]:
-        """Force [N] and torque [N m] of the arm on its base, base frame; without the base's own weight."""
+    def base_wrench(self, motion: Floats, payload: Payload) -> list[float]:
+        """Force [N] and torque [N m] of the arm on its base, base frame; without the base's own weight.
+
+        The motion is as for `tool`.
+        """
         self._load(payload)
-        pin.rnea(self._model, self._data, q, qd, qdd)
+        pin.rnea(self._model, self._data, motion[0], motion[1], motion[2])
         wrench = -self._data.oMi[1].act(self._data.f[1]).vector
         return [float(value) for value in wrench]
 

@@ -44,10 +44,21 @@ class Instruments:
             state: State of the tick.
             io: Terminals and registers at that tick.
         """
-        mode, current, mechanical = state.robot_mode, self._idle, 0.0
-        if mode == RUNNING:
-            moment = state.actual_moment
-            current = [m / constant for m, constant in zip(moment, self._constants, strict=True)]
-            mechanical = sum([m * v for m, v in zip(moment, state.actual_qd, strict=True)])
-        self._meters.update(state.tick, current, mechanical, powered=mode in POWERED)
+        current = self.follow(state.tick, state.robot_mode, state.actual_moment, state.actual_qd)
         return Snapshot(state, io, self._rigid, self._wrench, self._ratings, current, self._meters)
+
+    def follow(self, tick: int, mode: int, moment: list[float], velocity: list[float]) -> list[float]:
+        """Let temperatures and energies go on to a tick whose other values nobody reads; return the currents [A].
+
+        Args:
+            tick: Number of the control period; once for each period is enough.
+            mode: Robot mode.
+            moment: Measured torques [N m].
+            velocity: Measured velocities [rad/s].
+        """
+        current, mechanical = self._idle, 0.0
+        if mode == RUNNING:
+            current = [m / constant for m, constant in zip(moment, self._constants, strict=True)]
+            mechanical = sum([m * v for m, v in zip(moment, velocity, strict=True)])
+        self._meters.update(tick, current, mechanical, powered=mode in POWERED)
+        return current

@@ -4,17 +4,8 @@ from math import sqrt
 
 import numpy as np
 
-from tvist_controller.instruments.reading import (
-    ACTUAL_MOMENT,
-    ACTUAL_Q,
-    ACTUAL_QD,
-    SHAPED,
-    SHAPED_MOMENT,
-    SHAPED_QD,
-    SHAPED_QDD,
-    UNSHAPED,
-    Reading,
-)
+from tvist_controller.instruments.joint_lists import ACTUAL_Q, ACTUAL_QD, SHAPED, UNSHAPED
+from tvist_controller.instruments.reading import Reading
 from tvist_controller.instruments.rigid_body import add, carried, cross
 from tvist_controller.instruments.variables import Double, Vector3D, Vector6D, computed_once
 from tvist_controller.instruments.wrench import since_zeroed
@@ -76,7 +67,8 @@ class ToolValues(Reading):
         """
         linear: list[float] = (self._rotation @ np.array(self.state.actual_tool_accelerometer)).tolist()
         linear[2] -= GRAVITY
-        alpha, offset = self._shaped[15:].tolist(), self.io.tcp_offset
+        alpha: list[float] = self._shaped[15:].tolist()
+        offset = self.io.tcp_offset
         if any(offset[:3]):
             arm: list[float] = (self._rotation @ np.array(offset[:3])).tolist()
             linear = add(linear, carried(self.state.actual_TCP_speed[3:], alpha, arm))
@@ -174,17 +166,17 @@ class ToolValues(Reading):
 
         The weight of the base itself is not included.
         """
-        return self._rigid.base_wrench(*self._motion[UNSHAPED], self.io.payload)
+        return self._rigid.base_wrench(self._motion[UNSHAPED], self.io.payload)
 
     @computed_once
     def _target(self) -> Floats:
-        return self._rigid.tool(*self._motion[UNSHAPED], self.io.tcp_offset)
+        return self._rigid.tool(self._motion[UNSHAPED], self.io.tcp_offset)
 
     @computed_once
     def _shaped(self) -> Floats:
         if self.state.unshaped_q is None:
             return self._target
-        return self._rigid.tool(*self._motion[SHAPED], self.io.tcp_offset)
+        return self._rigid.tool(self._motion[SHAPED], self.io.tcp_offset)
 
     @computed_once
     def _elbow(self) -> tuple[list[float], list[float]]:
@@ -195,17 +187,16 @@ class ToolValues(Reading):
         return self._rigid.flange_rotation(self._motion[ACTUAL_Q])
 
     @computed_once
+    def _estimate(self) -> Floats:
+        if not self.driven:
+            return np.zeros(6 + len(self._ratings))
+        return self._wrench.estimate(self._motion, self.io.tcp_offset)
+
+    @property
+    def _force(self) -> Floats:
+        return self._estimate[:6]
+
+    @property
     def _felt(self) -> Floats:
         """External torque on the joints: expected minus measured, shape (n,) [N m]."""
-        if not self.driven:
-            return np.zeros(len(self.state.actual_q))
-        motion = self._motion
-        return self._wrench.between(
-            motion[SHAPED_QD], motion[SHAPED_QDD], motion[SHAPED_MOMENT], motion[ACTUAL_MOMENT]
-        )
-
-    @computed_once
-    def _force(self) -> Floats:
-        if not self.driven:
-            return np.zeros(6)
-        return self._wrench.at_tool(self._motion[ACTUAL_Q], self._felt, self.io.tcp_offset)
+        return self._estimate[6:]

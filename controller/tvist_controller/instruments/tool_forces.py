@@ -24,15 +24,16 @@ class ToolForces:
 
     def torques(self) -> list[float]:
         """External torques on the joints, shape (n,) [N m]."""
-        return list(self._wrench.felt(self._latest()).tolist())
+        return self._estimate()[6:]
 
     def wrench(self) -> list[float]:
         """External force and torque at the tool centre point, base frame [N, N m]."""
-        return since_zeroed(self._felt(), self._peripherals.wrench_zero)
+        return since_zeroed(self._estimate()[:6], self._peripherals.wrench_zero)
 
     def zero(self) -> None:
         """Take the present force and torque at the tool as zero."""
-        self._peripherals.zero_wrench(self._felt())
+        self._peripherals.zero_wrench(self._estimate()[:6])
 
-    def _felt(self) -> list[float]:
-        return self._wrench.of(self._latest(), self._peripherals.tcp_offset)
+    def _estimate(self) -> list[float]:
+        found: list[float] = self._wrench.of(self._latest(), self._peripherals.tcp_offset).tolist()
+        return found

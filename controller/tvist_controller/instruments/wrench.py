@@ -6,6 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.instruments.joint_lists import (
+    ACTUAL_MOMENT,
+    ACTUAL_Q,
+    ROWS,
+    SHAPED_MOMENT,
+    SHAPED_QD,
+    SHAPED_QDD,
+    as_rows,
+    joint_lists,
+)
 from tvist_controller.quiet.elimination import eliminate
 from tvist_plant.chain import bend, chain_of, start, step_along, twist
 from tvist_plant.description import Payload, RobotDescription
@@ -83,7 +93,7 @@ def product(A: Floats, B: Floats) -> Floats:
 
 @compiled_for_ticks
 def force_at(chain: Floats, offset: Floats, q: Floats, torque: Floats, force: Floats) -> None:
-    """Compute the force that causes torques; see `ToolWrench.at_tool`.
+    """Compute the force that causes torques; see `ToolWrench.estimate`.
 
     Args:
         chain: The links, see `tvist_plant.chain`, shape (n+1, 22).
@@ -111,6 +121,26 @@ def force_at(chain: Floats, offset: Floats, q: Floats, torque: Floats, force: Fl
                 force[k] += J[k, j] * known[j]
 
 
+@compiled_for_ticks
+def estimate(
+    chain: Floats, offset: Floats, motion: Floats, drives: Floats, slip: Floats, out: Floats
+) -> None:
+    """Estimate what acts on the arm from outside; see `ToolWrench.estimate`.
+
+    Args:
+        chain: The links, see `tvist_plant.chain`, shape (n+1, 22).
+        offset: Point in the frame of the end, shape (3,) [m].
+        motion: See `joint_lists`, shape (10, n).
+        drives: Inertia of the rotors [kg m²] and Coulomb friction [N m], shape (2, n).
+        slip: Share of the friction that acts, shape (n,) [-].
+        out: Result: force and torque at the point [N, N m], then torques on the joints [N m], shape (6 + n,).
+    """
+    for j in range(slip.shape[0]):
+        expected = motion[SHAPED_MOMENT, j] + drives[0, j] * motion[SHAPED_QDD, j] + drives[1, j] * slip[j]
+        out[6 + j] = expected - motion[ACTUAL_MOMENT, j]
+    force_at(chain, offset, motion[ACTUAL_Q], out[6:], out[:6])
+
+
 class ToolWrench:
     """Estimates the force at the tool centre point that explains the measured torques.
 
@@ -122,59 +152,38 @@ class ToolWrench:
         model = rigid_model(description, Payload())
         self._chain = chain_of(model, model.getFrameId(FLANGE))
         drives = description.drives
-        self._rotor = np.array(drives.rotor_inertia)
-        self._friction = np.array(drives.coulomb_friction)
+        self._drives = np.array([drives.rotor_inertia, drives.coulomb_friction])
         self._width, self._linear = drives.friction_width, drives.linear_friction
-        still = np.zeros(description.joints)
-        self.at_tool(still, still, (0.0,) * 6)  # loads compiled code, which takes many ticks
+        self._offset, self._point = [0.0] * 6, np.zeros(3)
+        # Loads compiled code, which takes many ticks.
+        self.estimate(np.zeros((ROWS, description.joints)), self._offset)
 
-    def felt(self, state: State) -> Floats:
-        """Return the external torque on the joints in a tick, shape (n,) [N m]; zero with the brakes on."""
-        if state.robot_mode != RUNNING:
-            return np.zeros(len(state.actual_q))
-        lists = state.target_qd, state.target_qdd, state.target_moment, state.actual_moment
-        return self.between(*map(np.array, lists))
+    def estimate(self, motion: Floats, offset: Sequence[float]) -> Floats:
+        """Return force and torque at the tool centre point, base frame [N, N m], and torques on the joints [N m].
 
-    def between(self, velocity: Floats, acceleration: Floats, moment: Floats, measured: Floats) -> Floats:
-        """Return the external torque on the joints, shape (n,) [N m].
-
-        It is the torque of drives that follow their target (rigid arm with the declared payload, rotors and
-        friction), minus the measured torque.
-
-        Args:
-            velocity: Of the target, shape (n,) [rad/s].
-            acceleration: Of the target, shape (n,) [rad/s²].
-            moment: Torque that the rigid arm needs for the target, shape (n,) [N m].
-            measured: Measured torque, shape (n,) [N m].
-        """
-        share = velocity / self._width
-        friction = self._friction * (share if self._linear else np.tanh(share))
-        torque: Floats = moment + self._rotor * acceleration + friction - measured
-        return torque
-
-    def at_tool(self, q: Floats, torque: Floats, offset: Sequence[float]) -> Floats:
-        """Return the force at the tool centre point that causes these joint torques, shape (6,) [N, N m], base frame.
+        External torques on the joints are the torques of drives that follow their target (rigid arm with the declared
+        payload, rotors and friction), minus the measured torques.
 
         F with Jᵀ F = τ by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) if the manipulability
         w is below w₀ (Nakamura and Hanafusa, 1986). Components that affect no joint are zero.
 
         Args:
-            q: Joint positions, shape (n,) [rad].
-            torque: External torque on the joints, shape (n,) [N m].
+            motion: See `joint_lists`, shape (10, n).
             offset: Tool centre point in the flange frame [m, rad].
-        """
-        force = np.empty(6)
-        force_at(self._chain, np.array(offset[:3]), q, torque, force)
-        return force
 
-    def of(self, state: State, offset: Sequence[float]) -> list[float]:
-        """Return force and torque at the tool centre point in a tick, base frame [N, N m]; zero with the brakes on.
-
-        Args:
-            state: State of the tick.
-            offset: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
+        Returns:
+            Shape (6 + n,).
         """
+        if offset != self._offset:
+            self._offset, self._point = list(offset), np.array(offset[:3])
+        share = motion[SHAPED_QD] / self._width
+        out = np.empty(6 + len(share))
+        slip = share if self._linear else np.tanh(share)
+        estimate(self._chain, self._point, motion, self._drives, slip, out)
+        return out
+
+    def of(self, state: State, offset: Sequence[float]) -> Floats:
+        """Return what `estimate` does for a tick; zeros with the brakes on."""
         if state.robot_mode != RUNNING:
-            return [0.0] * 6
-        wrench: list[float] = self.at_tool(np.array(state.actual_q), self.felt(state), offset).tolist()
-        return wrench
+            return np.zeros(6 + len(state.actual_q))
+        return self.estimate(as_rows(joint_lists(state)), offset)

@@ -23,6 +23,7 @@ from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.session import RtdeSession
 
 from . import rtde_client
@@ -50,6 +51,7 @@ class House(Sink):
         self.controller.session.release()
         self.host = Host(self.controller, self)
         self.instruments = Instruments(UR5E)
+        self.board = Board()
         self.robot = UrRobot(
             UR5E, "ur5e", self.tell, ExternalControl(None, nobody), lambda _: None, lambda _: None
         )
@@ -111,7 +113,8 @@ class Client:
         self.house, self.interface = house, interface
         self.stream, self.sampled, self.rest = bytearray(), b"", b""
         self.control = ConnectionControl(house.leases[host])
-        self.session = INTERFACES[interface](house.robot, self.control, self.take)
+        board = (house.board,) if interface == "rtde" else ()
+        self.session = INTERFACES[interface](house.robot, self.control, self.take, *board)
         house.clients.append(self)
         self.session.opened()
 

@@ -10,6 +10,7 @@ import weakref
 import pytest
 from tests.controller.robots import UR5E
 
+from tvist_controller.instruments.snapshot import Instruments
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.simulation import SimulationInject
@@ -288,3 +289,33 @@ async def test_a_client_whose_machine_lost_power_is_found_out(desk):
     idle = found.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE)
     every = found.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL)
     assert idle + every * found.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT) <= 30
+
+
+async def test_without_a_client_ticks_wait_for_others_and_nothing_is_missing_for_the_next_one(monkeypatch):
+    desk = Desk()
+    desk.interfaces = house = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", {"rtde": 0, "dashboard": 0})
+    await desk.tick()
+    await house.open()
+    looks, look = [], house._look
+    monkeypatch.setattr(house, "_look", lambda: looks.append(1) or look())
+    reference, states = Instruments(UR5E), [house.robot.latest.state]
+    reference.snapshot(states[0], house._io)
+    for count in range(1, 96):
+        desk.controller.begin_tick()
+        report, _ = desk.controller.complete_tick()
+        state = report.state
+        if count % 2:
+            house.report(report)
+        else:
+            house.publish("state", state, b"")
+        expected = reference.snapshot(state, house._io)
+        await asyncio.sleep(0)
+    assert len(looks) == 9
+    await connect_and_greet(desk)
+    assert house.robot.latest.state == state
+    for name in ("joint_temperatures", "actual_robot_energy_consumed", "actual_robot_current"):
+        assert getattr(house.robot.latest, name) == getattr(expected, name)
+    for writer in desk.writers:
+        writer.close()
+    await house.shut()
+    house.close()

@@ -13,7 +13,7 @@ from tests.controller.robots import UR5E, cut
 
 from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.inputs import INPUTS
-from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
+from tvist_server.gateways.ur.rtde.outputs import OUTPUTS, PARTS
 from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
 from tvist_server.gateways.ur.rtde.table import page
 from tvist_server.gateways.ur.rtde.wire import Wire
@@ -115,6 +115,13 @@ def test_who_else_reads_what_changes_nothing(snapshots, changes):
             board.begin(number, recipes[number])
         for recipe in recipes.values():
             assert board.package(recipe, snapshot, b"\x01") == alone(recipe.names, snapshot)
+
+
+def test_what_is_read_only_when_io_changes_depends_on_nothing_else(snapshots):
+    early, late = snapshots[3], snapshots[90]
+    assert early.io is late.io
+    for name, (part, _) in PARTS.items():
+        assert not part.of_io or part.read(early) == part.read(late), name
 
 
 def test_what_nobody_reads_is_not_computed(ur5e, monkeypatch):

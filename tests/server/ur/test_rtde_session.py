@@ -29,7 +29,7 @@ class Client:
     def __init__(self, robot, control):
         self.control = control
         self.stream = bytearray()
-        self.session = RtdeSession(robot, control, self.stream.extend)
+        self.session = RtdeSession(robot, control, self.stream.extend, robot.board)
         self.session.opened()
 
     def say(self, *packages):
@@ -67,7 +67,7 @@ class Client:
 
 @pytest.fixture
 def robot(robot):
-    robot.inputs, robot.outputs = InputOwners(), Board()
+    robot.inputs, robot.board = InputOwners(), Board()
     return robot
 
 

@@ -2,23 +2,22 @@
 
 import asyncio
 import contextlib
-import errno
 import logging
 import socket
-import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 from weakref import WeakValueDictionary
 
-from tvist_controller.instruments.snapshot import Instruments
+from tvist_controller.instruments.snapshot import Instruments, Snapshot
+from tvist_controller.reporting.report import Report
 from tvist_controller.reporting.sink import Topic
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.io import Io
 from tvist_protocol.stream import Event, State
-from tvist_server.gateways.base import Desk, Gateway, GatewayError, Message
+from tvist_server.gateways.base import Desk, Gateway, Message
 from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.connection import Connection
 from tvist_server.gateways.ur.dashboard.session import DashboardSession
@@ -26,24 +25,20 @@ from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.gripper import AskGripper, GripperSession
 from tvist_server.gateways.ur.interpreter import InterpreterSession
 from tvist_server.gateways.ur.lease import ALIVE, ConnectionControl, HostLease
+from tvist_server.gateways.ur.listening import listen
 from tvist_server.gateways.ur.notices import Notices
 from tvist_server.gateways.ur.places import Places
 from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.program_request import ProgramRequests
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.session import RtdeSession
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.ur_ports import InterfaceName
 
 log = logging.getLogger(__name__)
 
-SEND_BUFFER = 32_768
-"""System's send buffer for a client [bytes]: a tenth of a second of samples; a larger one would only add delay."""
-PROBES = (10, 5, 3)
-"""TCP keepalive: idle time before the first probe [s], time between probes [s], and number of unanswered probes after
-which a client counts as disconnected and loses control. Its machine may have lost power or network.
-"""
 FIRST = 1000
 """Longest wait for the first tick [ticks]."""
 MAX_PENDING = 250
@@ -54,6 +49,10 @@ PAUSE = 0.02
 """Time between two checks for room, in lockstep [s]."""
 UNREAD = 10
 """States that are handed over at once while there is no client: they count for temperatures and energies alone."""
+
+
+Tick = State | Report
+"""A tick whose state is made already, and one whose state is yet to be made."""
 
 
 class UrInterfaces(Gateway):
@@ -94,9 +93,9 @@ class UrInterfaces(Gateway):
         self._requests = ProgramRequests()
         external = ExternalControl(programs, self._requests.fetch)
         self.robot = UrRobot(description, name, self._tell, external, self._scripts.tell, self._refusals.tell)
-        self._instruments = Instruments(description)
+        self._instruments, self._board = Instruments(description), Board()
         self._io: Io | None = None
-        self._early = deque[State](maxlen=FIRST)
+        self._early = deque[Tick](maxlen=FIRST)
         """States from before the interfaces open, since temperatures and energies begin with the first tick."""
         self._connections: set[Connection] = set()
         """Connections that have a place while the interfaces are open."""
@@ -105,10 +104,12 @@ class UrInterfaces(Gateway):
         self._adopted: HostLease | None = None
         """Lease that this process holds in the name of a host."""
         self._lockstep = lockstep
-        self._news = deque[Message]()
+        self._news = deque[Tick | Message]()
         """What was published and waits for the interfaces' thread."""
         self._woken = False
         """Whether that thread is about to look at it."""
+        self._unread: Tick | None = None
+        """Last tick that only temperatures and energies have followed."""
         self._room = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._servers: list[asyncio.Server] = []
@@ -118,7 +119,7 @@ class UrInterfaces(Gateway):
             for interface, port in ports.items():
                 if interface == "gripper" and gripper is None:
                     continue
-                self._sockets[interface] = _listen(address, port, interface)
+                self._sockets[interface] = listen(address, port, interface)
         except BaseException:
             self._close_sockets()
             raise
@@ -152,6 +153,7 @@ class UrInterfaces(Gateway):
             self.robot.programs.io(self._io)
         while self._early:
             self._see(self._early.popleft())
+        self._look()
         for interface, bound in self._sockets.items():
             self._servers.append(
                 await self._loop.create_server(
@@ -170,21 +172,28 @@ class UrInterfaces(Gateway):
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  not MessagePack here
         """Pass a message to the interfaces' thread."""
-        if self._loop is None:  # the interfaces are not open
+        if isinstance(message, State):
+            self._pass_on(message)
+        elif self._loop is None:
             if isinstance(message, Io):
                 self._io = message
-            elif isinstance(message, State):
-                self._early.append(message)
-        elif isinstance(message, State):
-            if self._has_room():
-                self._news.append(message)
-                if self._connections or len(self._news) >= UNREAD:
-                    self._wake()
-            else:
-                self.dropped += 1
         elif isinstance(message, Io | Event):
             self._news.append(message)
             self._wake()
+
+    def report(self, report: Report) -> None:
+        """Pass a tick to the interfaces' thread, which makes its state for clients alone."""
+        self._pass_on(report)
+
+    def _pass_on(self, tick: Tick) -> None:
+        if self._loop is None:  # the interfaces are not open
+            self._early.append(tick)
+        elif not self._has_room():
+            self.dropped += 1
+        else:
+            self._news.append(tick)
+            if self._connections or len(self._news) >= UNREAD:
+                self._wake()
 
     def _has_room(self) -> bool:
         """Return whether one more state may wait; in lockstep, wait until there is room."""
@@ -232,21 +241,38 @@ class UrInterfaces(Gateway):
             message = self._news.popleft()
             if self._lockstep:
                 self._room.set()
-            if isinstance(message, State):
+            if isinstance(message, Tick):
                 self._see(message)
             elif isinstance(message, Io):
                 self._on_io(message)
             elif isinstance(message, Event):
                 self._on_event(message)
+        if self._unread is not None:
+            self._read(self._unread)
 
-    def _see(self, state: State) -> None:
+    def _see(self, tick: Tick) -> None:
         if self._io is None:
             return
-        snapshot = self.robot.latest = self._instruments.snapshot(state, self._io)
-        # All is made before any of it is sent: the readers' process then stays awake for all, and wakes up once.
-        for connection, data in [(one, one.sample(snapshot)) for one in tuple(self._connections)]:
-            if data:
-                connection.put(data)
+        if self._connections:
+            snapshot = self._read(tick)
+            # All is made before any of it is sent: the readers' process then stays awake for all, and wakes up once.
+            for connection, data in [(one, one.sample(snapshot)) for one in tuple(self._connections)]:
+                if data:
+                    connection.put(data)
+            return
+        self._unread = tick
+        if isinstance(tick, State):
+            self._instruments.follow(tick.tick, tick.robot_mode, tick.actual_moment, tick.actual_qd)
+        else:
+            measured = tick.sample.measured
+            self._instruments.follow(tick.tick, tick.modes[0], measured.moment.tolist(), measured.qd.tolist())
+
+    def _read(self, tick: Tick) -> Snapshot:
+        assert self._io is not None
+        state = tick if isinstance(tick, State) else tick.state
+        self._unread = None
+        self.robot.latest = self._instruments.snapshot(state, self._io)
+        return self.robot.latest
 
     def _on_io(self, io: Io) -> None:
         self._io = io
@@ -278,6 +304,8 @@ class UrInterfaces(Gateway):
             return GripperSession(
                 self._gripper, send, lambda answer: self._soon(lambda: control.hear(answer))
             )
+        if interface == "rtde":
+            return RtdeSession(self.robot, control, send, self._board)
         return _session(interface, self.robot, control, send)
 
     def _lease(self, host: str) -> HostLease:
@@ -308,8 +336,6 @@ def _session(interface: InterfaceName, robot: UrRobot, control: ConnectionContro
     match interface:
         case "dashboard":
             return DashboardSession(robot, control, send)
-        case "rtde":
-            return RtdeSession(robot, control, send)
         case "interpreter":
             return InterpreterSession(robot, control, send)
         case "realtime" | "realtime_read_only":
@@ -322,40 +348,3 @@ def _session(interface: InterfaceName, robot: UrRobot, control: ConnectionContro
                 read_only=interface.endswith("read_only"),
                 informed=interface.startswith("primary"),
             )
-
-
-def _probe(bound: socket.socket) -> None:
-    """Have silent peers probed as `PROBES` says, where the system lets it be chosen."""
-    if sys.platform == "linux":
-        options = (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
-        for option, value in zip(options, PROBES, strict=True):
-            bound.setsockopt(socket.IPPROTO_TCP, option, value)
-
-
-def _listen(address: str, port: int, interface: InterfaceName) -> socket.socket:
-    family = socket.AF_INET6 if ":" in address else socket.AF_INET
-    bound = socket.socket(family, socket.SOCK_STREAM)
-    try:
-        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        # Accepted sockets inherit these options.
-        bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
-        bound.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        _probe(bound)
-        bound.bind((address, port))
-        bound.listen(32)
-    except OSError as error:
-        bound.close()
-        raise GatewayError(
-            f"cannot listen on {address} port {port} for {interface}: {_reason(error)}"
-        ) from error
-    bound.setblocking(False)
-    return bound
-
-
-def _reason(error: OSError) -> str:
-    reasons = {
-        errno.EADDRINUSE: "the port is in use: stop the program that uses it, or choose another port with --ur-port",
-        errno.EADDRNOTAVAIL: "this machine does not have this address; it has 127.0.0.1 to 127.255.255.254",
-        errno.EACCES: "that is not permitted: choose a port above 1023",
-    }
-    return reasons.get(error.errno or 0, error.strerror or str(error))

@@ -8,7 +8,6 @@ from tvist_plant.description import RobotDescription
 from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.input_owners import InputOwners
 from tvist_server.gateways.ur.programs import Programs
-from tvist_server.gateways.ur.rtde.board import Board
 
 NO_MODE = "NONE"
 """Operational mode until a client sets one."""
@@ -44,8 +43,6 @@ class UrRobot:
         self.operational_mode = NO_MODE
         """Operational mode set by the dashboard."""
         self.inputs = InputOwners()
-        self.outputs = Board()
-        """What clients of RTDE read."""
         self.programs = Programs(self, external)
         self._tell = tell
         self.report = report

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from tvist_controller.instruments.reading import JOINT_LISTS
+from tvist_controller.instruments.joint_lists import JOINT_LISTS
 from tvist_controller.instruments.snapshot import VARIABLES, Snapshot
 from tvist_server.gateways.ur.rtde.registers import KINDS, SINGLE_BITS, registers
 from tvist_server.gateways.ur.rtde.wire import Wire
@@ -40,7 +40,8 @@ def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
 
 def _parts() -> Iterator[tuple[str, tuple[Part, int]]]:
     for name, word in VARIABLES.items():
-        yield name, (Part(attrgetter(name), Wire[word].value[-1]), 0)
+        of_io = (getattr(Snapshot, name).__doc__ or "").startswith("Io:")
+        yield name, (Part(attrgetter(name), Wire[word].value[-1], of_io=of_io), 0)
     joints = Part(attrgetter("joint_lists"), "d", len(JOINT_LISTS))
     yield from ((name, (joints, row)) for row, name in enumerate(JOINT_LISTS))
     tool = Part(attrgetter("target_tool"), "d", 3)

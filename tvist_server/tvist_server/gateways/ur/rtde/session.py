@@ -12,6 +12,7 @@ from tvist_controller.instruments.snapshot import Snapshot
 from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.base import ControllerAccess, PortSession, Send
 from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.codec import (
     PackageKind,
     PackageReader,
@@ -46,11 +47,13 @@ class RtdeSession(PortSession):
         robot: State that the interfaces of a robot share.
         control: Access to its controller.
         send: Sends bytes to the client.
+        board: Makes the data packages of all clients of the robot.
     """
 
     client_begins = True
 
-    def __init__(self, robot: UrRobot, control: ControllerAccess, send: Send) -> None:
+    def __init__(self, robot: UrRobot, control: ControllerAccess, send: Send, board: Board) -> None:
+        self._board = board
         self._robot = robot
         self._control = control
         self._send = send
@@ -103,12 +106,12 @@ class RtdeSession(PortSession):
         if tick < self._next:
             return b""
         self._next += every * ((tick - self._next) // every + 1)
-        return self._robot.outputs.package(self._outputs, snapshot, self._head)
+        return self._board.package(self._outputs, snapshot, self._head)
 
     def closed(self) -> None:
         """Release the input variables of the connection, so that other clients can set them, and read no more."""
         self._robot.inputs.release(self)
-        self._robot.outputs.end(self)
+        self._board.end(self)
 
     # ------------------------------------------------------------------ answers
 
@@ -191,9 +194,9 @@ class RtdeSession(PortSession):
     def _read(self) -> None:
         """Have the variables of the recipe computed as long as the client reads them."""
         if self._started and self._outputs is not None:
-            self._robot.outputs.begin(self, self._outputs)
+            self._board.begin(self, self._outputs)
         else:
-            self._robot.outputs.end(self)
+            self._board.end(self)
 
     def _take_text(self, _payload: bytes) -> None:
         """Ignore a text message: on a robot of UR's, it would appear in the log of the teach pendant."""
