@@ -169,7 +169,9 @@ def test_real_time_priority_is_asked_for_by_the_tick_thread_itself(monkeypatch):
 def test_threads_with_the_messages_of_every_tick_get_the_priority_next_to_it(monkeypatch):
     """Otherwise the tick waits for whatever program takes the processor from one that holds the interpreter's lock."""
     asked, courier = [], Courier([])
-    monkeypatch.setattr(os, "sched_setscheduler", lambda which, _, asks: asked.append((which, asks.sched_priority)))
+    monkeypatch.setattr(
+        os, "sched_setscheduler", lambda which, _, asks: asked.append((which, asks.sched_priority))
+    )
     courier.start()
     served([Mailbox(FakeHost())], priority=True)
     courier.close()
