@@ -184,9 +184,10 @@ class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="teleme
     """Timing and counters of the server, once a second. Counters count from the start of the server.
 
     These definitions hold wherever the words appear. A control period is due at a fixed distance from the one before,
-    on the wall clock. It either begins, at its deadline or later, or is left out, when the robot is more than 50
-    periods behind. The lateness of a period is its beginning minus its deadline. A period is missed if it begins a
-    period late or more, or is left out; so no more are missed than were due. The rate is the periods that have begun,
+    on the wall clock. It either begins, or is left out, when the robot is more than 50 periods behind. The lateness of
+    a period is its beginning minus its deadline, and 0 if it begins before: robots of one process take turns, and one
+    that has its turn early does not wait. A period is missed if it begins a period late or more, or is left out; so no
+    more are missed than were due. The rate is the periods that have begun,
     or the states that were received, per second of the clock of whoever counts them. The load is the time from the
     beginning to the end of the periods, with the commands carried out between them, per second of the wall clock.
     The robot is overloaded once a fifth of the periods due were missed in each of two seconds in a row, until less

@@ -10,6 +10,7 @@ import pytest
 from tvist_plant.plant import PlantError
 from tvist_server import punctual
 from tvist_server.clock import Lockstep, Mailbox, Realtime
+from tvist_server.courier import Courier
 
 pytestmark = pytest.mark.realtime
 
@@ -158,10 +159,23 @@ def test_real_time_priority_is_asked_for_by_the_tick_thread_itself(monkeypatch):
     )
     served([Mailbox(FakeHost())], priority=True)
     ((thread, which, policy, parameter),) = asked
-    assert (thread, which, policy) == ("tvist-tick", 0, os.SCHED_FIFO)
+    # What a thread with this priority starts has none.
+    assert (thread, which, policy) == ("tvist-tick", 0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK)
     assert parameter.sched_priority == punctual.PRIORITY
     served([Mailbox(FakeHost())])
     assert len(asked) == 1
+
+
+def test_threads_with_the_messages_of_every_tick_get_the_priority_next_to_it(monkeypatch):
+    """Otherwise the tick waits for whatever program takes the processor from one that holds the interpreter's lock."""
+    asked, courier = [], Courier([])
+    monkeypatch.setattr(
+        os, "sched_setscheduler", lambda which, _, asks: asked.append((which, asks.sched_priority))
+    )
+    courier.start()
+    served([Mailbox(FakeHost())], priority=True)
+    courier.close()
+    assert asked == [(0, punctual.PRIORITY), (courier._thread.native_id, punctual.PRIORITY - 1)]
 
 
 def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypatch, caplog):

@@ -25,7 +25,9 @@ def test_all_robots_tick_in_turn_after_one_wake_up_a_period(robots):
     begun = played(robots, 20 * robots)
     assert [robot for robot, *_ in begun] == list(range(robots)) * 20
     times = [now for _, now, *_ in begun]
-    assert times == pytest.approx([1000.0 + PERIOD * (1 + tick // robots) for tick in range(20 * robots)], abs=1e-9)
+    assert times == pytest.approx(
+        [1000.0 + PERIOD * (1 + tick // robots) for tick in range(20 * robots)], abs=1e-9
+    )
     assert all(late == 0.0 and missed == 0 for _, _, late, missed in begun)
 
 

@@ -204,9 +204,12 @@ class Realtime(Clock):
         finally:
             self._asked.set()
         robots, overloads, now, sleep = self._robots, self._overloads, time.monotonic, time.sleep
-        kept: float | None = None  # since when messages wait to be handed on
-        schedule, pace = Schedule(len(robots), self._period, now()), robots[0].pace
-        begin, silent = schedule.begin if pace is None else Followed(self._period, now()).begin, False
+        pace, silent, handed_on = robots[0].pace, False, now()
+        schedule: Schedule | Followed = (
+            Schedule(len(robots), self._period, handed_on)
+            if pace is None
+            else Followed(self._period, handed_on)
+        )
         while self._running:
             if pace is not None:
                 if not self._begins(robots[0], pace):
@@ -214,15 +217,11 @@ class Realtime(Clock):
                     continue
                 silent = False
             elif (wait := schedule.due - now()) > 0.0:
-                if kept is not None:
-                    kept = None
-                    self._hand_on()
-                    continue
                 sleep(min(wait, LONGEST_SLEEP))
                 if wait > LONGEST_SLEEP:
                     continue
             begun = now()
-            number, late, missed = begin(begun)
+            number, late, missed = schedule.begin(begun)
             robot = robots[number]
             robot.lateness.note(late)
             if missed:
@@ -232,10 +231,11 @@ class Realtime(Clock):
                 robot.host.warn(told)
             robot.jobs.do_waiting()
             robot.host.tick()
-            robot.lateness.worked(now() - begun)
-            kept = begun if kept is None else kept
-            if pace is not None or begun - kept >= HAND_ON_EVERY:
-                kept = None
+            ended = now()
+            robot.lateness.worked(ended - begun)
+            # All have had their turn, or messages have waited since the last time or since the thread woke up.
+            if schedule.due > ended or ended - max(handed_on, schedule.due) >= HAND_ON_EVERY:
+                handed_on = ended
                 self._hand_on()
         for robot in robots:
             robot.jobs.do_waiting()

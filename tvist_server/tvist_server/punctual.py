@@ -4,24 +4,36 @@ import ctypes
 import logging
 import os
 import sys
+import threading
 from pathlib import Path
 
 log = logging.getLogger(__name__)
 
 PRIORITY = 50
 """Real-time priority of the tick thread: the middle of the range 1 to 99."""
+EVERY_TICK = ("tvist-publisher", "recorder")
+"""Names of the threads that take the messages of every tick."""
 CURRENT, FUTURE, ON_FAULT = 1, 2, 4
 """Flags of mlockall: pages in use, those to come, and each only from its first use on: unused stacks take nothing."""
 CAP_IPC_LOCK = 14
 
 
 def take_priority() -> bool:
-    """Give the calling thread real-time priority (SCHED_FIFO); return whether it has it now."""
+    """Give the calling thread real-time priority (SCHED_FIFO); return whether it has it now.
+
+    Those of `EVERY_TICK` come next. If another program took the processor from one that holds the interpreter's lock,
+    the calling thread would wait for that program. What may take long, such as planning, stays behind other programs.
+    """
     if sys.platform != "linux":
         log.warning("real-time priority is only for Linux, so the control loop runs at normal priority")
         return False
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        # A thread that one of these starts, such as to write a file, inherits nothing.
+        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+        os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
+        for thread in threading.enumerate():
+            if thread.name in EVERY_TICK and thread.native_id is not None:
+                os.sched_setscheduler(thread.native_id, policy, os.sched_param(PRIORITY - 1))
     except OSError as error:
         log.warning(
             "real-time priority is not permitted (%s), so the control loop runs at normal priority: "

@@ -1,5 +1,6 @@
 """When robots' ticks are due: each robot has deadlines of its own, and one thread serves all of them."""
 
+import math
 from heapq import heapreplace
 
 CATCH_UP = 50
@@ -13,6 +14,9 @@ class Followed:
         period: Period of its ticks [s].
         start: Present time [s].
     """
+
+    due = math.inf
+    """Time from which the next tick may begin: nobody knows it."""
 
     def __init__(self, period: float, start: float) -> None:
         self._period, self._before = period, start
