@@ -16,8 +16,8 @@ import os
 import sys
 import uuid
 import warnings
-from collections.abc import Callable, Iterator
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -66,33 +66,28 @@ class KernelCache(_Cache):
         kernels.append(self)
 
     @cached_property
-    def _sources(self) -> str:
+    def sources(self) -> str:
         """Hash of what the machine code depends on among our sources; computed when a kernel is first called."""
         return _short(digest(self._function.__module__) + self._function.__code__.co_code.hex())
 
     @cached_property
-    def _folders(self) -> list[Path]:
+    def places(self) -> list[Path]:
+        """The folders in which machine code is looked for, in this order."""
         return folders(Path(self._function.__code__.co_filename).parent)
 
     @property
     def cache_path(self) -> str:
         """The folder in which machine code is looked for first."""
-        return str(self._folders[0])
+        return str(self.places[0])
 
     def holds(self) -> bool:
         """Return whether there is machine code of this kernel for this processor, for any types."""
-        start = f"{self.name}.{self._sources}-{_machine(cpu_target.target_context)}-"
-        for folder in self._folders:
-            with contextlib.suppress(OSError):
-                names = [name for name in os.listdir(folder) if name.startswith(start)]  # noqa: PTH208  fast
-                if any(name.endswith(".kernel") and _read(folder / name) is not None for name in names):
-                    return True
-        return False
+        return bool(held([self]))
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
         """Return the kernel for types of arguments; None if there is none on disk, or the file is damaged."""
         name = self._file(sig, target_context)
-        for folder in self._folders if self._enabled else ():
+        for folder in self.places if self._enabled else ():
             content = _read(folder / name) or b""
             checksum, code = content[:CHECKSUM_BYTES], content[CHECKSUM_BYTES:]
             if hashlib.sha256(code).digest() == checksum:
@@ -107,7 +102,7 @@ class KernelCache(_Cache):
         code = to_bytes(data)
         name = self._file(sig, data.target_context)
         failed: dict[str, str] = {}
-        for folder in self._folders:
+        for folder in self.places:
             try:
                 _write(folder / name, hashlib.sha256(code).digest() + code)
             except OSError as error:
@@ -128,20 +123,18 @@ class KernelCache(_Cache):
 
     def flush(self) -> None:
         """Remove this kernel's machine code for all sources, processors and types."""
-        for folder in self._folders:
+        for folder in self.places:
             with contextlib.suppress(OSError):
                 _remove(trust.real_folder(folder).glob(f"{self.name}.*.kernel"))
 
     def _file(self, sig: object, target_context: Any) -> str:
-        return f"{self.name}.{self._sources}-{_machine(target_context)}-{_short(str(sig))}.kernel"
+        return f"{self.name}.{self.sources}-{_machine(target_context)}-{_short(str(sig))}.kernel"
 
     def _forget_older(self, folder: Path, name: str) -> None:
         """Remove what this kernel was before its sources changed, on this machine."""
         machine = name.split("-")[-2]
         older = (
-            file
-            for file in folder.glob(f"{self.name}.*-{machine}-*.kernel")
-            if self._sources not in file.name
+            file for file in folder.glob(f"{self.name}.*-{machine}-*.kernel") if self.sources not in file.name
         )
         _remove(older)
 
@@ -154,6 +147,31 @@ class _Content(CompileResultCacheImpl):
         self._lineno = function.__code__.co_firstlineno
         self._py_file = function.__code__.co_filename
         self._locator = self
+
+
+def held(some: "Iterable[KernelCache]") -> "list[KernelCache]":
+    """Return those of some kernels of which there is machine code for this processor, for any types."""
+    listed = cache(_listed)
+    machine = _machine(cpu_target.target_context)
+    return [
+        kernel
+        for kernel in some
+        if any((kernel.name, f"{kernel.sources}-{machine}") in listed(folder) for folder in kernel.places)
+    ]
+
+
+def _listed(folder: Path) -> set[tuple[str, str]]:
+    """Return what is in a folder that may be loaded: kernels' names, each with the hashes of sources and machine."""
+    found = set()
+    with _trusting(folder):
+        names = [name for name in os.listdir(folder) if name.endswith(".kernel")]  # noqa: PTH208  fast
+        real = trust.real_folder(folder)
+        for file in names:
+            with _trusting(folder):
+                trust.check_file(real / file)
+                name, _, hashes = file.removesuffix(".kernel").rpartition("-")[0].rpartition(".")
+                found.add((name, hashes))
+    return found
 
 
 def folders(sources: Path) -> list[Path]:
@@ -186,14 +204,21 @@ def _machine(target_context: Any) -> str:
 
 def _read(file: Path) -> bytes | None:
     """Return what is in a file; None if there is none, or somebody else may have written it."""
-    try:
+    with _trusting(file.parent):
         file.lstat()
         return trust.read_file(trust.real_folder(file.parent) / file.name)
+    return None
+
+
+@contextlib.contextmanager
+def _trusting(folder: Path) -> Iterator[None]:
+    """Leave out what is not there, and, with a warning, what somebody else may have written into a folder."""
+    try:
+        yield
     except trust.DistrustError as error:
-        _warn(f"{error}, or delete {file.parent}; until then another folder is used")
+        _warn(f"{error}, or delete {folder}; until then another folder is used")
     except OSError:
         pass
-    return None
 
 
 def _warn(why: str) -> None:

@@ -64,6 +64,7 @@ def start(package, values="[1.0]", **environment):
             "PYTHONPATH": str(package.parent),
             "XDG_CACHE_HOME": str(package.parent / "home"),
             "NUMBA_CACHE_DIR": "",
+            "PYTHONDONTWRITEBYTECODE": "1",  # bytecode knows sources by their times
             **environment,
         },
         stdout=subprocess.PIPE,
@@ -104,9 +105,9 @@ def test_a_change_of_what_a_kernel_calls_or_uses_in_another_file_compiles_it_aga
 
 def test_where_the_sources_cannot_be_written_the_users_cache_folder_is_and_else_it_is_noted(package):
     (package / "__pycache__").write_text("a file where the folder would be")  # root may write anywhere
-    assert call(package, PYTHONDONTWRITEBYTECODE="1") == ["False", "3.0", "1", "0"]
+    assert call(package) == ["False", "3.0", "1", "0"]
     assert len(list((package.parent / "home").rglob("*outer*.kernel"))) == 1
-    assert call(package, PYTHONDONTWRITEBYTECODE="1") == ["True", "3.0", "0", "0"]
+    assert call(package) == ["True", "3.0", "0", "0"]
     assert call(package, NUMBA_CACHE_DIR="/proc/none") == ["False", "3.0", "1", "1"]
 
 

@@ -120,6 +120,7 @@ class PlanAhead:
             self._post(lambda: answer(_BUSY))
 
     def _run(self) -> None:
+        self._planner.rehearse_scripts()  # hundreds of milliseconds, for which no start waits
         while (waiting := self._queue.get()) is not None:
             try:
                 self._hand_over(waiting)

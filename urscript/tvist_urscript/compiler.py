@@ -11,7 +11,6 @@ from tvist_urscript.errors import ScriptError, syntax_error
 from tvist_urscript.failures import FILE
 from tvist_urscript.functions import MOST_FUNCTIONS, Functions
 from tvist_urscript.names import Scope, outline, scopes
-from tvist_urscript.parsing import parse
 from tvist_urscript.signatures import Signatures
 
 
@@ -143,6 +142,8 @@ def _statements(text: str) -> tree.Function:
 
 
 def _parsed(text: str, *, several: bool = False) -> list[tree.Statement]:
+    from tvist_urscript.parsing import parse  # with the library that parses, which no start waits for
+
     statements = parse(text, several=several)
     if not statements:
         raise ScriptError(1, 1, syntax_error(1, "the text has no statement"))

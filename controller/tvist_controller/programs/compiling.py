@@ -5,7 +5,7 @@ from functools import lru_cache
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.programs.built_in import built_in
 from tvist_controller.programs.interpreter import WAITS
-from tvist_controller.programs.library import MOVING, SIGNATURES
+from tvist_controller.programs.library import MOVING, known_signatures
 from tvist_plant.description import RobotDescription
 from tvist_protocol.programs import ProgramLoad, ProgramRun
 from tvist_urscript import Script, ScriptError, compile_script
@@ -28,7 +28,7 @@ class ScriptCompiler:
     def rehearse(self) -> None:
         """Build what compiling uses, before any program comes."""
         # Once as a program, and once as a statement that is added to it, which takes other ways through the compiler.
-        compile_script("sync()", SIGNATURES, compile_script("sync()", SIGNATURES))
+        compile_script("sync()", known_signatures(), compile_script("sync()", known_signatures()))
 
     def compile(self, command: ProgramLoad | ProgramRun) -> Script | None:
         """Return the program of a command; None if it names a program without giving its text that is not built in.
@@ -76,7 +76,7 @@ def _program(text: str) -> Script:
 
 def _compiled(text: str, after: Script | None = None) -> Script:
     try:
-        return compile_script(text, SIGNATURES, after)
+        return compile_script(text, known_signatures(), after)
     except ScriptError as error:
         raise _refusal(error.line, error.column, error.text) from error
 
