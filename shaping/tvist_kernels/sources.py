@@ -60,8 +60,8 @@ def _read(module: str) -> tuple[str, tuple[str, ...]]:
 @cache
 def _file(module: str) -> Path | None:
     """Return the file of a module, found without importing it; None if there is none."""
-    top, *inner = module.split(".")
-    place = _top(top)
+    package, *inner = module.split(".")
+    place = top(package)
     if place is None:
         return None
     if inner:
@@ -71,6 +71,7 @@ def _file(module: str) -> Path | None:
 
 
 @cache
-def _top(package: str) -> Path | None:
+def top(package: str) -> Path | None:
+    """Return the first file of a package that stands in none; None if it is not installed."""
     spec = find_spec(package)
     return None if spec is None or spec.origin is None else Path(spec.origin)

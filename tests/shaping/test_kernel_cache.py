@@ -189,7 +189,8 @@ def kernel(request, tmp_path, monkeypatch):
 
     function.__code__ = function.__code__.replace(co_filename=str(place / "module.py"))
     cache = KernelCache(function)
-    file = kernel_cache.folders(place)[0] / cache._file("types", cpu_target.target_context)
+    (machine, _) = kernel_cache._machines(cpu_target.target_context)
+    file = kernel_cache.folders(place)[0] / cache._file("types", machine)
     file.parent.mkdir(parents=True)
     code = pickle.dumps(Code(mark))
     file.write_bytes(hashlib.sha256(code).digest() + code)
