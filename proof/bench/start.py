@@ -49,9 +49,12 @@ def start(tell: Callable[[str], None]) -> dict[str, Figure]:
             "tvist serve until its first state", "s", found["serve"], libraries, found["libraries"]
         ),
         "first_start_s": figure(
-            "tvist serve until its first state, without what this machine has compiled", "s", [first] * REPETITIONS,
-            "with kernels on disk", found["serve"],
-        ),  # fmt: skip
+            "tvist serve until its first state, without what this machine has compiled",
+            "s",
+            [first] * REPETITIONS,
+            "with kernels on disk",
+            found["serve"],
+        ),
         "help_s": figure("tvist --help", "s", found["help"], small, found["small"]),
         "import_client_s": figure("import tvist_client", "s", found["client"], small, found["small"]),
         "import_robot_s": figure(
