@@ -89,6 +89,42 @@ def test_a_second_process_compiles_nothing_and_one_on_another_processor_all(pack
     assert call(package) == ["True", "3.0", "1", "0"]
 
 
+def test_what_a_distribution_brings_along_runs_unless_somebody_else_can_write_it_or_there_is_something_better(
+    package,
+):
+    made, own = package.parent / "made", {"NUMBA_CACHE_DIR": str(package.parent / "own")}
+    call(package, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="", NUMBA_CACHE_DIR=str(made))
+    shipped = package.parent / "tvist_compiled"
+    shipped.mkdir()
+    (shipped / "__init__.py").write_text("")
+    for file in made.rglob("*.kernel"):
+        file.rename(shipped / file.name)
+    assert call(package, **own) == ["True", "3.0", "0", "0"]
+    assert call(package, "[1]", **own) == [
+        "True",
+        "3.0",
+        "1",
+        "0",
+    ]  # another type; nothing is written beside them
+    assert len(list(shipped.glob("*.kernel"))) == 2
+    shipped.chmod(0o777)
+    again = call(package, **{**own, "NUMBA_CACHE_DIR": str(package.parent / "new")})
+    assert again == ["False", "3.0", "1", "0"]
+
+
+def test_to_load_a_kernel_nothing_is_imported_that_compiling_needs_unless_another_is_compiled(package):
+    unused = "; print([name for name in ('scipy', 'cffi', 'numba.np.linalg') if name in sys.modules])"
+    call(package)
+    environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
+    run = [sys.executable, "-c", CALL + unused.removeprefix("; "), "[1.0]"]
+    said = subprocess.run(run, env=environment, capture_output=True, text=True, check=True).stdout
+    assert said.split("\n")[-2] == "[]"
+    # A caller that is compiled anew takes in one that is loaded.
+    caller = package / "caller.py"
+    caller.write_text(caller.read_text().replace("+ 1.0", "+ 2.0"))
+    assert call(package) == ["False", "4.0", "1", "0"]
+
+
 def test_a_change_of_what_a_kernel_calls_or_uses_in_another_file_compiles_it_again(package):
     call(package)
     for name, old, new, value in (
