@@ -113,7 +113,7 @@ def test_what_a_distribution_brings_along_runs_unless_somebody_else_can_write_it
 
 
 def test_to_load_a_kernel_nothing_is_imported_that_compiling_needs_unless_another_is_compiled(package):
-    unused = "; print([name for name in ('scipy', 'cffi', 'numba.np.linalg') if name in sys.modules])"
+    unused = "; print([name for name in ('scipy.linalg', 'cffi', 'numba.np.linalg') if name in sys.modules])"
     call(package)
     environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
     run = [sys.executable, "-c", CALL + unused.removeprefix("; "), "[1.0]"]
