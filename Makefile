@@ -10,6 +10,8 @@ PROFILE ?= full
 READY := .venv/.ready
 # The folders of the distributions: tvist-protocol, tvist-shaping, tvist-urscript and tvist.
 DISTRIBUTIONS := ./protocol ./shaping ./urscript .
+# The folders of what they install.
+SOURCES := cli clients controller lab protocol shaping sim_plant testing tvist_server urscript view
 
 .PHONY: checksums page docs docs-serve rehearse release setup demo notebooks test test-all lint elsewhere bench soak dist format lock schemas clean
 
@@ -21,6 +23,8 @@ $(READY): requirements.lock pyproject.toml protocol/pyproject.toml shaping/pypro
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation $(addprefix --editable ,$(DISTRIBUTIONS))
+	@echo "and its bytecode, as pip makes it for what is not a checkout"
+	-$(BIN)/python -m compileall -q -j 0 $(SOURCES)
 	@touch $@
 
 demo: setup

@@ -52,7 +52,7 @@ def measured() -> Costs:
             if inner:
                 inner[-1][1].append(took)
 
-    Dispatcher.compile = watched
+    Dispatcher.compile = watched  # type: ignore[method-assign]
     for part in PARTS.values():
         part()
     return costs

@@ -1,5 +1,6 @@
 """Entry point of the `tvist` program and its list of commands; each command is imported when it is called."""
 
+import gc
 import os
 import shutil
 import signal
@@ -180,6 +181,7 @@ def _add(app: "cyclopts.App", package: str, commands: Mapping[str, str], called:
 
 def _run() -> None:
     if sys.argv[1:2] == ["serve"] and "--compile" not in sys.argv:
+        gc.disable()  # `serve` switches it on again: what is imported until then lives until the end
         # Nothing is served yet, so a signal can end the process at once. As the first process of a container,
         # it has no default action for signals.
         for number in ending_signals():

@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import msgspec
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.segment import Segment
-from rich.table import Table
 from rich.text import Text
 
 from tvist_cli.failure import interrupted
@@ -100,6 +98,8 @@ def progress(
     Raises:
         Failure: Control+C was pressed; the message says how many steps were done.
     """
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
     done = 0
 
     def advance(steps: int, name: str | None) -> None:
@@ -126,6 +126,8 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
     A table wider than the screen is printed in parts, one below the other, each with the first column.
     """
+    from rich.table import Table
+
     out.print(Text(title, style="bold"))
     for part in _parts(columns, rows):
         drawn = Table(show_edge=False, pad_edge=False)
@@ -153,6 +155,8 @@ def _parts(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[list[i
 
 def words(meanings: Mapping[str, str]) -> None:
     """Print words with what they mean beside them."""
+    from rich.table import Table
+
     grid = Table.grid(padding=(0, 2, 0, 0))
     grid.add_column(no_wrap=True)
     for word, meaning in meanings.items():

@@ -18,7 +18,7 @@ from tvist_protocol.errors import ProtocolError, TvistError
 from tvist_protocol.journal import Entry, lesson_of, message_of
 from tvist_protocol.recorded import THIS_BEHAVIOUR
 from tvist_protocol.stream import Event, State, Truth
-from tvist_server.recording import Recorder
+from tvist_server.recording.recorder import Recorder
 
 
 class ReplayError(TvistError):

@@ -1,10 +1,13 @@
 """Starts of programs, beside bare interpreters that import what these need."""
 
 import asyncio
+import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from tempfile import TemporaryDirectory
 
 from proof.bench.figure import Figure, figure, in_alternation
 from tvist_lab.bench.moving import Run
@@ -13,12 +16,14 @@ from tvist_lab.served import served
 REPETITIONS = 7
 LIBRARIES = "import numba, numpy, pinocchio, ruckig, msgspec, zenoh"
 """What a served robot needs of others."""
+WITHOUT = ("PYTHONDONTWRITEBYTECODE",)
+"""What keeps Python from writing bytecode."""
 SMALL = "import msgspec, zenoh"
 """What a client needs of others."""
 
 
 def start(tell: Callable[[str], None]) -> dict[str, Figure]:
-    """Measure starts with compiled kernels on disk.
+    """Measure starts with compiled kernels on disk, and one without.
 
     Args:
         tell: Called with a description of the measurement before it starts.
@@ -32,11 +37,23 @@ def start(tell: Callable[[str], None]) -> dict[str, Figure]:
         "used_client": _interpreter("-c", "from tvist_client import Robot"),
         "small": _interpreter("-c", SMALL),
     }
-    found = in_alternation(runs, REPETITIONS)
+    # An installation has its bytecode on disk, whether or not this process writes any.
+    with TemporaryDirectory() as bytecode, _environment({"PYTHONPYCACHEPREFIX": bytecode}, WITHOUT):
+        found = in_alternation(runs, REPETITIONS)
+        tell("a first start, which compiles what no distribution brings along")
+        with TemporaryDirectory() as kernels, _environment({"NUMBA_CACHE_DIR": kernels}):
+            first = _serve()
     libraries, small = "importing its libraries", "importing msgspec and zenoh"
     return {
         "serve_to_state_s": figure(
             "tvist serve until its first state", "s", found["serve"], libraries, found["libraries"]
+        ),
+        "first_start_s": figure(
+            "tvist serve until its first state, without what this machine has compiled",
+            "s",
+            [first] * REPETITIONS,
+            "with kernels on disk",
+            found["serve"],
         ),
         "help_s": figure("tvist --help", "s", found["help"], small, found["small"]),
         "import_client_s": figure("import tvist_client", "s", found["client"], small, found["small"]),
@@ -44,6 +61,20 @@ def start(tell: Callable[[str], None]) -> dict[str, Figure]:
             "from tvist_client import Robot", "s", found["used_client"], small, found["small"]
         ),
     }
+
+
+@contextmanager
+def _environment(given: Mapping[str, str], without: tuple[str, ...] = ()) -> Iterator[None]:
+    """Give the programs that are started meanwhile other environment variables."""
+    before = dict(os.environ)
+    try:
+        os.environ.update(given)
+        for name in without:
+            os.environ.pop(name, None)
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
 
 
 def _serve() -> float:

@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import sys
 from functools import cache
 from typing import Any
 
@@ -41,8 +42,7 @@ def components(
 @cache
 def field_docs(described: type) -> dict[str, str]:
     """Return the docstring under each field of a struct or member of an enumeration, in their order."""
-    (body,) = ast.parse(inspect.getsource(described)).body
-    assert isinstance(body, ast.ClassDef)
+    body = _classes(described.__module__)[described.__name__]
     docs: dict[str, str] = {}
     for field, below in zip(body.body, body.body[1:], strict=False):
         match field, below:
@@ -52,6 +52,13 @@ def field_docs(described: type) -> dict[str, str]:
             ):
                 docs[name] = " ".join(inspect.cleandoc(text).split())
     return docs
+
+
+@cache
+def _classes(module: str) -> dict[str, ast.ClassDef]:
+    """Return the classes of a module, parsed once: `inspect.getsource` of a class parses the whole module, too."""
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    return {part.name: part for part in ast.walk(tree) if isinstance(part, ast.ClassDef)}
 
 
 def _structs(messages: tuple[type[msgspec.Struct], ...]) -> set[type[msgspec.Struct]]:

@@ -4,6 +4,8 @@ numba's own cache has one file for each kernel that lists the others. It is rene
 changes, but not if a kernel in another file does that this one calls; and two processes that fill it at once can give
 each other's machine code the wrong name. Here a file's name says all that its content depends on, so that nothing is
 ever renewed, and it appears whole.
+
+A distribution of its own brings files along that run on any processor of its architecture.
 """
 
 # The types of numba are not whole.
@@ -16,8 +18,8 @@ import os
 import sys
 import uuid
 import warnings
-from collections.abc import Callable, Iterator
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +32,7 @@ from numba.misc.appdirs import AppDirs
 
 from tvist_kernels import trust
 from tvist_kernels.machine_code import from_bytes, to_bytes
-from tvist_kernels.sources import digest
+from tvist_kernels.sources import digest, top
 
 DIGITS = 16
 """Hexadecimal digits of each hash in a file's name."""
@@ -40,6 +42,8 @@ FORMAT = 2
 
 kernels: "list[KernelCache]" = []
 """Those of all functions that this process has imported so far."""
+SHIPPED = "tvist_compiled"
+"""Package, if it is installed, whose folder holds machine code that somebody else compiled."""
 unkept: dict[str, str] = {}
 """Why machine code could not be kept in any folder, by the folder that was tried last."""
 _said: set[str] = set()
@@ -66,38 +70,39 @@ class KernelCache(_Cache):
         kernels.append(self)
 
     @cached_property
-    def _sources(self) -> str:
+    def sources(self) -> str:
         """Hash of what the machine code depends on among our sources; computed when a kernel is first called."""
         return _short(digest(self._function.__module__) + self._function.__code__.co_code.hex())
 
     @cached_property
-    def _folders(self) -> list[Path]:
+    def places(self) -> list[Path]:
+        """The folders in which machine code is looked for, in this order."""
+        shipped = top(SHIPPED)
+        return self._own if shipped is None else [*self._own, shipped.parent]
+
+    @cached_property
+    def _own(self) -> list[Path]:
         return folders(Path(self._function.__code__.co_filename).parent)
 
     @property
     def cache_path(self) -> str:
         """The folder in which machine code is looked for first."""
-        return str(self._folders[0])
+        return str(self._own[0])
 
     def holds(self) -> bool:
         """Return whether there is machine code of this kernel for this processor, for any types."""
-        start = f"{self.name}.{self._sources}-{_machine(cpu_target.target_context)}-"
-        for folder in self._folders:
-            with contextlib.suppress(OSError):
-                names = [name for name in os.listdir(folder) if name.startswith(start)]  # noqa: PTH208  fast
-                if any(name.endswith(".kernel") and _read(folder / name) is not None for name in names):
-                    return True
-        return False
+        return bool(held([self]))
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
         """Return the kernel for types of arguments; None if there is none on disk, or the file is damaged."""
-        name = self._file(sig, target_context)
-        for folder in self._folders if self._enabled else ():
-            content = _read(folder / name) or b""
-            checksum, code = content[:CHECKSUM_BYTES], content[CHECKSUM_BYTES:]
-            if hashlib.sha256(code).digest() == checksum:
-                _cache_log("[cache] data loaded from %r", str(folder / name))  # with NUMBA_DEBUG_CACHE=1
-                return from_bytes(target_context, code)
+        for machine in _machines(target_context) if self._enabled else ():
+            name = self._file(sig, machine)
+            for folder in self.places:
+                content = _read(folder / name) or b""
+                checksum, code = content[:CHECKSUM_BYTES], content[CHECKSUM_BYTES:]
+                if hashlib.sha256(code).digest() == checksum:
+                    _cache_log("[cache] data loaded from %r", str(folder / name))  # with NUMBA_DEBUG_CACHE=1
+                    return from_bytes(target_context, code)
         return None
 
     def save_overload(self, sig: object, data: Any) -> None:
@@ -105,9 +110,9 @@ class KernelCache(_Cache):
         if not self._enabled or not self._content.check_cachable(data):
             return
         code = to_bytes(data)
-        name = self._file(sig, data.target_context)
+        name = self._file(sig, _machines(data.target_context)[0])
         failed: dict[str, str] = {}
-        for folder in self._folders:
+        for folder in self._own:
             try:
                 _write(folder / name, hashlib.sha256(code).digest() + code)
             except OSError as error:
@@ -128,20 +133,18 @@ class KernelCache(_Cache):
 
     def flush(self) -> None:
         """Remove this kernel's machine code for all sources, processors and types."""
-        for folder in self._folders:
+        for folder in self._own:
             with contextlib.suppress(OSError):
                 _remove(trust.real_folder(folder).glob(f"{self.name}.*.kernel"))
 
-    def _file(self, sig: object, target_context: Any) -> str:
-        return f"{self.name}.{self._sources}-{_machine(target_context)}-{_short(str(sig))}.kernel"
+    def _file(self, sig: object, machine: str) -> str:
+        return f"{self.name}.{self.sources}-{machine}-{_short(str(sig))}.kernel"
 
     def _forget_older(self, folder: Path, name: str) -> None:
         """Remove what this kernel was before its sources changed, on this machine."""
         machine = name.split("-")[-2]
         older = (
-            file
-            for file in folder.glob(f"{self.name}.*-{machine}-*.kernel")
-            if self._sources not in file.name
+            file for file in folder.glob(f"{self.name}.*-{machine}-*.kernel") if self.sources not in file.name
         )
         _remove(older)
 
@@ -154,6 +157,34 @@ class _Content(CompileResultCacheImpl):
         self._lineno = function.__code__.co_firstlineno
         self._py_file = function.__code__.co_filename
         self._locator = self
+
+
+def held(some: "Iterable[KernelCache]") -> "list[KernelCache]":
+    """Return those of some kernels of which there is machine code for this processor, for any types."""
+    listed, machines = cache(_listed), _machines(cpu_target.target_context)
+    return [
+        kernel
+        for kernel in some
+        if any(
+            (kernel.name, f"{kernel.sources}-{machine}") in listed(folder)
+            for machine in machines
+            for folder in kernel.places
+        )
+    ]
+
+
+def _listed(folder: Path) -> set[tuple[str, str]]:
+    """Return what is in a folder that may be loaded: kernels' names, each with the hashes of sources and machine."""
+    found = set()
+    with _trusting(folder):
+        names = [name for name in os.listdir(folder) if name.endswith(".kernel")]  # noqa: PTH208  fast
+        real = trust.real_folder(folder)
+        for file in names:
+            with _trusting(folder):
+                trust.check_file(real / file)
+                name, _, hashes = file.removesuffix(".kernel").rpartition("-")[0].rpartition(".")
+                found.add((name, hashes))
+    return found
 
 
 def folders(sources: Path) -> list[Path]:
@@ -177,23 +208,31 @@ def folders(sources: Path) -> list[Path]:
     return [named]
 
 
-def _machine(target_context: Any) -> str:
-    """Hash of the processor with its features, and of what compiles and loads for it."""
+def _machines(target_context: Any) -> list[str]:
+    """Hashes of processors whose machine code runs here, this one first, each with what compiles and loads for it."""
     python = (sys.implementation.cache_tag, getattr(sys, "abiflags", ""))
     versions = (FORMAT, python, numba.__version__, llvmlite.__version__)
-    return _short(repr((target_context.codegen().magic_tuple(), versions)))
+    own = target_context.codegen().magic_tuple()
+    return [_short(repr((processor, versions))) for processor in (own, (own[0], "generic", ""))]
 
 
 def _read(file: Path) -> bytes | None:
     """Return what is in a file; None if there is none, or somebody else may have written it."""
-    try:
+    with _trusting(file.parent):
         file.lstat()
         return trust.read_file(trust.real_folder(file.parent) / file.name)
+    return None
+
+
+@contextlib.contextmanager
+def _trusting(folder: Path) -> Iterator[None]:
+    """Leave out what is not there, and, with a warning, what somebody else may have written into a folder."""
+    try:
+        yield
     except trust.DistrustError as error:
-        _warn(f"{error}, or delete {file.parent}; until then another folder is used")
+        _warn(f"{error}, or delete {folder}; until then another folder is used")
     except OSError:
         pass
-    return None
 
 
 def _warn(why: str) -> None:

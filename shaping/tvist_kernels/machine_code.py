@@ -70,7 +70,7 @@ def _offer_memory() -> None:
 
 
 def _of_numba(environment: Any) -> bool:
-    return environment.globals["__name__"].startswith("numba.")
+    return str(environment.globals["__name__"]).startswith("numba.")
 
 
 @cache

@@ -13,6 +13,7 @@ _IMPORT = re.compile(
 )
 
 
+@cache
 def digest(module: str) -> str:
     """Return a hash of the contents of a module and of all modules of ours that it imports at its top, transitively.
 
@@ -45,6 +46,9 @@ def _read(module: str) -> tuple[str, tuple[str, ...]]:
     imported = set()
     for origin, names, whole in _IMPORT.findall(content.decode()):
         imported.add(origin or whole)
+        package = _file(origin) if origin else None
+        if package is None or package.name != "__init__.py":
+            continue
         # `from package import name`: the name may be that of a module.
         for name in re.findall(r"^\s*\(?\s*(\w+)|,\s*(\w+)", names):
             inner = f"{origin}.{name[0] or name[1]}"
@@ -56,12 +60,18 @@ def _read(module: str) -> tuple[str, tuple[str, ...]]:
 @cache
 def _file(module: str) -> Path | None:
     """Return the file of a module, found without importing it; None if there is none."""
-    top, *inner = module.split(".")
-    spec = find_spec(top)
-    if spec is None or spec.origin is None:
+    package, *inner = module.split(".")
+    place = top(package)
+    if place is None:
         return None
-    place = Path(spec.origin)
     if inner:
         place = place.parent.joinpath(*inner)
         place = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
     return place if place.is_file() else None
+
+
+@cache
+def top(package: str) -> Path | None:
+    """Return the first file of a package that stands in none; None if it is not installed."""
+    spec = find_spec(package)
+    return None if spec is None or spec.origin is None else Path(spec.origin)

@@ -50,6 +50,17 @@ def read_file(file: Path) -> bytes:
         return stream.read()
 
 
+def check_file(file: Path) -> None:
+    """Check, as a look that `read_file` repeats, that nobody but this user and root can have written a file.
+
+    Raises:
+        DistrustError: Somebody else owns it or can write it.
+        OSError: It is not there.
+    """
+    if sys.platform != "win32":
+        _check(file, file.lstat(), {0, os.geteuid()}, sticky=False)
+
+
 def make_folder(folder: Path) -> Path:
     """Make a folder, and those above it, in which this user alone can write, and return where it really is.
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from tvist_controller.programs.checking import check_program
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
-from tvist_controller.programs.library import SIGNATURES
+from tvist_controller.programs.library import known_signatures
 from tvist_controller.programs.table import page
 from tvist_urscript import METHOD
 
@@ -46,7 +46,9 @@ def test_functions_that_are_not_simulated_are_warnings_beside_the_errors():
 
 def test_every_function_that_is_not_simulated_is_warned_of():
     for name in SUBJECTS.keys() - {METHOD}:
-        needed = [one.name for one in SIGNATURES[name].parameters][: SIGNATURES[name].required]
+        needed = [one.name for one in known_signatures()[name].parameters][
+            : known_signatures()[name].required
+        ]
         (finding,) = check_program(script(f"{name}({', '.join('0' for _ in needed)})"))
         assert (finding.line, finding.level) == (2, "warning")
         assert finding.text.startswith(f"{name}: ")

@@ -4,6 +4,9 @@ A difference is either an error or a deliberate change of what a robot does. Aft
 `make.py` and `thin.py`, and CHANGELOG says what is different.
 """
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,6 +50,14 @@ def test_a_recorded_run_comes_out_again(path):
                 f"tick {recorded.tick}: {name} was {before}, is {after}"
             )
     assert list(map(told, again.events)) == list(map(told, content.events))
+
+
+@pytest.mark.nightly
+def test_what_is_compiled_for_any_processor_gives_the_same_bits(tmp_path):
+    """As in the wheels of `tvist-compiled`; all that is not compiled is the same."""
+    any_processor = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(tmp_path)}
+    run = [sys.executable, "-m", "pytest", "-q", "-m", "not nightly", __file__]
+    assert subprocess.run(run, env={**os.environ, **any_processor}, check=False).returncode == 0
 
 
 def test_a_run_of_another_behaviour_says_so():

@@ -9,7 +9,7 @@ from pathlib import Path
 from llvmlite import binding
 
 from tvist_lab.recordings.mcap_file import read
-from tvist_server.recording import Recorder
+from tvist_server.recording.recorder import Recorder
 
 EVERY = 50
 """Of so many states one is kept."""

@@ -21,7 +21,7 @@ from tvist_plant.plant import Foreseeing, ModalPlant, Truthful
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ConfigError, ServeConfig
-from tvist_server.recording import Recorder
+from tvist_server.recording.recorder import Recorder
 
 SEED = 314159
 

@@ -15,17 +15,6 @@ AFTER_ALL = (
 SLEEP = "import time; print('{}', flush=True); time.sleep(1000)"
 
 
-class Kernel:
-    """One that is on disk after so many looks."""
-
-    def __init__(self, looks):
-        self.looks = looks
-
-    def holds(self):
-        self.looks -= 1
-        return self.looks < 0
-
-
 @pytest.fixture
 def begun(monkeypatch):
     """What the processes run that compile, by part; those that were started."""
@@ -46,7 +35,9 @@ def begun(monkeypatch):
 
 def test_the_share_grows_from_look_to_look(begun, monkeypatch):
     begun[0].update(a="input()", b="input()")
-    monkeypatch.setattr(kernels, "KERNELS", tuple(map(Kernel, (0, 1, 3))))
+    monkeypatch.setattr(kernels, "KERNELS", "abc")
+    looks = iter(["a", "ab", "ab"])
+    monkeypatch.setattr(kernels, "held", lambda _: next(looks, "abc"))
     told = []
 
     def tell(*share):

@@ -25,7 +25,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ServeConfig
 from tvist_server.ending import SignalExit
-from tvist_server.recording import Recorder
+from tvist_server.recording.recorder import Recorder
 from tvist_server.schedule import Followed
 from tvist_server.workers import _rehearse
 

@@ -17,8 +17,9 @@ from tests.server.test_recording_writer import INFO, STATE, TRUTH
 from tvist_protocol import Event, Setpoint, State, Truth
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.recorded import JsonReader
-from tvist_server.recording import Recorder, RecorderError
 from tvist_server.recording import recorder as recorder_module
+from tvist_server.recording.errors import RecorderError
+from tvist_server.recording.recorder import Recorder
 from tvist_server.recording.whereabouts import whereabouts
 from tvist_server.recording.writer import RecordingWriter
 
@@ -332,7 +333,7 @@ CHILD = """
 import os, resource, sys
 import msgspec
 from tvist_protocol import Info, State
-from tvist_server.recording import Recorder
+from tvist_server.recording.recorder import Recorder
 
 path, info, state, size, limit = sys.argv[1:]
 if limit != "0":

@@ -17,8 +17,9 @@ from tvist_lab.replay import ReplayError, replay_file
 from tvist_protocol import Event, Io, State, Truth
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import earlier_name, topics
-from tvist_server.recording import Recorder, RecorderError, writer
+from tvist_server.recording import RecorderError, writer
 from tvist_server.recording.joined import complete
+from tvist_server.recording.recorder import Recorder
 from tvist_server.recording.ring import Ring
 from tvist_server.recording.writer import heading
 

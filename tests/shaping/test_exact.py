@@ -8,7 +8,8 @@ from tests.examples import examples
 
 from tvist_shaping import SHAPERS, DesignError, ShaperRangeError, band, ei, ei_exact, ei_of, residual
 from tvist_shaping.amplitudes import ripple
-from tvist_shaping.exact import HumpShaper
+from tvist_shaping.exact import EI, EI2, EI3, HumpShaper
+from tvist_shaping.unity import UM_ZV, UM_ZVD
 
 NAMES = ("ei_exact", "ei2_exact", "ei3_exact")
 
@@ -53,6 +54,11 @@ def test_two_and_three_humps_are_the_published_fits_in_undamped_periods(name, ta
         inner, last = np.split(np.abs(impulses.tau - t * math.sqrt(1.0 - zeta**2)), [4])
         assert inner.max() < 5e-3
         assert (last < 0.05).all()
+
+
+def test_the_durations_that_are_written_down_are_those_of_the_equations():
+    for shaper in (EI, EI2, EI3, UM_ZV, UM_ZVD):
+        assert shaper.longest() == shaper.duration_periods
 
 
 def test_in_damped_periods_the_published_times_are_wrong():

@@ -64,6 +64,7 @@ def start(package, values="[1.0]", **environment):
             "PYTHONPATH": str(package.parent),
             "XDG_CACHE_HOME": str(package.parent / "home"),
             "NUMBA_CACHE_DIR": "",
+            "PYTHONDONTWRITEBYTECODE": "1",  # bytecode knows sources by their times
             **environment,
         },
         stdout=subprocess.PIPE,
@@ -88,6 +89,42 @@ def test_a_second_process_compiles_nothing_and_one_on_another_processor_all(pack
     assert call(package) == ["True", "3.0", "1", "0"]
 
 
+def test_what_a_distribution_brings_along_runs_unless_somebody_else_can_write_it_or_there_is_something_better(
+    package,
+):
+    made, own = package.parent / "made", {"NUMBA_CACHE_DIR": str(package.parent / "own")}
+    call(package, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="", NUMBA_CACHE_DIR=str(made))
+    shipped = package.parent / "tvist_compiled"
+    shipped.mkdir()
+    (shipped / "__init__.py").write_text("")
+    for file in made.rglob("*.kernel"):
+        file.rename(shipped / file.name)
+    assert call(package, **own) == ["True", "3.0", "0", "0"]
+    assert call(package, "[1]", **own) == [
+        "True",
+        "3.0",
+        "1",
+        "0",
+    ]  # another type; nothing is written beside them
+    assert len(list(shipped.glob("*.kernel"))) == 2
+    shipped.chmod(0o777)
+    again = call(package, **{**own, "NUMBA_CACHE_DIR": str(package.parent / "new")})
+    assert again == ["False", "3.0", "1", "0"]
+
+
+def test_to_load_a_kernel_nothing_is_imported_that_compiling_needs_unless_another_is_compiled(package):
+    unused = "; print([name for name in ('scipy.linalg', 'cffi', 'numba.np.linalg') if name in sys.modules])"
+    call(package)
+    environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
+    run = [sys.executable, "-c", CALL + unused.removeprefix("; "), "[1.0]"]
+    said = subprocess.run(run, env=environment, capture_output=True, text=True, check=True).stdout
+    assert said.split("\n")[-2] == "[]"
+    # A caller that is compiled anew takes in one that is loaded.
+    caller = package / "caller.py"
+    caller.write_text(caller.read_text().replace("+ 1.0", "+ 2.0"))
+    assert call(package) == ["False", "4.0", "1", "0"]
+
+
 def test_a_change_of_what_a_kernel_calls_or_uses_in_another_file_compiles_it_again(package):
     call(package)
     for name, old, new, value in (
@@ -104,9 +141,9 @@ def test_a_change_of_what_a_kernel_calls_or_uses_in_another_file_compiles_it_aga
 
 def test_where_the_sources_cannot_be_written_the_users_cache_folder_is_and_else_it_is_noted(package):
     (package / "__pycache__").write_text("a file where the folder would be")  # root may write anywhere
-    assert call(package, PYTHONDONTWRITEBYTECODE="1") == ["False", "3.0", "1", "0"]
+    assert call(package) == ["False", "3.0", "1", "0"]
     assert len(list((package.parent / "home").rglob("*outer*.kernel"))) == 1
-    assert call(package, PYTHONDONTWRITEBYTECODE="1") == ["True", "3.0", "0", "0"]
+    assert call(package) == ["True", "3.0", "0", "0"]
     assert call(package, NUMBA_CACHE_DIR="/proc/none") == ["False", "3.0", "1", "1"]
 
 
@@ -188,7 +225,8 @@ def kernel(request, tmp_path, monkeypatch):
 
     function.__code__ = function.__code__.replace(co_filename=str(place / "module.py"))
     cache = KernelCache(function)
-    file = kernel_cache.folders(place)[0] / cache._file("types", cpu_target.target_context)
+    (machine, _) = kernel_cache._machines(cpu_target.target_context)
+    file = kernel_cache.folders(place)[0] / cache._file("types", machine)
     file.parent.mkdir(parents=True)
     code = pickle.dumps(Code(mark))
     file.write_bytes(hashlib.sha256(code).digest() + code)

@@ -50,6 +50,12 @@ def test_asked_for_the_band_of_a_known_shaper_it_is_that_shaper(name):
     np.testing.assert_allclose(tau, known.tau, atol=1e-5)
 
 
+def test_the_numbers_of_si_are_those_of_its_band():
+    made = si_of(0.75, 1.25)
+    assert (made.zeta_max, made.peak) == (SHAPERS["si"].zeta_max, SHAPERS["si"].peak)
+    np.testing.assert_allclose(SHAPERS["si"].train, made.train, rtol=0, atol=1e-12)
+
+
 def test_a_wider_band_takes_a_longer_train():
     durations = [specified(1.0 - w / 2.0, 1.0 + w / 2.0, 0.05)[1][-1] for w in np.linspace(0.01, 1.5, 150)]
     assert (np.diff(durations) > 0.0).all()

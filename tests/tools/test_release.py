@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from tools.release.attempt import attempt
 from tools.release.changelog import notes
+from tools.release.compiled import written
 from tools.release.environments import FailedError, check_is_built, constraints, installed, run
 from tools.release.first_commands import First, fences, first_command, first_commands
 from tools.release.prepare import check, prepare
@@ -22,6 +23,20 @@ DATE = "2031-02-03"
 
 def git(root, *words):
     run("git", "-c", "user.name=a", "-c", "user.email=a@example.org", *words, cwd=root)
+
+
+def test_a_wheel_with_machine_code_says_what_it_holds_and_what_it_needs(tmp_path):
+    wheel = written(tmp_path, {"a.b.c-d-e.kernel": b"code"}, "cp312", "1.2.3", "0.68.1", "0.50.0")
+    assert wheel.name.startswith("tvist_compiled-1.2.3-cp312-cp312-manylinux")
+    with zipfile.ZipFile(wheel) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    assert content["tvist_compiled/a.b.c-d-e.kernel"] == b"code"
+    about = content["tvist_compiled-1.2.3.dist-info/METADATA"].decode()
+    for demanded in ("tvist[server]==1.2.3", "numba==0.68.1", "llvmlite==0.50.0"):
+        assert f"Requires-Dist: {demanded}\n" in about
+    lines = content["tvist_compiled-1.2.3.dist-info/RECORD"].decode().splitlines()
+    assert [line.split(",")[0] for line in lines] == list(content)
+    assert all(str(len(content[name])) == size for name, _, size in (line.split(",") for line in lines[:-1]))
 
 
 @pytest.fixture

@@ -8,6 +8,8 @@ import tempfile
 from pathlib import Path
 
 from tools.release.changelog import notes
+from tools.release.compiled import compiled_wheel
+from tools.release.environments import FailedError
 from tools.release.prepare import check, prepare
 from tools.release.rehearse import rehearse
 from tools.release.versions import ReleaseError, common_version
@@ -34,6 +36,9 @@ def main() -> int:
     verbs.add_parser("notes", help="Print what the changelog says about the version.")
     summing = verbs.add_parser("checksums", help="Write SHA256SUMS beside the built files.")
     summing.add_argument("folder", type=Path, help="Folder with the files.")
+    compiling = verbs.add_parser("compiled", help="Add wheels with machine code for some Pythons.")
+    compiling.add_argument("folder", type=Path, help="Folder with the built files.")
+    compiling.add_argument("python", nargs="+", help="A Python, such as python3.12.")
     rehearsing = verbs.add_parser("rehearse", help="Make and try all that a release makes; publish nothing.")
     rehearsing.add_argument("--json", action="store_true", help="Print one JSON object.")
     given = parser.parse_args()
@@ -49,10 +54,14 @@ def main() -> int:
                 print(notes(given.root, common_version(given.root)), end="")
             case "checksums":
                 print(checksums(given.folder), end="")
+            case "compiled":
+                for python in given.python:
+                    wheel = compiled_wheel(given.root, given.folder.resolve(), python)
+                    print(f"{wheel.name}: {wheel.stat().st_size / 1e6:.1f} MB", flush=True)
             case "rehearse":
                 with tempfile.TemporaryDirectory(prefix="tvist-release-") as folder:
                     return 0 if rehearse(given.root, Path(folder), as_json=given.json) else 1
-    except ReleaseError as error:
+    except (FailedError, ReleaseError) as error:
         print(f"tools.release: {error}", file=sys.stderr)
         return 1
     return 0

@@ -51,13 +51,13 @@ def clean() -> dict[str, str]:
     return {**found, "PYTHONUNBUFFERED": "1"}
 
 
-def install(what: str, where: Path, dist: Path, versions: Path) -> None:
-    """Make an environment with what a line names, by uv where there is one.
+def install(what: str, where: Path, dist: Path, versions: Path, python: str = sys.executable) -> None:
+    """Make an environment of a Python with what a line names, by uv where there is one.
 
     Raises:
         FailedError: It could not be installed, or holds a distribution of ours that is not the one built.
     """
-    run(sys.executable, "-m", "venv", "--without-pip", where, cwd=dist)
+    run(python, "-m", "venv", "--without-pip", where, cwd=dist)
     uv = shutil.which("uv")
     at: list[str | Path] = ["--python", where / "bin" / "python"]
     pip = [uv, "pip", "install", *at] if uv else [sys.executable, "-m", "pip", *at, "install"]

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tvist_controller.controller import Controller
 from tvist_controller.reporting.sink import Sink
@@ -13,9 +13,11 @@ from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.courier import Courier
 from tvist_server.fleet import recording_of
 from tvist_server.gateways.exposure import ExposureError, check_endpoints, guarded, guarded_interfaces
-from tvist_server.gateways.ur.interfaces import UrInterfaces
 from tvist_server.learnt_file import LearntFile
 from tvist_server.robot import ServedRobot
+
+if TYPE_CHECKING:
+    from tvist_server.gateways.ur.interfaces import UrInterfaces
 
 
 def made_robot(
@@ -64,12 +66,14 @@ def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dic
         raise ConfigError(str(error)) from error
 
 
-def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> UrInterfaces:
+def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrInterfaces":
     """Return UR's interfaces of a robot, whose number gives their address.
 
     Raises:
         ConfigError: Other machines could reach them unprotected, or they cannot be there.
     """
+    from tvist_server.gateways.ur.interfaces import UrInterfaces
+
     address, ports = config.interfaces(number)
     try:
         guarded_interfaces(address, insecure=config.insecure)

@@ -10,7 +10,7 @@ from contextlib import suppress
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.loopback import LoopbackHost
-from tvist_kernels.cache import kernels, unkept
+from tvist_kernels.cache import held, kernels, unkept
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import Command, MoveJ, ServoStart, ServoStop, SetShaper, Stop, TakeControl
 from tvist_protocol.kinematics import ForwardKinematics
@@ -36,7 +36,7 @@ class KernelsError(RuntimeError):
 
 def compiled() -> int:
     """Return how many of `KERNELS` are on disk; if some are not, the start of a robot takes long."""
-    return sum(kernel.holds() for kernel in KERNELS)
+    return len(held(KERNELS))
 
 
 def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> None:
@@ -50,14 +50,12 @@ def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> Non
         KernelsError: Some could not be compiled or kept.
     """
     waiting, running, said = list(PARTS), list[_Process](), ""
-    missing = list(KERNELS)
     try:
         while waiting or running:
             while waiting and len(running) < (processes or processors()):
                 running.append(_begin(waiting.pop(0)))
-            missing = [kernel for kernel in missing if not kernel.holds()]
             if tell is not None:
-                tell(len(KERNELS) - len(missing), len(KERNELS))
+                tell(compiled(), len(KERNELS))
             with suppress(subprocess.TimeoutExpired):
                 running[0].wait(LOOK)
             for process in [process for process in running if process.poll() is not None]:

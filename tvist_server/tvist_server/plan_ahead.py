@@ -28,6 +28,7 @@ TRIES = 10
 CLOSE_WAIT = 1.0
 """Longest time to finish the current plan at close [s]."""
 
+_REHEARSING = threading.Lock()
 _BUSY = Refused(
     code="busy",
     where="",
@@ -120,6 +121,8 @@ class PlanAhead:
             self._post(lambda: answer(_BUSY))
 
     def _run(self) -> None:
+        with _REHEARSING:  # the robots of a process share what the first of them makes
+            self._planner.rehearse_scripts()  # hundreds of milliseconds, for which no start waits
         while (waiting := self._queue.get()) is not None:
             try:
                 self._hand_over(waiting)

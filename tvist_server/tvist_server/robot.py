@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
@@ -31,8 +32,10 @@ from tvist_server.program_folder import ProgramFolder
 from tvist_server.publisher import Publisher
 from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
-from tvist_server.recording.recorder import Recorder
 from tvist_server.studies import Studies
+
+if TYPE_CHECKING:
+    from tvist_server.recording.recorder import Recorder
 
 LOCAL = "127.0.0.1"
 """Address of this machine, from which commands of this process come."""
@@ -80,9 +83,9 @@ class ServedRobot:
             rehearse(self.controller.cycle)
             self.controller.motion.ahead.rehearse()
         info_of(self.controller)  # computes the slowest part of the description once, before the first tick
-        self.recorder = None
+        self.recorder: Recorder | None = None
         if record is not None:
-            self.recorder = Recorder(
+            self.recorder = _recorder(
                 record,
                 info_of(self.controller),
                 setup.to_builtins(),
@@ -300,6 +303,12 @@ class ServedRobot:
     def warn(self, why: str) -> None:
         """Publish a warning to clients and the console."""
         self.driven.post(lambda: self._host.warn(why))
+
+
+def _recorder(*given: Any, **how: Any) -> "Recorder":
+    from tvist_server.recording.recorder import Recorder  # with the library that writes
+
+    return Recorder(*given, **how)
 
 
 def _planner(setup: Setup) -> Planner:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from threading import Thread
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from tvist_controller.controller import Controller
 from tvist_controller.reporting.sink import Sink
@@ -23,11 +23,13 @@ from tvist_server.gateways.endpoints import is_local
 from tvist_server.gateways.metrics import Metrics
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.starting import Prepare, Starting
-from tvist_server.gateways.ur.interfaces import UrInterfaces
 from tvist_server.punctual import leave_processor, lock_memory
 from tvist_server.robot import ServedRobot
 from tvist_server.spread import Share, check_together
 from tvist_server.ur_ports import InterfaceName
+
+if TYPE_CHECKING:
+    from tvist_server.gateways.ur.interfaces import UrInterfaces
 
 LEAVE = 0.6
 """Longest time that clients have at shutdown to read pending messages [s]."""

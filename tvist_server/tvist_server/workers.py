@@ -13,6 +13,7 @@ import signal
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import import_module
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -148,6 +149,12 @@ class Workers:
     # ------------------------------------------------------------------ start
 
     def _fork(self) -> None:
+        for needed, name in (
+            (self._config.ur, "gateways.ur.interfaces"),
+            (self._config.record, "recording.recorder"),
+        ):
+            if needed:
+                import_module(f"tvist_server.{name}")
         gc.collect()
         gc.freeze()  # what exists stays shared memory: the collector writes to no object that it does not look at
         parts = shares(len(self.setups), self._config.workers)
@@ -271,7 +278,9 @@ def _rehearse(setup: Setup) -> None:
     Somebody's own arm is not touched: only the process that serves it makes it.
     """
     setup = replace(setup, plant=None)
-    Planner(setup).rehearse()
+    planner = Planner(setup)
+    planner.rehearse()
+    planner.rehearse_scripts()
     controller = Controller(setup)
     Host(controller).tick()
     rehearse(controller.cycle)

@@ -2,50 +2,15 @@
 
 import ast
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from types import CodeType, MappingProxyType
 
 from tvist_urscript import tree
 from tvist_urscript.errors import ScriptError, syntax_error
 from tvist_urscript.failures import FILE
 from tvist_urscript.functions import MOST_FUNCTIONS, Functions
-from tvist_urscript.names import Scope, outline, scopes
-from tvist_urscript.parsing import parse
+from tvist_urscript.names import outline, scopes
+from tvist_urscript.script import Script
 from tvist_urscript.signatures import Signatures
-
-
-@dataclass(frozen=True)
-class Script:
-    """A compiled script. It can run any number of times.
-
-    Attributes:
-        name: The name of its program; of one without `def` the first word.
-        secondary: It is a `sec`, which runs beside the program.
-        text: What it was compiled from.
-        main: The name of its main function.
-        functions: The code of its functions.
-        constants: Values that the code uses by name.
-        used: The built-in functions that it calls.
-        scope: What names mean on its outermost level.
-        scopes: Number of its scopes, with those of the program that it is added to.
-        idle: It only defines functions, so it ends at once.
-    """
-
-    name: str
-    secondary: bool
-    text: str
-    main: str
-    functions: tuple[CodeType, ...]
-    constants: Mapping[str, object]
-    used: frozenset[str]
-    scope: Scope = field(repr=False)
-    scopes: int
-    idle: bool = False
-
-    def forgetting(self, last: "Script") -> "Script":
-        """Return the program for later statements, which know nothing of what was added up to the last one."""
-        return replace(self, scopes=last.scopes)
 
 
 def compile_script(text: str, signatures: Signatures, after: Script | None = None) -> Script:
@@ -143,6 +108,8 @@ def _statements(text: str) -> tree.Function:
 
 
 def _parsed(text: str, *, several: bool = False) -> list[tree.Statement]:
+    from tvist_urscript.parsing import parse  # with the library that parses, which no start waits for
+
     statements = parse(text, several=several)
     if not statements:
         raise ScriptError(1, 1, syntax_error(1, "the text has no statement"))

@@ -4,12 +4,12 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
 from typing import Any
 
-from tvist_urscript.compiler import Script
 from tvist_urscript.errors import Fault, ScriptError
 from tvist_urscript.failures import TooDeep, failure, line_of, position_of
 from tvist_urscript.functions import DEEPEST_CALLS
 from tvist_urscript.namespace import Namespace
 from tvist_urscript.pieces import HERE, MISSING
+from tvist_urscript.script import Script
 from tvist_urscript.threads import MOST_THREADS, Thread
 from tvist_urscript.values import Value
 

@@ -5,9 +5,9 @@ from collections.abc import Callable, Collection, Mapping
 from types import FunctionType
 from typing import Any
 
-from tvist_urscript.compiler import Script
 from tvist_urscript.library import ANEW, PURE, WEIGHTS
 from tvist_urscript.operators import operators
+from tvist_urscript.script import Script
 from tvist_urscript.values import Array
 
 _NUMBERED = re.compile(r"[fc](\d+)_")

@@ -81,13 +81,19 @@ def signature(function: Callable[..., Any], *, linear: bool = False) -> Signatur
     )
 
 
-def signatures(functions: type) -> dict[str, Signature]:
-    """Return how scripts call the public methods of a class, by name and in the order of the class."""
-    return {
-        name: signature(method.__get__(functions))  # bound to anything: scripts do not give `self`
+def names(functions: type) -> list[str]:
+    """Return the names of the public methods of a class, in the order of the class."""
+    return [
+        name
         for name, method in vars(functions).items()
         if inspect.isfunction(method) and not name.startswith("_")
-    }
+    ]
+
+
+def signatures(functions: type) -> dict[str, Signature]:
+    """Return how scripts call the public methods of a class, by name and in the order of the class."""
+    # Bound to anything: scripts do not give `self`.
+    return {name: signature(vars(functions)[name].__get__(functions)) for name in names(functions)}
 
 
 def parameters(*required: str, **defaults: Value) -> tuple[Parameter, ...]:

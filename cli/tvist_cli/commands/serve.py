@@ -1,6 +1,7 @@
 """`tvist serve`: run a robot."""
 
 import asyncio
+import gc
 import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
@@ -57,6 +58,8 @@ def serve(
     from tvist_server.recording import RecorderError
     from tvist_server.server import Server
 
+    gc.freeze()
+    gc.enable()
     checked = configuration(given, config)
     with told(ConfigError, code=2):
         ending = Ending()

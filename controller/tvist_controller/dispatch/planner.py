@@ -35,7 +35,7 @@ class Planner:
         self._planners: dict[type, Any] = {type(one): one for one in planners}
 
     def rehearse(self) -> None:
-        """Compile what plans use, before any is needed: it takes long where nothing is in numba's cache."""
+        """Load what plans use, before any is needed; where it is not on disk, it is compiled, which takes long."""
         self.rehearse_postures()
         self.rehearse_plans()
 
@@ -47,6 +47,9 @@ class Planner:
         """Compile what is not inverse kinematics."""
         rehearse()
         self._paths.rehearse()
+
+    def rehearse_scripts(self) -> None:
+        """Make what compiling a program needs; that is Python alone, and may be done while a robot ticks."""
         self._scripts.rehearse()
 
     def for_lesson(self, lesson: Lesson, basis: FilterBasis) -> Plan:

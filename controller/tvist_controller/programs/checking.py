@@ -6,11 +6,11 @@ from difflib import get_close_matches
 from typing import Literal
 
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
-from tvist_controller.programs.library import SIGNATURES
+from tvist_controller.programs.library import known_signatures
 from tvist_urscript import METHOD, PURE, ScriptError, check, compile_script
 
-_SIMULATED = {name: one for name, one in SIGNATURES.items() if name not in SUBJECTS}
-_NAMES = {name.lower(): name for name in (*SIGNATURES, *PURE)}
+_SIMULATED = {name: one for name, one in known_signatures().items() if name not in SUBJECTS}
+_NAMES = {name.lower(): name for name in (*known_signatures(), *PURE)}
 _UNKNOWN = re.compile(r"compile_error_name_not_found:(\.?\w+):")
 
 
@@ -37,7 +37,7 @@ def check_program(text: str) -> list[Finding]:
     Args:
         text: The program: a `def` or `sec` with its `end`, or statements.
     """
-    findings = [_error(error) for error in check(text, SIGNATURES)]
+    findings = [_error(error) for error in check(text, known_signatures())]
     # Without these functions, the same check finds the places where they are called.
     known = {(finding.line, finding.column) for finding in findings}
     for error in check(text, _SIMULATED):
@@ -49,7 +49,7 @@ def check_program(text: str) -> list[Finding]:
         if subject is not None:
             text_of_it = f"{name}: this controller does not simulate {subject[1]}"
             findings.append(Finding(error.line, error.column, "warning", text_of_it))
-    if not known and compile_script(text, SIGNATURES).idle:
+    if not known and compile_script(text, known_signatures()).idle:
         why = "the text only defines functions: as a program, it ends at once"
         findings.append(Finding(1, 1, "warning", why))
     return sorted(findings, key=lambda finding: (finding.line, finding.column))

@@ -5,10 +5,10 @@ from functools import lru_cache
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.programs.built_in import built_in
 from tvist_controller.programs.interpreter import WAITS
-from tvist_controller.programs.library import MOVING, SIGNATURES
+from tvist_controller.programs.library import MOVING, known_signatures
 from tvist_plant.description import RobotDescription
 from tvist_protocol.programs import ProgramLoad, ProgramRun
-from tvist_urscript import Script, ScriptError, compile_script
+from tvist_urscript import Script, ScriptError
 
 KEPT = 8
 """Compiled programs that are kept, since many clients send the same text again and again."""
@@ -27,8 +27,10 @@ class ScriptCompiler:
 
     def rehearse(self) -> None:
         """Build what compiling uses, before any program comes."""
+        from tvist_urscript import compile_script  # with the compiler, which no start waits for
+
         # Once as a program, and once as a statement that is added to it, which takes other ways through the compiler.
-        compile_script("sync()", SIGNATURES, compile_script("sync()", SIGNATURES))
+        compile_script("sync()", known_signatures(), compile_script("sync()", known_signatures()))
 
     def compile(self, command: ProgramLoad | ProgramRun) -> Script | None:
         """Return the program of a command; None if it names a program without giving its text that is not built in.
@@ -75,8 +77,10 @@ def _program(text: str) -> Script:
 
 
 def _compiled(text: str, after: Script | None = None) -> Script:
+    from tvist_urscript import compile_script
+
     try:
-        return compile_script(text, SIGNATURES, after)
+        return compile_script(text, known_signatures(), after)
     except ScriptError as error:
         raise _refusal(error.line, error.column, error.text) from error
 

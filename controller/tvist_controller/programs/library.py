@@ -1,6 +1,7 @@
 """All functions of the controller that programs can call."""
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 from tvist_controller.programs.access import Access
@@ -24,7 +25,7 @@ from tvist_controller.programs.popups import Popups
 from tvist_controller.programs.runstate import RunstateOutputs
 from tvist_controller.programs.sockets import Sockets
 from tvist_controller.programs.watchdogs import Watchdogs
-from tvist_urscript import Signature, Signatures, signatures
+from tvist_urscript import Signature, Signatures, names, signatures
 
 FAMILIES: Mapping[type, str] = {
     MotionFunctions: "Motions",
@@ -42,15 +43,18 @@ FAMILIES: Mapping[type, str] = {
 }
 """What the functions of each class are about, in the order of the documentation."""
 
-SIGNATURES: Signatures = {
-    **{name: one for family in FAMILIES for name, one in signatures(family).items()},
-    **{name: Signature(given) for name, (given, _) in SUBJECTS.items()},
-    **signatures(IdleFunctions),
-}
-"""How scripts call each function; those of the language itself are in `tvist_urscript`."""
-
-MOVING = frozenset(signatures(MotionFunctions)) | {"interpreter_mode"}
+MOVING = frozenset(names(MotionFunctions)) | {"interpreter_mode"}
 """Functions that move the arm, or let clients do so."""
+
+
+@cache
+def known_signatures() -> Signatures:
+    """Return how scripts call each function; those of the language itself are in `tvist_urscript`."""
+    return {
+        **{name: one for family in FAMILIES for name, one in signatures(family).items()},
+        **{name: Signature(given) for name, (given, _) in SUBJECTS.items()},
+        **signatures(IdleFunctions),
+    }
 
 
 def functions(
@@ -79,4 +83,4 @@ def functions(
         GripperFunctions(access, arm),
         IdleFunctions(),
     )
-    return MISSING | {name: getattr(family, name) for family in families for name in signatures(type(family))}
+    return MISSING | {name: getattr(family, name) for family in families for name in names(type(family))}

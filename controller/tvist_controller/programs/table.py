@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from inspect import getdoc
 
 from tvist_controller.programs.functions.unsimulated import SUBJECTS, IdleFunctions
-from tvist_controller.programs.library import FAMILIES, SIGNATURES
+from tvist_controller.programs.library import FAMILIES, known_signatures
 from tvist_urscript import METHOD, REQUIRED, Signature, signatures
 
 HEAD = """# Functions of programs
@@ -33,9 +33,12 @@ def page() -> str:
             for name, one in signatures(functions).items()
         ]
         parts.append(f"## {title}\n\n{_table(('function', '', 'what'), rows)}\n")
-    costs = sorted({one.cost for one in SIGNATURES.values() if one.cost > 1}, reverse=True)
+    costs = sorted({one.cost for one in known_signatures().values() if one.cost > 1}, reverse=True)
     dear = [
-        (str(cost), ", ".join(f"`{name}`" for name, one in sorted(SIGNATURES.items()) if one.cost == cost))
+        (
+            str(cost),
+            ", ".join(f"`{name}`" for name, one in sorted(known_signatures().items()) if one.cost == cost),
+        )
         for cost in costs
     ]
     parts.append(f"## Costs\n\n{COSTS}\n\n{_table(('evaluations', 'functions'), dear)}\n")

@@ -14,7 +14,7 @@ from tvist_protocol.commands import Command
 from tvist_protocol.programs import ProgramClosePopup
 from tvist_server.config import ConfigError
 from tvist_server.learnt_file import LearntFile
-from tvist_server.recording import Recorder
+from tvist_server.recording.recorder import Recorder
 
 ATTEND_EVERY = 50
 """Ticks between two calls of the function that tells people about the run."""

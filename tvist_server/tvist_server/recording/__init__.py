@@ -1,5 +1,5 @@
 """Recording of every tick, and of everything that reached the controller, to an MCAP file."""
 
-from tvist_server.recording.recorder import Recorder, RecorderError
+from tvist_server.recording.errors import RecorderError
 
-__all__ = ["Recorder", "RecorderError"]
+__all__ = ["RecorderError"]

@@ -15,7 +15,7 @@ from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import Recorded
 from tvist_protocol.stream import Event, State, Truth
-from tvist_server.recording.recorder import Recorder, RecorderError
+from tvist_server.recording.errors import RecorderError
 
 log = logging.getLogger(__name__)
 
@@ -93,6 +93,8 @@ class BlackBox(Sink):
             ).start()
 
     def _write_file(self, path: Path, info: Info, messages: list[Recorded]) -> None:
+        from tvist_server.recording.recorder import Recorder  # with the library that writes
+
         try:
             with Recorder(path, info, self._start, wait=True) as recorder:
                 for message in messages:

@@ -21,6 +21,7 @@ from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import Recorded, topics
 from tvist_protocol.stream import Event, State, Truth
+from tvist_server.recording.errors import RecorderError
 from tvist_server.recording.kept import OccupiedError, set_aside
 from tvist_server.recording.one_file import OneFile
 from tvist_server.recording.ring import Ring
@@ -39,10 +40,6 @@ call, and the interpreter's lock in the middle of its work.
 """
 LOOK = 1.0
 """Time between two checks whether the file has been moved or deleted [s]."""
-
-
-class RecorderError(TvistError):
-    """A recording cannot be started."""
 
 
 class MovedError(Exception):

@@ -39,7 +39,8 @@ def record(
     from tvist_client.robot import Robot
     from tvist_server.durations import ticks_of
     from tvist_server.ending import Ending
-    from tvist_server.recording import Recorder, RecorderError
+    from tvist_server.recording import RecorderError
+    from tvist_server.recording.recorder import Recorder
 
     with told(ValueError, code=2):
         kept = None if keep is None else ticks_of(keep, "keep")
