@@ -4,6 +4,7 @@ import logging
 import os
 from collections import deque
 from collections.abc import Callable, Mapping
+from copy import copy
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -50,7 +51,7 @@ class BlackBox(Sink):
     def report(self, report: Report) -> None:
         """Keep a tick, of which a file needs the state; the first one after a failure is the last one in its file."""
         kept = self._kept
-        kept.append(report)
+        kept.append(copy(report))  # without what others will make of it, which would double its size
         while kept[0].tick < report.tick - KEPT:
             kept.popleft()
         if self._failed:
