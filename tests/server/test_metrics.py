@@ -20,6 +20,10 @@ TELEMETRY = Telemetry(
 )  # fmt: skip
 
 
+def nobody():
+    """A robot without a state."""
+
+
 @pytest.fixture
 def metrics():
     metrics = Metrics("0")
@@ -33,7 +37,7 @@ def read(metrics):
 
 
 def test_what_a_robot_says_is_on_the_page_with_its_place(metrics):
-    gateway = metrics.gateway("hall-3", "left")
+    gateway = metrics.gateway("hall-3", "left", nobody)
     gateway.publish("telemetry", TELEMETRY, b"")
     for _ in range(2):
         gateway.publish("event", Event(tick=1, kind="lease_lost", id=None, why="gone"), b"")
@@ -53,13 +57,13 @@ def test_what_a_robot_says_is_on_the_page_with_its_place(metrics):
 
 
 def test_a_robot_that_has_said_nothing_has_no_figures(metrics):
-    metrics.gateway("", "left")
+    metrics.gateway("", "left", nobody)
     assert all(not family.samples for family in read(metrics).values())
 
 
 def test_in_lockstep_nothing_is_due(metrics):
     telemetry = msgspec.structs.replace(TELEMETRY, due_ticks=None, load=None)
-    metrics.gateway("", "left").publish("telemetry", telemetry, b"")
+    metrics.gateway("", "left", nobody).publish("telemetry", telemetry, b"")
     families = read(metrics)
     assert not families["tvist_due_ticks"].samples
     assert families["tvist_missed_ticks"].samples

@@ -1,20 +1,24 @@
 """What a robot says waits in order, is dropped and counted or waited for, and is handed on when somebody comes."""
 
 import threading
+from copy import copy
 
 from tests.controller.robots import Robot
 
 from tvist_protocol.codec import decode_event, decode_state
 from tvist_protocol.stream import Event
 from tvist_server.courier import Courier
+from tvist_server.gateways.base import Gateway
 from tvist_server.publisher import MAX_WAITING, Publisher
 
 WAIT = 30.0
 ROBOT = Robot()
 STATE, IO = ROBOT.tick(), ROBOT.controller.io()
+REPORT = ROBOT.controller.report
+TRUTH = ROBOT.controller.truth()
 
 
-class NotingGateway:
+class NotingGateway(Gateway):
     """Keeps what is published; may hold up whoever publishes."""
 
     def __init__(self):
@@ -28,6 +32,9 @@ class NotingGateway:
         self.published.append((topic, data))
         self.news.set()
 
+    def close(self):
+        """Nothing is open."""
+
 
 def publisher(*, lossless=False):
     gateway, made = NotingGateway(), Publisher(lossless=lossless)
@@ -38,7 +45,7 @@ def publisher(*, lossless=False):
 def test_messages_and_answers_go_out_in_their_order():
     gateway, made = publisher()
     made.event(Event(tick=1, kind="warning"))
-    made.state(STATE)
+    made.report(REPORT)
     made.answer(lambda: gateway.published.append(("reply", None)))
     assert gateway.published == []
     made.hand_on()
@@ -50,7 +57,7 @@ def test_messages_and_answers_go_out_in_their_order():
 def test_in_real_time_states_without_room_are_dropped_and_counted_and_events_are_not():
     gateway, made = publisher()
     for _ in range(MAX_WAITING + 10):
-        made.state(STATE)
+        made.report(REPORT)
     made.event(Event(tick=1, kind="warning"))
     made.hand_on()
     assert made.dropped == 10
@@ -59,12 +66,12 @@ def test_in_real_time_states_without_room_are_dropped_and_counted_and_events_are
 
 def test_in_lockstep_the_robot_waits_for_room_and_nothing_is_lost():
     gateway, made = publisher(lossless=True)
-    courier = Courier([made.hand_on])
+    courier = Courier([made])
     made.open([gateway], courier.wake)
     gateway.free.clear()
     courier.start()
     states = MAX_WAITING + 500
-    robot = threading.Thread(target=lambda: [made.state(STATE) for _ in range(states)])
+    robot = threading.Thread(target=lambda: [made.report(REPORT) for _ in range(states)])
     robot.start()
     gateway.free.set()
     robot.join(WAIT)
@@ -76,7 +83,7 @@ def test_in_lockstep_the_robot_waits_for_room_and_nothing_is_lost():
 
 def test_whoever_waits_for_room_goes_on_when_the_robot_is_about_to_end():
     _, made = publisher(lossless=True)
-    robot = threading.Thread(target=lambda: [made.state(STATE) for _ in range(MAX_WAITING + 1)])
+    robot = threading.Thread(target=lambda: [made.report(REPORT) for _ in range(MAX_WAITING + 1)])
     robot.start()
     made.hurry()
     robot.join(WAIT)
@@ -86,10 +93,10 @@ def test_whoever_waits_for_room_goes_on_when_the_robot_is_about_to_end():
 
 def test_one_courier_empties_the_outlets_of_several_robots():
     pairs = [publisher() for _ in range(3)]
-    courier = Courier([made.hand_on for _, made in pairs])
+    courier = Courier([made for _, made in pairs])
     courier.start()
     for _, made in pairs:
-        made.state(STATE)
+        made.report(REPORT)
     courier.wake()
     for gateway, _ in pairs:
         assert gateway.news.wait(WAIT)
@@ -99,7 +106,7 @@ def test_one_courier_empties_the_outlets_of_several_robots():
 def test_a_gateway_that_fails_is_logged_and_the_next_message_goes_out(caplog):
     gateway, made = publisher()
     made.answer(lambda: 1 / 0)
-    made.state(STATE)
+    made.report(REPORT)
     made.hand_on()
     assert "ZeroDivisionError" in caplog.text
     assert [topic for topic, _ in gateway.published] == ["state"]
@@ -107,6 +114,38 @@ def test_a_gateway_that_fails_is_logged_and_the_next_message_goes_out(caplog):
 
 def test_the_state_and_io_are_told_again_to_those_who_come_late():
     gateway, made = publisher()
-    made.repeat(STATE, IO)
+    made.repeat(REPORT, IO)
     made.hand_on()
     assert [topic for topic, _ in gateway.published] == ["io", "state"]
+
+
+def test_what_no_gateway_takes_is_neither_queued_nor_made():
+    gateway, made = publisher()
+    gateway.takes = {"event"}
+    report = copy(REPORT)
+    report.made = report.written = None
+    made.report(report)
+    made.truth(TRUTH)
+    assert not made.waiting
+    made.event(Event(tick=1, kind="warning"))
+    made.io(IO)
+    made.hand_on()
+    assert [topic for topic, _ in gateway.published] == ["event"]
+    gateway.takes = {"event", "state"}
+    made.report(report)
+    made.hand_on()
+    assert decode_state(gateway.published[-1][1]) == STATE
+
+
+def test_a_courier_is_not_woken_when_nothing_waits():
+    gateway, made = publisher()
+    calls = []
+    made.hand_on = lambda: calls.append(len(made.waiting)) or Publisher.hand_on(made)
+    courier = Courier([made])
+    courier.start()
+    courier.wake()
+    made.report(REPORT)
+    courier.wake()
+    assert gateway.news.wait(WAIT)
+    courier.close()
+    assert calls[0] == 1

@@ -10,6 +10,7 @@ from tvist_protocol.programs import ProgramLoad, ProgramPlay
 from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationStep
 from tvist_protocol.stream import State
+from tvist_server.gateways.base import Gateway
 from tvist_server.robot import ServedRobot
 
 
@@ -20,10 +21,10 @@ class NoLateness:
         return None
 
 
-class IoGateway:
+class IoGateway(Gateway):
     """Keeps what is told of inputs, outputs, registers and programs."""
 
-    dropped = setpoints_refused = 0
+    setpoints_refused = 0
 
     def __init__(self):
         self.told = []
@@ -31,6 +32,9 @@ class IoGateway:
     def publish(self, _topic, message, _data):
         if isinstance(message, Io):
             self.told.append(message)
+
+    def close(self):
+        """Nothing is open."""
 
 
 def test_with_the_telemetry_io_is_told_as_it_is_and_not_as_it_was_before_the_last_commands(tmp_path):

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import msgpack
 import pytest
@@ -208,6 +209,48 @@ def test_what_is_published_arrives_with_its_encoding(gateway, session):
         topic: f"tvist/ur5e/{topic}" for topic in ("state", "event", "telemetry")
     }
     assert {str(s.encoding) for s in samples} == {"application/msgpack"}
+
+
+def taken(gateway, topic, *, taken):
+    """Wait until a gateway takes a topic, or does no longer."""
+    end = time.monotonic() + WAIT
+    while (topic in gateway.takes) != taken:
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+@pytest.mark.parametrize("key", ["tvist/ur5e/state", "tvist/*/state", "**"])
+def test_in_real_time_states_are_taken_while_somebody_subscribes_to_them(gateway, session, endpoint, key):
+    assert gateway.takes == {"event", "telemetry", "io"}
+    with connect(endpoint) as other:
+        others = other.declare_subscriber(key, queue.Queue().put)
+        taken(gateway, "state", taken=True)
+        subscriber = session.declare_subscriber(key, queue.Queue().put)
+        replies(session, "tvist/ur5e/info")
+        others.undeclare()
+        replies(other, "tvist/ur5e/info")
+        assert "state" in gateway.takes
+        subscriber.undeclare()
+        taken(gateway, "state", taken=False)
+        other.declare_subscriber(key, queue.Queue().put)
+        taken(gateway, "state", taken=True)
+    taken(gateway, "state", taken=False)  # it has left without a word
+
+
+def test_who_subscribed_before_the_robot_was_ready_gets_its_states(network, endpoint, desk):
+    network.expect(["ur5e"], desk)
+    with connect(endpoint) as early:
+        subscribe(early, "tvist/ur5e/truth")
+        replies(early, "tvist/ur5e/info")
+        told = []
+        gateway = network.gateway("ur5e", desk, lockstep=False, truth=False, wanted=told.append)
+        taken(gateway, "truth", taken=True)
+        assert told == [True]
+        assert "state" not in gateway.takes
+
+
+def test_in_lockstep_every_state_is_taken(lockstep_gateway):
+    assert lockstep_gateway.takes == {"state", "event", "truth", "telemetry", "io"}
 
 
 def test_in_lockstep_events_states_and_truth_keep_their_order(lockstep_gateway, session):

@@ -116,7 +116,7 @@ def drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Co
     In lockstep no message may be lost, so a courier waits for a slow client, and must not delay other robots.
     """
     if config.clock == "realtime":
-        courier, driven = Courier([robot.hand_on for robot in robots]), [robot.driven for robot in robots]
+        courier, driven = Courier([robot.publisher for robot in robots]), [robot.driven for robot in robots]
         clock = Realtime(
             driven,
             courier.wake,
@@ -126,5 +126,5 @@ def drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Co
             processor=config.processor,
         )
         return [courier], [clock]
-    couriers = [Courier([robot.hand_on]) for robot in robots]
+    couriers = [Courier([robot.publisher]) for robot in robots]
     return couriers, [Lockstep(robot.driven, robot.repeat) for robot in robots]

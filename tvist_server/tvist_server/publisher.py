@@ -1,7 +1,8 @@
 """Output queue of one robot: states, events and replies wait here, in order, for the thread that hands them on.
 
 The controller's thread only appends to the queue. If the network is slow, the queue grows to its limit. Then states
-are dropped and counted in real time; in lockstep, where no state may be lost, the controller waits.
+are dropped and counted in real time; in lockstep, where no state may be lost, the controller waits. What no gateway
+takes is not queued, so that it need not be made.
 """
 
 import logging
@@ -9,6 +10,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
+from tvist_controller.reporting.report import Report
 from tvist_controller.reporting.sink import Sink, Topic
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
@@ -26,7 +28,9 @@ published states, the later a client's reaction to a state arrives.
 PAUSE = 0.02
 """Longest wait of the controller between two checks for room [s]."""
 
-TOPICS: Mapping[type[Message], Topic] = {
+Announced = Event | Truth | Telemetry | Io
+TOPICS: Mapping[type[Report | Message], Topic] = {
+    Report: "state",
     State: "state",
     Event: "event",
     Truth: "truth",
@@ -46,7 +50,8 @@ class Publisher(Sink):
         self._lossless = lossless
         self._gateways: Sequence[Gateway] = ()
         self._wake: Callable[[], None] = _nobody
-        self._queue: deque[Message | Callable[[], None]] = deque()
+        self.waiting: deque[Report | Announced | Callable[[], None]] = deque()
+        """Messages and answers that wait to be handed on."""
         self._room = threading.Event()
         self.dropped = 0
         """Number of messages of a tick that were dropped for lack of room."""
@@ -72,18 +77,19 @@ class Publisher(Sink):
 
     def hand_on(self) -> None:
         """Hand on the messages waiting now; later ones wait for the next call, so that other robots get their turn."""
-        queue = self._queue
-        for _ in range(len(queue)):
-            item = queue.popleft()
-            if self._lossless and len(queue) <= LEAD // 2:
+        waiting = self.waiting
+        for _ in range(len(waiting)):
+            item = waiting.popleft()
+            if self._lossless and len(waiting) <= LEAD // 2:
                 self._room.set()
             try:
                 self._publish(item)
             except Exception:
                 log.exception("could not hand on a message")
 
-    def state(self, state: State) -> None:
-        self._offer(state)
+    def report(self, report: Report) -> None:
+        """Queue a tick's state."""
+        self._offer(report)
 
     def event(self, event: Event) -> None:
         self._put(event)
@@ -103,38 +109,50 @@ class Publisher(Sink):
         """Queue a call that answers a client, behind the states that precede it."""
         self._put(call)
 
-    def repeat(self, state: State, io: Io) -> None:
+    def repeat(self, report: Report, io: Io) -> None:
         """Publish the present state, inputs, outputs and registers again, for new clients."""
         self._put(io)
-        self._put(state)
+        self._put(report)
 
-    def _offer(self, message: State | Truth | Io) -> None:
-        """Queue a message of a tick, if there is room."""
-        if self._lossless and len(self._queue) >= LEAD:
+    def _offer(self, message: Report | Truth | Io) -> None:
+        """Queue a message of a tick, if somebody takes it and there is room."""
+        topic = TOPICS[type(message)]
+        for gateway in self._gateways:
+            if topic in gateway.takes:
+                break
+        else:
+            return
+        if self._lossless and len(self.waiting) >= LEAD:
             self._wait_for_room()
-        if len(self._queue) < MAX_WAITING:
+        if len(self.waiting) < MAX_WAITING:
             self._put(message)
         else:
             self.dropped += 1
 
     def _wait_for_room(self) -> None:
         """Wait until half of the room is free: waking up for each message would cost more than the message."""
-        while self._lossless and len(self._queue) > LEAD // 2:
+        while self._lossless and len(self.waiting) > LEAD // 2:
             self._room.clear()
             self._room.wait(PAUSE)
 
-    def _put(self, item: Message | Callable[[], None]) -> None:
-        self._queue.append(item)
+    def _put(self, item: Report | Announced | Callable[[], None]) -> None:
+        self.waiting.append(item)
         self._wake()
 
-    def _publish(self, item: Message | Callable[[], None]) -> None:
-        if not isinstance(item, Message):
+    def _publish(self, item: Report | Announced | Callable[[], None]) -> None:
+        if isinstance(item, Report):
+            for gateway in self._gateways:
+                if "state" in gateway.takes:
+                    gateway.report(item)
+        elif isinstance(item, Announced):
+            topic = TOPICS[type(item)]
+            takers = [gateway for gateway in self._gateways if topic in gateway.takes]
+            # Encoded once for all gateways, and here rather than in the tick thread, whose time is short (decision 14).
+            data = encode(item) if takers else b""
+            for gateway in takers:
+                gateway.publish(topic, item, data)
+        else:
             item()
-            return
-        # Encoded once for all gateways, and here rather than in the tick thread, whose time is short (decision 14).
-        topic, data = TOPICS[type(item)], encode(item)
-        for gateway in self._gateways:
-            gateway.publish(topic, item, data)
 
 
 def _nobody() -> None:

@@ -19,7 +19,7 @@ from tvist_plant.plant import Pacing, Truthful
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Refused, Reply
-from tvist_protocol.stream import Telemetry
+from tvist_protocol.stream import State, Telemetry
 from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.clock import Clock, Mailbox
 from tvist_server.gateways.base import Answer, Gateway
@@ -95,8 +95,9 @@ class ServedRobot:
                 on_moved=self.warn,
             )
         black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins())
-        self._publisher = Publisher(lossless=lockstep)
-        self._looked_at = self.controller.latest.tick
+        self.publisher = Publisher(lossless=lockstep)
+        """Queue of its messages, which a courier empties."""
+        self._looked_at = self.controller.report.tick
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
@@ -112,13 +113,13 @@ class ServedRobot:
                 setup, students, self._studies.later, lambda lesson, on: planner.for_lesson(lesson, on.basis)
             )
         self._host = Host(
-            self.controller, *sinks, black_box, self._publisher, ports=self.sockets, experience=experience
+            self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience
         )
         if learnt is not None:
             learnt.recall(self._host)
         plant = self.controller.cycle.line.plant
         knows = isinstance(plant, Truthful) and plant.truth() is not None
-        self.want_truth = self._publisher.want_truth if knows and not setup.truth else None
+        self.want_truth = self.publisher.want_truth if knows and not setup.truth else None
         """To be told whether a client on this machine wants the truth; None if it is published anyway, or unknown."""
         self.driven = Mailbox(
             self._host, self.sockets.patience, plant.wait if isinstance(plant, Pacing) else None
@@ -132,7 +133,7 @@ class ServedRobot:
             self._host,
             self.driven.post,
             carry_out,
-            self._publisher.answer,
+            self.publisher.answer,
             None if programs is None else programs.listed,
         )
         """Desk that gateways pass messages to."""
@@ -146,7 +147,7 @@ class ServedRobot:
             wake: Called for every message, if no thread hands them on regularly.
         """
         self._gateways = gateways
-        self._publisher.open(gateways, wake)
+        self.publisher.open(gateways, wake)
 
     def request(self, command: Command) -> Reply:
         """Carry out a command of this process, in the controller's thread or before the clock starts.
@@ -157,15 +158,15 @@ class ServedRobot:
 
     def hand_on(self) -> None:
         """Hand on the messages that wait for the gateways."""
-        self._publisher.hand_on()
+        self.publisher.hand_on()
 
     def repeat(self) -> None:
         """Publish the state again for new clients, unless time has passed; in the controller's thread."""
-        state = self.controller.latest
+        report = self.controller.report
         # A robot that is stepped publishes newer ones by itself, and to its clients an old one would look like a tick.
-        if state.tick == self._looked_at:
-            self._publisher.repeat(state, self.controller.io())
-        self._looked_at = state.tick
+        if report.tick == self._looked_at:
+            self.publisher.repeat(report, self.controller.io())
+        self._looked_at = report.tick
 
     def _carry_out(self, admitted: Admitted, answer: Answer) -> None:
         client = admitted.client
@@ -184,6 +185,12 @@ class ServedRobot:
 
     # ------------------------------------------------------------------ figures and shutdown
 
+    @property
+    def newest(self) -> State | None:
+        """State of the last tick, from any thread; None before the first tick."""
+        report = self.controller.report
+        return report.state if report.tick > 0 else None
+
     def start(self) -> None:
         """Start to plan; to be called before the clock starts."""
         if self._plan_ahead is not None:
@@ -201,7 +208,7 @@ class ServedRobot:
 
     def hurry(self) -> None:
         """Stop planning and waiting for clients, since the robot is about to end."""
-        self._publisher.hurry()
+        self.publisher.hurry()
         if self._plan_ahead is not None:
             self._plan_ahead.end()
 
@@ -236,7 +243,7 @@ class ServedRobot:
             # Use the current io, not the last published one: a program may have been played since, before the next
             # tick.
             io = self.controller.io()
-            self._publisher.telemetry(self._telemetry(punctuality), io)
+            self.publisher.telemetry(self._telemetry(punctuality), io)
             if self.recorder is not None and self._realtime:  # recordings of equal runs in lockstep are equal
                 self.recorder.io(io)
 
@@ -256,7 +263,7 @@ class ServedRobot:
             late_p99_us=on_time.p99_us,
             late_max_us=on_time.max_us,
             missed_ticks=counters.missed_ticks,
-            dropped_states=self._publisher.dropped + sum(gateway.dropped for gateway in gateways),
+            dropped_states=self.publisher.dropped + sum(gateway.dropped for gateway in gateways),
             recorder_dropped=self.recorder.dropped if self.recorder is not None else 0,
             setpoints_received=counters.setpoints_received + refused,
             setpoints_refused=counters.setpoints_refused + refused,

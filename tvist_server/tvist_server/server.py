@@ -172,7 +172,7 @@ class Server:
             self.ur.append((interfaces.address, interfaces.ports))
             gateways.append(interfaces)
         if self.metrics is not None:
-            gateways.append(self.metrics.gateway(config.namespace or "", name))
+            gateways.append(self.metrics.gateway(config.namespace or "", name, lambda: robot.newest))
         if not self._observed:
             gateways.append(ConsoleGateway(self._console, name, partial(config.command_line, name=name)))
         return gateways

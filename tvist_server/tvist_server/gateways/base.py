@@ -1,9 +1,10 @@
 """Gateways, through which clients reach a robot, and the interface between a gateway and its robot."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Collection
+from typing import Protocol, get_args
 
+from tvist_controller.reporting.report import Report
 from tvist_controller.reporting.sink import Topic
 from tvist_protocol.commands import Command
 from tvist_protocol.io import Io
@@ -69,6 +70,12 @@ class Gateway(ABC):
     """Number of set-points rejected before the desk: those on a key with a wildcard, and those that are too large."""
     dropped = 0
     """Number of states dropped because too many were waiting."""
+    takes: Collection[Topic] = frozenset(get_args(Topic))
+    """Topics of which somebody wants messages at present; what no gateway takes is not made. Read from any thread."""
+
+    def report(self, report: Report) -> None:
+        """Publish the state of a tick; see `publish`."""
+        self.publish("state", report.state, report.encoded)
 
     @abstractmethod
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:

@@ -3,7 +3,7 @@
 import logging
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from queue import SimpleQueue
 
 from tvist_controller.reporting.sink import Topic
@@ -118,6 +118,7 @@ class ConsoleGateway(Gateway):
     """
 
     setpoints_refused = 0
+    takes: Collection[Topic] = frozenset[Topic]({"event"})
 
     def __init__(self, console: Console, name: str, command_line: Callable[[str], str]) -> None:
         self._console, self._name, self._command_line = console, name, command_line

@@ -5,6 +5,7 @@ from zenoh.handlers import Callback, RingChannel
 
 from tvist_protocol import keys
 from tvist_protocol.codec import decode_event, decode_state, decode_telemetry
+from tvist_protocol.stream import State
 from tvist_server.gateways.metrics import MetricsGateway
 
 
@@ -18,18 +19,17 @@ class DistantMetrics(MetricsGateway):
     """
 
     def __init__(self, session: zenoh.Session, namespace: str, robot: str) -> None:
-        super().__init__(namespace, robot)
+        super().__init__(namespace, robot, self._arrived)
         # Nobody looks at 500 states a second: Zenoh keeps the newest, without a call of Python for each.
         newest: RingChannel[zenoh.Sample] = RingChannel(1)
         self._states = session.declare_subscriber(keys.state(robot), newest)
         session.declare_subscriber(keys.event(robot), Callback(self._on_event, indirect=False))
         session.declare_subscriber(keys.telemetry(robot), Callback(self._on_telemetry, indirect=False))
 
-    def look(self) -> None:
-        """Take the newest state that has arrived over the network; to be called before the figures are read."""
+    def _arrived(self) -> State | None:
+        """Newest state that has arrived over the network since the last call."""
         sample = self._states.try_recv()
-        if sample is not None:
-            self.state = decode_state(sample.payload.to_bytes())
+        return None if sample is None else decode_state(sample.payload.to_bytes())
 
     def _on_event(self, sample: zenoh.Sample) -> None:
         self.events[decode_event(sample.payload.to_bytes()).kind] += 1

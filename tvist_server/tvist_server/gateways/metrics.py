@@ -3,7 +3,7 @@
 import contextlib
 import socket
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import TYPE_CHECKING
 
 from tvist_controller.reporting.sink import Topic
@@ -26,12 +26,15 @@ class MetricsGateway(Gateway):
     Args:
         namespace: Namespace of the robot; empty if it has none.
         robot: Name of the robot.
+        newest: Returns the robot's newest state when somebody asks, from any thread; None if there is none yet.
     """
 
     setpoints_refused = 0
+    takes: Collection[Topic] = frozenset[Topic]({"event", "telemetry"})
 
-    def __init__(self, namespace: str, robot: str) -> None:
+    def __init__(self, namespace: str, robot: str, newest: Callable[[], State | None]) -> None:
         self.labels = (namespace, robot)
+        self._newest = newest
         self.state: State | None = None
         """Newest state."""
         self.telemetry: Telemetry | None = None
@@ -40,15 +43,14 @@ class MetricsGateway(Gateway):
         """Number of events of each kind."""
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  every gateway gets it
-        if isinstance(message, State):
-            self.state = message
-        elif isinstance(message, Telemetry):
+        if isinstance(message, Telemetry):
             self.telemetry = message
         elif isinstance(message, Event):
             self.events[message.kind] += 1
 
     def look(self) -> None:
-        """Take what has arrived since the last look; before the figures are read."""
+        """Take the newest state; before the figures are read."""
+        self.state = self._newest() or self.state
 
     def close(self) -> None:
         """Do nothing, since the figures of the last second may still be read."""
@@ -82,9 +84,9 @@ class Metrics(Collector):
         self.page = f"http://{f'[{host}]' if ':' in host else host}:{self._server.server_port}/metrics"
         """Address of the page with the figures."""
 
-    def gateway(self, namespace: str, robot: str) -> MetricsGateway:
-        """Create the gateway of a robot."""
-        gateway = MetricsGateway(namespace, robot)
+    def gateway(self, namespace: str, robot: str, newest: Callable[[], State | None]) -> MetricsGateway:
+        """Create the gateway of a robot; arguments as for the gateway."""
+        gateway = MetricsGateway(namespace, robot, newest)
         self.add(gateway)
         return gateway
 

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Final
 
 from tvist_controller.programs.socket_ports import SocketPorts
@@ -122,6 +122,8 @@ class ProgramSockets(Gateway, SocketPorts):
         warn: Tells people; likewise.
         allowed: The machines that programs may connect to.
     """
+
+    takes: Collection[Topic] = ()
 
     def __init__(
         self, tell: Callable[[SocketNews], None], warn: Callable[[str], None], allowed: AllowedHosts

@@ -8,17 +8,20 @@ them to the desk and return. One may still be running when the session is closed
 import contextlib
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import zenoh
 from zenoh.handlers import Callback
 
+from tvist_controller.reporting.report import Report
 from tvist_controller.reporting.sink import Topic
 from tvist_protocol import keys
 from tvist_protocol.codec import MAX_BYTES
 from tvist_protocol.replies import Refused, Reply
 from tvist_server.gateways.base import Desk, Gateway, Message, Queried
 from tvist_server.gateways.replies import ENCODING, Answers
+
+EVERY_TICK: frozenset[Topic] = frozenset({"state", "truth"})
+"""Topics of each tick, whose messages nobody makes while nobody subscribes to them."""
 
 
 class ZenohGateway(Gateway):
@@ -40,6 +43,7 @@ class ZenohGateway(Gateway):
         self._desk: Desk | None = None
         self._queried = starting
         self._closed = False
+        self.takes: set[Topic] = set()
         self._answers = Answers()
         serve = {keys.command(robot): self._on_command, keys.info(robot): self._on_info}
         self._queryables = [
@@ -65,16 +69,27 @@ class ZenohGateway(Gateway):
         setpoint = keys.setpoint(robot)
         session.declare_subscriber(setpoint, Callback(partial(self._on_setpoint, setpoint), indirect=False))
         self._publishers = _publishers(session, robot, lockstep=lockstep, truth=truth or wanted is not None)
+        self.takes = set(self._publishers)
+        if (
+            not lockstep
+        ):  # there a client must not miss the tick that it asks for right after it has subscribed
+            for topic in EVERY_TICK & self.takes:
+                self.takes.discard(topic)
+                self._listen(topic, partial(self._on_wanted, topic))
         if wanted is not None:
-            tell = Callback(partial(_tell_wanted, wanted), indirect=False)
-            self._publishers["truth"].declare_matching_listener(tell)
-            status: Any = self._publishers["truth"].matching_status  # its annotation is another
-            wanted(status.matching)
+            self._listen("truth", wanted)
         # Declared last, since it announces that everything else is ready.
         self._alive = session.liveliness().declare_token(keys.alive(robot))
 
+    def report(self, report: Report) -> None:
+        """Publish a tick's state, which need not be made for that."""
+        self._put("state", report.encoded)
+
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  it is already encoded
         """Publish an encoded message; a message of a topic that is not served is ignored."""
+        self._put(topic, payload)
+
+    def _put(self, topic: Topic, payload: bytes) -> None:
         publisher = self._publishers.get(topic)
         if publisher is not None and not self._closed:
             with contextlib.suppress(zenoh.ZError):  # the session is being closed
@@ -87,6 +102,20 @@ class ZenohGateway(Gateway):
             self._closed = True
 
     # ------------------------------------------------------------------ what arrives, in Zenoh's threads
+
+    def _listen(self, topic: Topic, tell: Callable[[bool], None]) -> None:
+        """Have it told whether anybody subscribes to a topic: now, if somebody does, and whenever that changes."""
+
+        def on_matching(status: zenoh.MatchingStatus) -> None:
+            tell(status.matching)
+
+        self._publishers[topic].declare_matching_listener(Callback(on_matching, indirect=False))
+
+    def _on_wanted(self, topic: Topic, wanted: bool) -> None:
+        if wanted:
+            self.takes.add(topic)
+        else:
+            self.takes.discard(topic)
 
     def _on_command(self, key: str, query: zenoh.Query) -> None:
         answer = self._answer(key, query)
@@ -140,10 +169,6 @@ class ZenohGateway(Gateway):
         """Note that a session has ended. Its liveliness tokens may outlast it while another session holds a copy."""
         if not self._closed and self._desk is not None:
             self._desk.session_gone(session)
-
-
-def _tell_wanted(wanted: Callable[[bool], None], status: zenoh.MatchingStatus) -> None:
-    wanted(status.matching)
 
 
 def _publishers(

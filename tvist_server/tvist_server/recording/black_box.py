@@ -4,18 +4,20 @@ import logging
 import os
 from collections import deque
 from collections.abc import Callable, Mapping
+from copy import copy
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from tvist_controller.reporting.report import Report
 from tvist_controller.reporting.sink import Sink
 from tvist_plant.user_file import named
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
-from tvist_protocol.recorded import Recorded
-from tvist_protocol.stream import Event, State, Truth
+from tvist_protocol.stream import Event, Truth
 from tvist_server.recording.errors import RecorderError
+from tvist_server.recording.message import Kept
 
 log = logging.getLogger(__name__)
 
@@ -42,20 +44,20 @@ class BlackBox(Sink):
         start: Mapping[str, Any],
     ) -> None:
         self._folder, self._info, self._start = folder, info, start
-        self._kept: deque[Recorded] = deque()
+        self._kept: deque[Kept] = deque()
         self._failed = False
         self._written = 0
         self._said = set[str]()
 
-    def state(self, state: State) -> None:
-        """Keep a state; the first state after a failure is the last one in its file."""
+    def report(self, report: Report) -> None:
+        """Keep a tick, of which a file needs the state; the first one after a failure is the last one in its file."""
         kept = self._kept
-        kept.append(state)
-        while kept[0].tick < state.tick - KEPT:
+        kept.append(copy(report))  # without what others will make of it, which would double its size
+        while kept[0].tick < report.tick - KEPT:
             kept.popleft()
         if self._failed:
             self._failed = False
-            self._write(state.tick)
+            self._write(report.tick)
 
     def event(self, event: Event) -> None:
         self._kept.append(event)
@@ -92,15 +94,15 @@ class BlackBox(Sink):
                 target=self._write_file, args=(path, info, messages), name="black-box", daemon=True
             ).start()
 
-    def _write_file(self, path: Path, info: Info, messages: list[Recorded]) -> None:
+    def _write_file(self, path: Path, info: Info, messages: list[Kept]) -> None:
         from tvist_server.recording.recorder import Recorder  # with the library that writes
 
         try:
             with Recorder(path, info, self._start, wait=True) as recorder:
                 for message in messages:
                     match message:
-                        case State():
-                            recorder.state(message)
+                        case Report():
+                            recorder.report(message)
                         case Event():
                             recorder.event(message)
                         case Truth():

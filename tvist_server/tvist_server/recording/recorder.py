@@ -14,15 +14,17 @@ from typing import Any, Self
 
 import msgspec
 
+from tvist_controller.reporting.report import Report
 from tvist_controller.reporting.sink import Sink
 from tvist_protocol.errors import TvistError
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
-from tvist_protocol.recorded import Recorded, topics
+from tvist_protocol.recorded import topics
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording.errors import RecorderError
 from tvist_server.recording.kept import OccupiedError, set_aside
+from tvist_server.recording.message import Kept
 from tvist_server.recording.one_file import OneFile
 from tvist_server.recording.ring import Ring
 from tvist_server.recording.whereabouts import DeletedError, whereabouts
@@ -94,7 +96,7 @@ class Recorder(Sink):
         self.error: str | None = None
         """Why the recording stopped by itself, as a sentence."""
         self._dropped: dict[type[msgspec.Struct], int] = dict.fromkeys((State, Event, Truth, Io, Entry), 0)
-        self._queue: deque[Recorded] = deque()
+        self._queue: deque[Kept | State] = deque()
         self._queue_size = queue_size
         self._wait = wait
         self._on_error = on_error
@@ -108,7 +110,11 @@ class Recorder(Sink):
         self._thread = Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
+    def report(self, report: Report) -> None:
+        self._offer(report)
+
     def state(self, state: State) -> None:
+        """Take a state of which there is no report."""
         self._offer(state)
 
     def event(self, event: Event) -> None:
@@ -147,11 +153,11 @@ class Recorder(Sink):
     ) -> None:
         self.close()
 
-    def _offer(self, message: Recorded) -> None:
+    def _offer(self, message: Kept | State) -> None:
         if self._wait and len(self._queue) >= self._queue_size:
             self._wait_for_room()
         if self._stopped or len(self._queue) >= self._queue_size:
-            self._dropped[type(message)] += 1
+            self._dropped[State if isinstance(message, Report) else type(message)] += 1
         else:
             self._queue.append(message)
 
@@ -234,7 +240,8 @@ class Recorder(Sink):
     def _drain(self) -> None:
         """Write the messages waiting now; later ones wait for the next call, so that the file is checked regularly."""
         for _ in range(len(self._queue)):
-            self._file.write(self._queue.popleft())
+            message = self._queue.popleft()
+            self._file.write(message.state if isinstance(message, Report) else message)
         self._file.flush()
         self._room.set()
 
