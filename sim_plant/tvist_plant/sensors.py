@@ -28,7 +28,8 @@ class Accelerometer:
         if sample is None:  # draw a block, since one call of the generator takes as long as a hundred samples
             self._drawn = iter(self._noise * self._random.standard_normal((512, 3)))
             sample = next(self._drawn)
-        return np.asarray(specific_force + sample)
+        noisy: Floats = specific_force + sample
+        return noisy
 
 
 def gear_phases(joints: int, seed: int) -> Floats:
