@@ -179,7 +179,7 @@ class FlexibleArm:
             return played(self, commands)
         response = self._played(self.memory, commands)
         force = response.specific_force
-        noisy = np.array([self._accelerometer.read(one) for one in force]).reshape(len(force), 3)
+        noisy = self._accelerometer.read_all(force)
         if len(force):
             self._specific_force = force[-1]
         return replace(response, measured=replace(response.measured, accelerometer=noisy))
