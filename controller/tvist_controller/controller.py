@@ -272,7 +272,6 @@ class Controller(WholeRobot):
             with suppress(PlantError):
                 self._faults.clear()
             sample = self._safety.recover(error, self._seed)
-            self._reporter.restart()
             self._payload.begin_anew()
             self.modes.changed = True
         self._payload.watch(sample)
@@ -406,7 +405,6 @@ class Controller(WholeRobot):
         self._safety.put(command.mode)
         if command.mode is not None:
             self.modes.forget_stops()
-        self._reporter.restart()
         self._reporter.forget_modes()
         self.modes.update()
         self.report = self._report(self.cycle.sample)

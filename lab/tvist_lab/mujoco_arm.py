@@ -62,18 +62,12 @@ class MujocoArm:
         Raises:
             PlantError: The state is no longer finite.
         """
-        arm, n = self._arm, self._description.joints
-        moved, felt = np.empty((len(commands), 3, n)), np.empty((len(commands), 6))
-        turned = np.empty((len(commands), 3, 3))
-        for k, command in enumerate(commands):
-            arm.step_compiled(DriveCommand(*command))
-            self._force, self._rotation = arm.flange()
-            moved[k] = arm.q, arm.qd, arm.moment()
-            felt[k, :3], felt[k, 3:], turned[k] = self._force, arm.flange_position(), self._rotation
-        if not np.isfinite(felt).all():
+        q, qd, moment, force, position, turned = self._arm.play(np.ascontiguousarray(commands, dtype=float))
+        if not (np.isfinite(force).all() and np.isfinite(position).all()):
             raise PlantError("the state of the arm in MuJoCo is no longer finite")
-        measured = Measurement(moved[:, 0], moved[:, 1], moved[:, 2], felt[:, :3].copy())
-        return Response(measured, felt[:, :3], felt[:, 3:], turned)
+        if len(commands):
+            self._force, self._rotation = force[-1].copy(), turned[-1].copy()
+        return Response(Measurement(q, qd, moment, force.copy()), force, position, turned)
 
     def _measure(self) -> Measurement:
         arm = self._arm

@@ -98,7 +98,7 @@ class SecondOpinion:
             [self._velocity_gain, self._position_gain, self._integral_gain, self._friction, width]
         )
         self._model = _build(description, payload, timestep)
-        self._data = mujoco.MjData(self._model)
+        self._data = data = mujoco.MjData(self._model)
 
         def dofs(names: list[str]) -> NDArray[np.int64]:
             return np.array([self._model.joint(name).dofadr[0] for name in names], dtype=np.int64)
@@ -111,10 +111,15 @@ class SecondOpinion:
         self._flex_stiffness = np.repeat(description.link_flexibility.stiffness, 2)
         self._s = np.zeros(description.joints)
         self._command = np.zeros((3, description.joints))
+        self._state = data.qpos, data.qvel, data.qfrc_applied
+        self._place, self._turn = data.xpos[self._flange], data.xmat[self._flange]
+        self._felt = np.zeros(6)
+        self._evaluated = False
+        """Whether MuJoCo has evaluated the present positions and velocities already."""
 
     def reset(self, command: DriveCommand) -> Floats:
         """Set static equilibrium under a command, with preloaded integrators; return link-side q, shape (n,) [rad]."""
-        data = self._data
+        data, self._evaluated = self._data, False
         mujoco.mj_resetData(self._model, data)
         self._command = np.array([command.q, command.qd, command.torque])
         gravity = np.zeros(self._model.nv)
@@ -129,29 +134,48 @@ class SecondOpinion:
 
     def step_compiled(self, command: DriveCommand) -> None:
         """Simulate 2 ms as `step` does, with the drives' law in compiled code: half of the time."""
-        start, end = self._command, np.array([command.q, command.qd, command.torque])
-        model, data, steps = self._model, self._data, self._steps
-        q, qd, applied = data.qpos, data.qvel, data.qfrc_applied
+        self._move(np.array([command.q, command.qd, command.torque]))
+
+    def _move(self, end: Floats) -> None:
+        start, model, data, steps = self._command, self._model, self._data, self._steps
+        timestep, motors, laws, s = self._timestep, self._motors, self._laws, self._s
+        step, (q, qd, applied) = mujoco.mj_step, self._state
         for k in range(steps):
-            drive(
-                start,
-                end,
-                (k + 0.5) / steps,
-                self._timestep,
-                self._motors,
-                self._laws,
-                self._s,
-                q,
-                qd,
-                applied,
-            )
-            mujoco.mj_step(model, data)
+            drive(start, end, (k + 0.5) / steps, timestep, motors, laws, s, q, qd, applied)
+            if self._evaluated:  # the first half of MuJoCo's step is done
+                mujoco.mj_step2(model, data)
+                self._evaluated = False
+            else:
+                step(model, data)
         self._command = end
+
+    def play(self, commands: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
+        """Simulate many periods, each as `step_compiled` does.
+
+        Args:
+            commands: Rows q_r, q̇_r and τ_ff of each command, shape (T, 3, n).
+
+        Returns:
+            After each: link-side angles, their velocities and the torques of the motors, shape (T, n); specific force
+            in the flange frame and position of the flange, shape (T, 3), and its orientation, shape (T, 3, 3).
+        """
+        T, nv, n = len(commands), self._model.nv, len(self._motors)
+        angles, speeds, sums = np.empty((T, nv)), np.empty((T, nv)), np.empty((T, n))
+        force, position, turned = np.empty((T, 3)), np.empty((T, 3)), np.empty((T, 9))
+        q, qd, _ = self._state
+        for k, command in enumerate(commands):
+            self._move(command)
+            self._feel()
+            angles[k], speeds[k], sums[k] = q, qd, self._s
+            force[k], position[k], turned[k] = self._felt[3:], self._place, self._turn
+        moments = self._moments(commands, angles[:, self._motors], speeds[:, self._motors], sums)
+        q, qd = angles[:, self._joints], speeds[:, self._joints]
+        return q, qd, moments, force, position, turned.reshape(T, 3, 3)
 
     def step(self, command: DriveCommand) -> Floats:
         """Simulate 2 ms while the drives approach the command linearly; return link-side q, shape (n,) [rad]."""
         start, end = self._command, np.array([command.q, command.qd, command.torque])
-        data = self._data
+        data, self._evaluated = self._data, False
         for k in range(self._steps):
             q_r, qd_r, torque = start + (k + 0.5) / self._steps * (end - start)
             angle, speed = data.qpos[self._motors], data.qvel[self._motors]
@@ -170,16 +194,20 @@ class SecondOpinion:
 
     def flange(self) -> tuple[Floats, Floats]:
         """Specific force in the flange frame [m/s^2], shape (3,), and its orientation, shape (3, 3)."""
+        self._feel()
+        return self._felt[3:].copy(), np.array(self._turn).reshape(3, 3)
+
+    def _feel(self) -> None:
+        """Evaluate the accelerations at the present state."""
         model, data = self._model, self._data
         mujoco.mj_forward(model, data)
+        self._evaluated = True
         mujoco.mj_rnePostConstraint(model, data)  # accelerations in MuJoCo include gravity's
-        felt = np.zeros(6)
-        mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, self._flange, felt, 1)
-        return felt[3:], np.array(data.xmat[self._flange]).reshape(3, 3)
+        mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, self._flange, self._felt, 1)
 
     def flange_position(self) -> Floats:
         """Position of the flange, shape (3,) [m]."""
-        return np.array(self._data.xpos[self._flange])
+        return np.array(self._place)
 
     @property
     def q(self) -> Floats:
@@ -208,9 +236,13 @@ class SecondOpinion:
 
     def moment(self) -> Floats:
         """Torques of the motors on the joint side, shape (n,) [N m]."""
-        q_r, qd_r, torque = self._command
-        feedback = self._velocity_gain * (qd_r - self.motor_qd) + self._position_gain * (q_r - self.motor_q)
-        return np.asarray(torque + feedback + self._integral_gain * self._s)
+        return self._moments(self._command, self.motor_q, self.motor_qd, self._s)
+
+    def _moments(self, command: Floats, q: Floats, qd: Floats, s: Floats) -> Floats:
+        """The same for many states, each of shape (T, n), and commands of shape (T, 3, n)."""
+        q_r, qd_r, torque = np.moveaxis(command, -2, 0)
+        feedback = self._velocity_gain * (qd_r - qd) + self._position_gain * (q_r - q)
+        return np.asarray(torque + feedback + self._integral_gain * s)
 
 
 def _joint(number: int) -> str:

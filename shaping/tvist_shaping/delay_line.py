@@ -109,7 +109,7 @@ class DelayLine:
             raise ShapingError(
                 f"a delay line needs joints >= 1 and capacity >= 4, not {joints=}, {capacity=}"
             )
-        self.joints = joints
+        self.joints, self._shape = joints, (joints,)
         self.capacity = capacity
         self.max_delay = capacity - _MARGIN
         self.ring = np.zeros((capacity, joints))
@@ -142,7 +142,9 @@ class DelayLine:
         Raises:
             ShapingError: q has another shape.
         """
-        sample = self._sample(q)
+        sample = np.asarray(q, dtype=float)
+        if sample.shape != self._shape:
+            sample = self._sample(q)  # which says what is wrong
         head = self.head = (self.head + 1) % self.capacity
         self.ring[head] = sample
         bits = sample.tobytes()  # the fastest comparison

@@ -62,6 +62,8 @@ class FlexibleArm:
         n = description.joints
         self._phase = np.zeros(n)
         self._width = 3 * n + 3
+        self._places = slice(n), slice(n, 2 * n), slice(2 * n, 3 * n), slice(3 * n, None)
+        """Places of what `evaluate` measures: angles, velocities, torques and specific force."""
         self._load(payload)
         self._accelerometer = Accelerometer(description.sensors.accelerometer_noise, 0)
 
@@ -177,7 +179,7 @@ class FlexibleArm:
             return played(self, commands)
         response = self._played(self.memory, commands)
         force = response.specific_force
-        noisy = np.array([self._accelerometer.read(one) for one in force]).reshape(len(force), 3)
+        noisy = self._accelerometer.read_all(force)
         if len(force):
             self._specific_force = force[-1]
         return replace(response, measured=replace(response.measured, accelerometer=noisy))
@@ -266,11 +268,9 @@ class FlexibleArm:
     def _measured(self, out: Floats, finite: bool) -> Measurement:
         if not finite:
             raise PlantError("the arm's state is no longer finite")
-        n = len(self._phase)
-        self._specific_force = out[3 * n :]
-        return Measurement(
-            out[:n], out[n : 2 * n], out[2 * n : 3 * n], self._accelerometer.read(self._specific_force)
-        )
+        q, qd, moment, force = self._places
+        self._specific_force = out[force]
+        return Measurement(out[q], out[qd], out[moment], self._accelerometer.read(self._specific_force))
 
     def truth(self) -> PlantTruth:
         """Return what a real robot cannot measure, at the present state."""

@@ -18,17 +18,32 @@ class Accelerometer:
     def __init__(self, noise: float, seed: int) -> None:
         self._noise = noise
         self._random = np.random.default_rng([seed, 1])
-        self._drawn = iter(np.empty((0, 3)))
+        self._drawn, self._used = np.empty((0, 3)), 0
 
     def read(self, specific_force: Floats) -> Floats:
         """Return a noisy reading [m/s^2], shape (3,)."""
         if self._noise == 0.0:
             return specific_force.copy()
-        sample = next(self._drawn, None)
-        if sample is None:  # draw a block, since one call of the generator takes as long as a hundred samples
-            self._drawn = iter(self._noise * self._random.standard_normal((512, 3)))
-            sample = next(self._drawn)
-        return np.asarray(specific_force + sample)
+        if self._used == len(self._drawn):
+            self._draw()
+        noisy: Floats = specific_force + self._drawn[self._used]
+        self._used += 1
+        return noisy
+
+    def read_all(self, specific_forces: Floats) -> Floats:
+        """Return noisy readings one after the other, as `read` does, shape (T, 3) [m/s^2]."""
+        noisy, done = specific_forces.copy(), 0
+        while self._noise != 0.0 and done < len(noisy):
+            if self._used == len(self._drawn):
+                self._draw()
+            block = self._drawn[self._used : self._used + len(noisy) - done]
+            noisy[done : done + len(block)] += block
+            self._used, done = self._used + len(block), done + len(block)
+        return noisy
+
+    def _draw(self) -> None:
+        """Draw a block, since one call of the generator takes as long as a hundred samples."""
+        self._drawn, self._used = self._noise * self._random.standard_normal((512, 3)), 0
 
 
 def gear_phases(joints: int, seed: int) -> Floats:

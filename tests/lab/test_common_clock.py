@@ -99,7 +99,7 @@ def test_the_rigid_acceleration_of_a_turning_tool_points_to_its_axis(make_record
     vibration = np.zeros((TICKS, 3))
     vibration[motion.start : motion.start + len(rigid)] = rigid + np.array([0.0, 0.3, 0.4])
     shaken = make_recording(q, np.roll(q, 1), truth=vibration)
-    assert in_motion_rms(shaken, motion, kinematics) == pytest.approx(0.5)
+    assert in_motion_rms(shaken, motion, rigid) == pytest.approx(0.5)
 
 
 def test_the_rigid_motion_cannot_be_told_where_ticks_are_missing(one_motion):

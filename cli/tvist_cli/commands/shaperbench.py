@@ -80,7 +80,8 @@ def shaperbench(
     methods = on_the_bench(description, known, against, mine)
     arms = [*ARMS, *plants_of([], hidden, description)]
     drawn = bench.draw(description, count, seed)
-    faults = [bench.inspect(one, description, drawn) for one in methods]
+    ours = len(methods) - (mine is not None)  # what comes with the package is inspected by its tests
+    faults = [None] * ours + [bench.inspect(one, description, drawn) for one in methods[ours:]]
     sound = [one for one, fault in zip(methods, faults, strict=True) if fault is None]
     jobs = bench.jobs(description, sound, drawn, seed, quick=quick, arms=arms)
     bends = bench.bends(description, sound, drawn)

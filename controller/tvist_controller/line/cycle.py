@@ -95,7 +95,8 @@ class ControlCycle:
                 motors = motors.corrected(command, corrections.acceleration)
         measured = line.plant.step(command)
         self.sample = Sample(
-            mode, reference, line.shaped.joints.window, signals, command, measured, motors, refused
+            mode, reference, line.shaped.references, line.shaped.joints.window, signals, command, measured, motors,
+            refused,
         )  # fmt: skip
         self._settle()  # last, so that the tick that comes to rest is still reported as one of the motion
         return self.sample
@@ -212,5 +213,6 @@ class ControlCycle:
         if measured is None and isinstance(plant, Placeable):
             measured = plant.reset(command, payload=carried, seed=seed)
         assert measured is not None, "what cannot be placed is measured"
-        self.sample = Sample(self.mode, q, line.shaped.joints.window, signals, command, measured)
+        still = line.shaped.references
+        self.sample = Sample(self.mode, q, still, still, signals, command, measured)
         return self.sample

@@ -18,6 +18,8 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
     """What the line did."""
     reference: Floats
     """q before shaping, shape (n,) [rad]."""
+    references: tuple[Floats, Floats, Floats]
+    """The last three references before shaping, see `ShapedReference`."""
     window: tuple[Floats, Floats, Floats]
     """The last three shaped references, the newest last, each of shape (n,) [rad]."""
     signals: Floats
@@ -35,6 +37,17 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
     def target(self) -> Target:
         """q* and its derivatives at the previous tick, since central differences cost one tick of delay."""
         return Target(self.signals[Q], self.signals[QD], self.signals[QDD])
+
+    @property
+    def unshaped(self) -> tuple[Floats, Floats, Floats] | None:
+        """The references before shaping around the tick of the target; None if they are the shaped ones to the bit."""
+        references, shaped = self.references, self.window
+        if references is shaped:
+            return None
+        for k in (2, 1, 0):  # comparing bytes is several times as fast as comparing arrays
+            if references[k].tobytes() != shaped[k].tobytes():
+                return references
+        return None
 
     @property
     def torque(self) -> Floats:

@@ -26,6 +26,8 @@ class ShapedReference:
     def reset(self, q: Floats) -> None:
         """Restart at rest; from now on samples are joint positions."""
         self.joints.reset(q)
+        self.references = self.joints.window
+        """The last three references before shaping, as `Differentiator.window`; since a bypass, the shaped ones."""
         self.enter(None, q)
 
     def enter(self, posture_of: Posture | None, sample: Floats) -> None:
@@ -60,12 +62,17 @@ class ShapedReference:
         Returns:
             Joint positions before shaping, shape (n,) [rad].
         """
-        if self.posture_of is None:
-            self.joints.push(x_star)
-            return x
-        q = self.posture_of(x)
-        self.along.push(x_star)
-        self.joints.push(q if x_star is x else self.posture_of(x_star))
+        q, q_star, posture_of = x, x_star, self.posture_of
+        if posture_of is not None:
+            q = posture_of(x)
+            q_star = q if x_star is x else posture_of(x_star)
+            self.along.push(x_star)
+        self.joints.push(q_star)
+        if x_star is x:  # what bypasses the filter continues the shaped reference: the reference may jump
+            self.references = self.joints.window
+        else:
+            _, middle, last = self.references
+            self.references = (middle, last, q)
         return q
 
     def posture(self, sample: Floats) -> Floats:

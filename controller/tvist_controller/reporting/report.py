@@ -37,9 +37,6 @@ class Report(Struct, gc=False):
     """Number of the tick."""
     sample: Sample
     """Signals along the control line."""
-    unshaped: tuple[Floats, Floats, Floats] | None
-    """Three references without the filter around the tick of the target, the newest last; None if the target is that.
-    """
     modes: tuple[int, int, int]
     """Robot mode, safety mode and runtime state."""
     speed: float
@@ -79,23 +76,25 @@ class Report(Struct, gc=False):
 
     def _write(self) -> bytes:
         sample, sequence, tick, f_d = self.sample, self.sequence, self.tick, self.f_d
-        motors, measured = sample.motors, sample.measured
+        motors, measured, unshaped = sample.motors, sample.measured, sample.unshaped
         key = (
             width(tick), None if sequence is None else width(sequence), self.modes, self.missed, self.clipped,
-            self.unshaped is None, motors is not None and motors.limited, motors is None, len(f_d),
+            unshaped is None, motors is not None and motors.limited, motors is None, len(f_d),
         )  # fmt: skip
         template, places, integers = self.layouts.of(key, self)
-        unshaped = self.unshaped or (NOWHERE, NOWHERE, NOWHERE)
-        return write_state(
-            template, places, integers, tick, sequence or 0, PERIOD, self.speed, self.delay, sample.signals,
-            *unshaped, measured.q, measured.qd, measured.moment, measured.accelerometer,
+        before, middle, last = unshaped or (NOWHERE, NOWHERE, NOWHERE)
+        out = template.copy()
+        write_state(
+            out, places, integers, tick, sequence or 0, PERIOD, self.speed, self.delay, sample.signals,
+            before, middle, last, measured.q, measured.qd, measured.moment, measured.accelerometer,
             self.kinematics.chain, self.kinematics.offset, f_d, self.zeta,
             NOTHING if motors is None else motors.rows,
-        ).tobytes()  # fmt: skip
+        )  # fmt: skip
+        return out.tobytes()
 
     def _make(self) -> State:
         sample, motors = self.sample, self.sample.motors
-        unshaped = None if self.unshaped is None else middle_of(self.unshaped, PERIOD)
+        unshaped = None if sample.unshaped is None else middle_of(sample.unshaped, PERIOD)
         target, measured = sample.target, sample.measured
         motion = self.kinematics.motion(measured.q, measured.qd).tolist()
         robot_mode, safety_mode, runtime = self.modes

@@ -3,7 +3,6 @@
 from tvist_controller.line.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.line.sample import Sample
 from tvist_controller.reporting.report import Layouts, Report
-from tvist_controller.reporting.unshaped_reference import UnshapedReference
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 from tvist_plant.plant import PERIOD, ModalPlant, Plant, PlantTruth, Truthful
@@ -27,7 +26,6 @@ class Reporter:
         self._kinematics = ForwardKinematics(description)
         self._layouts = Layouts()
         self._true_modes: dict[str, list[float]] = {}
-        self._unshaped = UnshapedReference()
 
     def report(
         self,
@@ -53,7 +51,7 @@ class Reporter:
             missed_ticks: Number of ticks that began too late.
         """
         return Report(
-            tick, sample, self._unshaped.of(sample), modes, speed, tvist.f_d, tvist.zeta, tvist.delay + drive_delay,
+            tick, sample, modes, speed, tvist.f_d, tvist.zeta, tvist.delay + drive_delay,
             tvist.clipped, setpoint_sequence, missed_ticks, self._kinematics, self._layouts,
         )  # fmt: skip
 
@@ -94,10 +92,6 @@ class Reporter:
             static_link_deflection=_listed(truth.static_link_deflection),
             **(self._true_modes or NO_MODES),
         )
-
-    def restart(self) -> None:
-        """Forget what the arm did, since it was placed somewhere at rest."""
-        self._unshaped.join()
 
     def forget_modes(self) -> None:
         """Have the modes computed anew, since the arm was placed elsewhere."""

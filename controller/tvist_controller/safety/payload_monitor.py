@@ -39,8 +39,16 @@ def add(total: Floats, moment: Floats, expected: Floats) -> None:
 
 @compiled_for_ticks
 def correlate(
-    chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Floats, friction: Floats, feedback: Floats
-) -> tuple[float, float, float]:
+    chain: Floats,
+    q: Floats,
+    qd: Floats,
+    qdd: Floats,
+    scratch: Floats,
+    friction: Floats,
+    feedback: Floats,
+    fade: Floats,
+    sums: Floats,
+) -> None:
     """Compare the feedback of the drives with the torques that a kilogram needs, y.
 
     Args:
@@ -50,10 +58,9 @@ def correlate(
         qdd: Accelerations, shape (n,) [rad/s^2].
         scratch: Scratch, shape (n+1, 28).
         friction: F of each joint, shape (n,) [N m].
-        feedback: r, shape (n,) [N m].
-
-    Returns:
-        yᵀ W y [1/kg²], yᵀ W r [1/kg] and Σ |y_j| W_j F_j [1/kg].
+        feedback: Sum of r over `EVERY` ticks, shape (n,) [N m]; set to zero.
+        fade: What is left of each memory after these ticks, shape (2,) [-].
+        sums: yᵀ W y [1/kg²], yᵀ W r [1/kg] and φ Σ |y_j| W_j F_j [1/kg] in each memory, shape (3, 2); changed.
     """
     per_kg = np.empty(q.shape[0])
     torques(chain, q, qd, qdd, GRAVITY, scratch, per_kg)
@@ -63,7 +70,11 @@ def correlate(
         square += weighted * per_kg[j]
         product += weighted * feedback[j]
         bound += abs(weighted) * friction[j]
-    return square, product, bound
+        feedback[j] = 0.0
+    for memory in range(fade.shape[0]):
+        sums[0, memory] = fade[memory] * sums[0, memory] + square
+        sums[1, memory] = fade[memory] * sums[1, memory] + product / EVERY
+        sums[2, memory] = fade[memory] * sums[2, memory] + FRICTION * bound
 
 
 class Patience:
@@ -134,7 +145,8 @@ class PayloadMonitor:
         self.declare(declared)
         still = np.zeros_like(self._sum)  # the first calls load compiled code, which takes many ticks
         add(still, still, still)
-        correlate(self._chain, still, still, still, self._scratch, self._friction, still)
+        nothing = np.zeros_like(self._sums)
+        correlate(self._chain, still, still, still, self._scratch, self._friction, still, self._fade, nothing)
 
     def declare(self, payload: Payload, *, found: bool = False, told: bool = False) -> None:
         """Set another payload: discard past measurements, and wait until it is fully phased in.
@@ -156,7 +168,7 @@ class PayloadMonitor:
         self._wait = 0
         self._ticks, self._sum[:] = 0, 0.0
         self._time = 0.0
-        self._yy, self._yr, self._bound = np.zeros((3, len(self._fade)))
+        self._sums = np.zeros((3, len(self._fade)))
         self._warned = False
         if self._patience is not None:
             self._patience.begin()
@@ -168,9 +180,8 @@ class PayloadMonitor:
 
     def _estimate(self, memory: int) -> tuple[float, float]:
         """The same with `MEMORY`, 0, or `RECENT`, 1."""
-        if self._yy[memory] <= 0.0:
-            return 0.0, np.inf
-        return float(self._yr[memory] / self._yy[memory]), float(self._bound[memory] / self._yy[memory])
+        square, product, bound = self._sums[:, memory].tolist()
+        return (0.0, np.inf) if square <= 0.0 else (product / square, bound / square)
 
     def update(
         self, signals: Floats, expected: Floats, moment: Floats, *, at_rest: bool = False
@@ -193,15 +204,11 @@ class PayloadMonitor:
         self._ticks += 1
         if self._ticks < EVERY:
             return None
-        square, product, bound = correlate(
-            self._chain, signals[Q], signals[QD], signals[QDD], self._scratch, self._friction, self._sum
-        )
-        self._ticks, self._sum[:] = 0, 0.0
-        fade = self._fade
-        self._time = float(fade[0]) * self._time + EVERY * PERIOD
-        self._yy = fade * self._yy + square
-        self._yr = fade * self._yr + product / EVERY
-        self._bound = fade * self._bound + FRICTION * bound
+        correlate(
+            self._chain, signals[Q], signals[QD], signals[QDD], self._scratch, self._friction, self._sum,
+            self._fade, self._sums,
+        )  # fmt: skip
+        self._ticks, self._time = 0, float(self._fade[0]) * self._time + EVERY * PERIOD
         return self._judge(at_rest)
 
     def _judge(self, at_rest: bool) -> str | None:

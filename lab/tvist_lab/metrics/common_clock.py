@@ -145,13 +145,14 @@ def rigid_acceleration(recording: Recording, motion: MotionRows, kinematics: Kin
     return np.asarray(np.einsum("tji,tj->ti", rotation, world), dtype=np.float64)
 
 
-def in_motion_rms(recording: Recording, motion: MotionRows, kinematics: Kinematics) -> float:
+def in_motion_rms(recording: Recording, motion: MotionRows, rigid: Floats) -> float:
     """Vibration during the motion: rms of |α - α of the rigid arm| until the shaped reference stops [m/s²].
 
-    Raises:
-        NotMeasurableError: Ticks are missing during the motion.
+    Args:
+        recording: Recording of the motion.
+        motion: Where it is in the recording.
+        rigid: What `rigid_acceleration` returns for it.
     """
-    rigid = rigid_acceleration(recording, motion, kinematics)
     first = max(motion.start, 1)
     alpha = best_tool_acceleration(recording)[first : first + len(rigid)]
     return float(np.sqrt(np.mean(np.sum((alpha - rigid) ** 2, axis=1))))

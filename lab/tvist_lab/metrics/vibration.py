@@ -1,5 +1,7 @@
 """α, the acceleration of the tool measured by its accelerometer, without gravity."""
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
@@ -66,7 +68,7 @@ def amplitude(alpha: Floats) -> Floats:
 def low_pass(signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
     """Low-pass filter a signal with zero phase (Butterworth, forwards and backwards), below 0.45 of its rate."""
     cut_off = min(cut_off, 0.45 / period)
-    return _both_ways(butter(4, cut_off, "lowpass", fs=1.0 / period, output="sos"), signal)
+    return _both_ways(_designed(4, cut_off, "lowpass", 1.0 / period), signal)
 
 
 def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
@@ -89,7 +91,13 @@ def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BA
 def band_pass(signal: Floats, period: float, band: tuple[float, float] = BAND) -> Floats:
     """Band-pass filter a signal with zero phase (Butterworth, forwards and backwards)."""
     band = (band[0], min(band[1], 0.45 / period))
-    return _both_ways(butter(2, band, "bandpass", fs=1.0 / period, output="sos"), signal)
+    return _both_ways(_designed(2, band, "bandpass", 1.0 / period), signal)
+
+
+@lru_cache(maxsize=16)
+def _designed(order: int, ends: float | tuple[float, float], kind: str, rate: float) -> Floats:
+    """Return the sections of a Butterworth filter; to design one takes as long as to filter a motion with it."""
+    return np.asarray(butter(order, ends, kind, fs=rate, output="sos"))
 
 
 def _both_ways(sos: Floats, signal: Floats) -> Floats:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tvist_controller.api.line import RefusalError, body, elastic_feed_forward, paper_payload
-from tvist_lab.metrics import in_motion_rms, motions, peak_after_stop
+from tvist_lab.metrics import in_motion_rms, motions, peak_after_stop, rigid_acceleration
 from tvist_lab.recordings import Floats
 from tvist_lab.runners import Processes, in_order
 from tvist_lab.studies.pages import page
@@ -140,7 +140,7 @@ def judge(job: PathJob) -> Judged:
         elastic = None if tvist is None else elastic_feed_forward(tvist, description, job.calibration)
         recording = line.follow(reference.q, q, elastic=elastic).simulate(arm, seed)
         motion = motions(recording)[0]
-        rms = in_motion_rms(recording, motion, at)
+        rms = in_motion_rms(recording, motion, rigid_acceleration(recording, motion, at))
         return peak_after_stop(recording, motion), motion.shaped_duration(recording), rms
 
     unshaped = follow(plain, plain.q)

@@ -102,7 +102,12 @@ def jobs(
     quick: bool,
     arms: Sequence[Variant] = ARMS,
 ) -> list[Job]:
-    """Return all jobs: method by move by payload error; in the quick version, one error in turn for each move."""
+    """Return all jobs: methods by move by payload error; in the quick version, one error in turn for each move.
+
+    The methods of a job make their motions on the same arms. What a calibration tells of friction is fed forward to
+    all of a job, so that methods without one have jobs of their own.
+    """
+    known, others = ([one for one in methods if hasattr(one, "recipe") is has] for has in (True, False))
     return [
         Job(
             Case(
@@ -113,13 +118,14 @@ def jobs(
                 payload_error=error,
                 axes={"move": number, "payload_error": error},
             ),
-            (method,),
+            tuple(together),
             WANTED,
             as_served=False,
         )
-        for method in methods
         for number, move in enumerate(moves)
         for error in ((PAYLOAD_ERRORS[number % len(PAYLOAD_ERRORS)],) if quick else PAYLOAD_ERRORS)
+        for together in (known, others)
+        if together
     ]
 
 

@@ -19,6 +19,7 @@ from tvist_lab.metrics import (
     peak_acceleration,
     peak_after_stop,
     peak_velocity,
+    rigid_acceleration,
     still_after,
 )
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL, Kinematics, peak_later_than
@@ -43,13 +44,19 @@ class Motion:
         shaped: The shaped reference.
         recording: What the arm made of it.
         unshaped: Returns the recording of the unshaped motion; called only if a measure needs it.
+        like: The same motion by another arm, so that what its reference tells is known; None if there is none.
     """
 
     def __init__(
-        self, case: Case, shaped: Shaped, recording: Recording, unshaped: "Callable[[], Motion]"
+        self,
+        case: Case,
+        shaped: Shaped,
+        recording: Recording,
+        unshaped: "Callable[[], Motion]",
+        like: "Motion | None" = None,
     ) -> None:
         self.case, self.shaped, self.recording = case, shaped, recording
-        self._unshaped = unshaped
+        self._unshaped, self._like = unshaped, like
 
     @cached_property
     def unshaped(self) -> "Motion":
@@ -59,7 +66,14 @@ class Motion:
     @cached_property
     def rows(self) -> MotionRows:
         """Where it is in its recording."""
-        return motions(self.recording)[0]
+        return motions(self.recording)[0] if self._like is None else self._like.rows
+
+    @cached_property
+    def rigid(self) -> Floats:
+        """Acceleration of a rigid arm's flange along the shaped reference, see `rigid_acceleration` [m/s²]."""
+        if self._like is not None:
+            return self._like.rigid
+        return rigid_acceleration(self.recording, self.rows, kinematics(self.case.description))
 
     @cached_property
     def peak(self) -> float:
@@ -100,7 +114,7 @@ class Motion:
 
     def in_motion(self) -> float:
         """Rms of α relative to the rigid arm [m/s²]."""
-        return in_motion_rms(self.recording, self.rows, kinematics(self.case.description))
+        return in_motion_rms(self.recording, self.rows, self.rigid)
 
 
 @dataclass(frozen=True)

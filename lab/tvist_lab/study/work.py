@@ -91,10 +91,12 @@ class Bench:
             yield from ((arm.name, self.unshaped(arm.name)) for arm in self.job.case.arms)
             return
         shaped = method.shaped(replace(self.task, ticks=ticks))
-        follow = self._following(shaped)
+        follow, first = self._following(shaped), None
         for arm in self.job.case.arms:
             unshaped = partial(self.unshaped, arm.name)
-            yield arm.name, Motion(self.job.case, shaped, follow(arm.name), unshaped)
+            motion = Motion(self.job.case, shaped, follow(arm.name), unshaped, first)
+            first = first or motion
+            yield arm.name, motion
 
     def unshaped(self, arm: str) -> Motion:
         """Return the unshaped motion of an arm, which is simulated once."""

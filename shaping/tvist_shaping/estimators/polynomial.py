@@ -170,10 +170,10 @@ class Polynomial(Estimator):
         self._ranges: Floats = np.array([[f_low, f_high], [z_low, z_high]])
         joints_used = np.array(self.basis.joints, dtype=np.int64)
         self.coefficients = Coefficients(
-            joints_used, basis == "trigonometric", self.basis.centre, self.basis.scale, self.basis.multiples(),
-            self._coefficients, self._ranges,
+            joints_used, basis == "trigonometric", self.basis.centre.copy(), self.basis.scale.copy(),
+            self.basis.multiples(), self._coefficients, self._ranges,
         )  # fmt: skip
-        """What `evaluate` needs."""
+        """What `evaluate` needs, as arrays that can be written: numba takes those alone by its fast way."""
         self._joints_needed = max(self.basis.joints) + 1
 
     def __repr__(self) -> str:
