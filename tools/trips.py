@@ -166,7 +166,7 @@ def rtde() -> Trip:
     interfaces = UrInterfaces(robot.reception, robot.setup.description, "ur5e", "127.0.0.1", {})
     lease = HostLease(robot.reception, "127.0.0.1", lambda call: call())
     lease.adopt(bench.token, bench)
-    session = RtdeSession(interfaces.robot, ConnectionControl(lease), lambda _: None, Board())
+    session = RtdeSession(interfaces.robot, ConnectionControl(lease), lambda _: None, {1: Board()})
     instruments = Instruments(robot.setup.description)
     bench.tick()
 

@@ -6,7 +6,7 @@ The controller is a real one. Its replies come late, as over a thread, so that c
 import gc
 import struct
 import tracemalloc
-from collections import deque
+from collections import defaultdict, deque
 from random import Random
 
 import pytest
@@ -51,7 +51,7 @@ class House(Sink):
         self.controller.session.release()
         self.host = Host(self.controller, self)
         self.instruments = Instruments(UR5E)
-        self.board = Board()
+        self.boards = defaultdict(Board)
         self.robot = UrRobot(
             UR5E, "ur5e", self.tell, ExternalControl(None, nobody), lambda _: None, lambda _: None
         )
@@ -113,7 +113,7 @@ class Client:
         self.house, self.interface = house, interface
         self.stream, self.sampled, self.rest = bytearray(), b"", b""
         self.control = ConnectionControl(house.leases[host])
-        board = (house.board,) if interface == "rtde" else ()
+        board = (house.boards,) if interface == "rtde" else ()
         self.session = INTERFACES[interface](house.robot, self.control, self.take, *board)
         house.clients.append(self)
         self.session.opened()

@@ -1,6 +1,7 @@
 """RTDE's connections: set-up, samples, inputs and who owns them."""
 
 import struct
+from collections import defaultdict
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -29,7 +30,7 @@ class Client:
     def __init__(self, robot, control):
         self.control = control
         self.stream = bytearray()
-        self.session = RtdeSession(robot, control, self.stream.extend, robot.board)
+        self.session = RtdeSession(robot, control, self.stream.extend, robot.boards)
         self.session.opened()
 
     def say(self, *packages):
@@ -67,7 +68,7 @@ class Client:
 
 @pytest.fixture
 def robot(robot):
-    robot.inputs, robot.board = InputOwners(), Board()
+    robot.inputs, robot.boards = InputOwners(), defaultdict(Board)
     return robot
 
 
@@ -262,6 +263,22 @@ class TestOwnership:
         assert one.say(client.inputs([ints[0], "external_force_torque"])) == [("I", b"\x01INT32,VECTOR6D")]
         control.held_by_other = False
         assert one.say(client.inputs(names))[0][1][0] == 2
+
+
+def test_what_only_a_slow_client_reads_is_not_computed_for_the_others(one, other, ur5e, monkeypatch):
+    arm, computed = ur5e(), []
+    monkeypatch.setattr(type(arm.instruments._rigid), "momentum", lambda *_: computed.append(1) or 0.0)
+    one.started(("actual_q",))
+    other.started(("actual_momentum",), 100.0)
+    due = 0
+    for _ in range(20):
+        one.session.sample(arm.tick())
+        due += other.session.sample(arm.tick()) != b""
+    assert len(computed) == due == 8
+    other.session.closed()
+    for _ in range(20):
+        one.session.sample(arm.tick())
+    assert len(computed) == due
 
 
 def shown(robot, **changes):

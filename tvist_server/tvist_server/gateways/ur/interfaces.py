@@ -5,7 +5,7 @@ import contextlib
 import logging
 import socket
 import threading
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable, Mapping
 from functools import partial
 from weakref import WeakValueDictionary
@@ -93,7 +93,7 @@ class UrInterfaces(Gateway):
         self._requests = ProgramRequests()
         external = ExternalControl(programs, self._requests.fetch)
         self.robot = UrRobot(description, name, self._tell, external, self._scripts.tell, self._refusals.tell)
-        self._instruments, self._board = Instruments(description), Board()
+        self._instruments, self._boards = Instruments(description), defaultdict[int, Board](Board)
         self._io: Io | None = None
         self._early = deque[Tick](maxlen=FIRST)
         """States from before the interfaces open, since temperatures and energies begin with the first tick."""
@@ -305,7 +305,7 @@ class UrInterfaces(Gateway):
                 self._gripper, send, lambda answer: self._soon(lambda: control.hear(answer))
             )
         if interface == "rtde":
-            return RtdeSession(self.robot, control, send, self._board)
+            return RtdeSession(self.robot, control, send, self._boards)
         return _session(interface, self.robot, control, send)
 
     def _lease(self, host: str) -> HostLease:

@@ -10,7 +10,6 @@ from sys import byteorder
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.io import Io
@@ -50,7 +49,7 @@ class Board:
             head: Bytes in front of the variables: the recipe's id in protocol version 2, nothing in version 1.
         """
         if self._bytes is None:
-            self._bytes = _Bytes((name for one in self._recipes.values() for name in one.names), snapshot)
+            self._bytes = _Bytes(self._recipes.values(), snapshot)
         if snapshot is not self._snapshot:
             self._bytes.write(snapshot)
             self._packages.clear()
@@ -68,11 +67,13 @@ class _Bytes:
     """Bytes of the variables that some recipes name.
 
     Args:
-        names: The variables; one may occur several times.
+        recipes: The recipes.
         snapshot: Tells how many joints the arm has.
     """
 
-    def __init__(self, names: Iterable[str], snapshot: Snapshot) -> None:
+    def __init__(self, recipes: Iterable[OutputRecipe], snapshot: Snapshot) -> None:
+        different = {recipe.text: recipe for recipe in recipes}.values()
+        names = [name for recipe in different for name in recipe.names]
         parts = dict.fromkeys(PARTS[name][0] for name in names)
         self._places: dict[Part, _Place] = {}
         self._of_io = _Packing([part for part in parts if part.of_io], snapshot, 0, self._places)
@@ -82,23 +83,29 @@ class _Bytes:
         self._zero = self._others.end
         self._buffer = bytearray(self._zero + 1)
         self._numbers = np.frombuffer(self._buffer, np.uint8)
-        self._indices: dict[str, NDArray[np.intp]] = {}
+        self._spans: dict[str, slice] = {}
+        """Where the bytes of each recipe are among those gathered, by its text."""
+        first = 0
+        for recipe in different:
+            self._spans[recipe.text] = slice(first, first + recipe.size)
+            first += recipe.size
+        places = {name: np.array(self._places_of(name), np.intp) for name in dict.fromkeys(names)}
+        self._index = np.concatenate([places[name] for name in names])
+        self._gathered = b""
         self._io: Io | None = None
 
     def write(self, snapshot: Snapshot) -> None:
-        """Write the values of a tick."""
+        """Write the values of a tick, and gather those of each recipe."""
         if snapshot.io is not self._io:
             self._of_io.write(snapshot, self._buffer)
             self._io = snapshot.io
         self._others.write(snapshot, self._buffer)
+        # The quickest mode; all places are inside.
+        self._gathered = self._numbers.take(self._index, mode="clip").tobytes()
 
     def of(self, recipe: OutputRecipe) -> bytes:
         """Return the bytes of the variables of a recipe."""
-        index = self._indices.get(recipe.text)
-        if index is None:
-            places = list(chain.from_iterable(self._places_of(name) for name in recipe.names))
-            index = self._indices[recipe.text] = np.array(places, np.intp)
-        return self._numbers.take(index, mode="clip").tobytes()  # the quickest mode; all places are inside
+        return self._gathered[self._spans[recipe.text]]
 
     def _places_of(self, name: str) -> list[int]:
         """Places of the bytes of a variable.

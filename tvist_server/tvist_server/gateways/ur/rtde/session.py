@@ -4,7 +4,7 @@ A connection uses protocol version 1 until the client requests version 2. In ver
 frequency, packages of outputs carry no recipe id, and text messages carry no source.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import floor
 from struct import Struct
 
@@ -47,13 +47,16 @@ class RtdeSession(PortSession):
         robot: State that the interfaces of a robot share.
         control: Access to its controller.
         send: Sends bytes to the client.
-        board: Makes the data packages of all clients of the robot.
+        boards: Make the data packages of all clients of the robot, by ticks between two packages: what only a
+            slow client reads is not computed for the others.
     """
 
     client_begins = True
 
-    def __init__(self, robot: UrRobot, control: ControllerAccess, send: Send, board: Board) -> None:
-        self._board = board
+    def __init__(
+        self, robot: UrRobot, control: ControllerAccess, send: Send, boards: Mapping[int, Board]
+    ) -> None:
+        self._boards, self._board = boards, boards[1]
         self._robot = robot
         self._control = control
         self._send = send
@@ -193,10 +196,10 @@ class RtdeSession(PortSession):
 
     def _read(self) -> None:
         """Have the variables of the recipe computed as long as the client reads them."""
+        self._board.end(self)
         if self._started and self._outputs is not None:
+            self._board = self._boards[self._every]
             self._board.begin(self, self._outputs)
-        else:
-            self._board.end(self)
 
     def _take_text(self, _payload: bytes) -> None:
         """Ignore a text message: on a robot of UR's, it would appear in the log of the teach pendant."""
