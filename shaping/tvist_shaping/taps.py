@@ -111,5 +111,6 @@ def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> 
 
 
 def length(taps: Floats) -> int:
-    """Number of taps up to the last one that matters."""
-    return int(np.flatnonzero(np.abs(taps) > MATTERS)[-1])
+    """Number of taps up to the last one that matters; 0 if none does."""
+    matter = np.flatnonzero(np.abs(taps) > MATTERS)
+    return int(matter[-1]) if len(matter) else 0
