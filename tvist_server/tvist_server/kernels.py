@@ -9,6 +9,7 @@ from contextlib import suppress
 
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.instruments.snapshot import Instruments
+from tvist_controller.line.rehearsal import rehearse
 from tvist_controller.loopback import LoopbackHost
 from tvist_kernels.cache import held, kernels, unkept
 from tvist_protocol.codec import decode_reply, encode
@@ -126,6 +127,7 @@ def _line() -> None:
         reply = ask(command)
         assert not isinstance(reply, Refused), reply
     Instruments(host.controller.setup.description)
+    rehearse(host.controller.cycle)  # as a served robot does before its first tick
 
 
 def _postures() -> None:
