@@ -6,7 +6,7 @@ import logging
 import socket
 import threading
 from collections import defaultdict, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from weakref import WeakValueDictionary
 
@@ -71,6 +71,8 @@ class UrInterfaces(Gateway):
     Raises:
         GatewayError: The server cannot listen on a port.
     """
+
+    takes: Collection[Topic] = frozenset[Topic]({"state", "event", "io"})
 
     def __init__(
         self,
