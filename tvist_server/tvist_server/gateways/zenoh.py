@@ -70,9 +70,8 @@ class ZenohGateway(Gateway):
         session.declare_subscriber(setpoint, Callback(partial(self._on_setpoint, setpoint), indirect=False))
         self._publishers = _publishers(session, robot, lockstep=lockstep, truth=truth or wanted is not None)
         self.takes = set(self._publishers)
-        if (
-            not lockstep
-        ):  # there a client must not miss the tick that it asks for right after it has subscribed
+        # In lockstep a client must not miss the tick that it asks for right after it has subscribed.
+        if not lockstep:
             for topic in EVERY_TICK & self.takes:
                 self.takes.discard(topic)
                 self._listen(topic, partial(self._on_wanted, topic))
