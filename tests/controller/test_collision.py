@@ -23,12 +23,15 @@ DOWN = np.array([0.0, 0.6, 0.0, -1.57, 0.0, 0.0])
 """The upper arm points below the horizon."""
 
 
+LONG = Payload(mass=1.0, com=(0.0, 0.1, 0.25))
+
+
 @pytest.fixture(scope="module")
 def model():
     return CollisionModel(UR5E, UR5E.payload)
 
 
-def capsules(q):
+def capsules(q, payload=UR5E.payload):
     """Ends and radii of all bodies in the world, by forward kinematics of this test's own."""
     arm = rigid_model(UR5E, Payload())
     data = arm.createData()
@@ -40,7 +43,7 @@ def capsules(q):
             at = data.oMi[part.link + 1] * link_frame(UR5E, part.link)
         found[part.name] = (at.act(np.array(part.start)), at.act(np.array(part.end)), part.radius)
     flange = data.oMi[6] * link_frame(UR5E, 5)
-    com, radius = np.array(UR5E.payload.com), UR5E.collision.payload_radius
+    com, radius = np.array(payload.com), UR5E.collision.payload_radius
     inset = com * min(radius / np.linalg.norm(com), 1.0)
     found["payload"] = (flange.act(inset), flange.act(2 * com - inset), radius)
     return found
@@ -101,6 +104,15 @@ def test_a_way_that_is_found_free_is_free_by_small_steps(model):
         else:
             assert deepest < CLEARANCE
     assert free > 20
+
+
+@pytest.mark.parametrize("arm", [UR5E, UR5E.without_floor()], ids=["floor", "none"])
+def test_no_point_of_a_payload_travels_farther_than_the_bound_on_which_steps_depend(arm):
+    model, random = CollisionModel(arm, LONG), np.random.default_rng(3)
+    for _ in range(200):
+        q, turned = random.uniform(-3.0, 3.0, 6), random.uniform(-0.5, 0.5, 6) * (random.random(6) < 0.5)
+        before, after = (capsules(posture, LONG)["payload"] for posture in (q, q + turned))
+        assert np.linalg.norm(np.subtract(after[1], before[1])) <= model.travel(turned) + 1e-12
 
 
 def test_a_move_that_would_collide_is_refused_with_the_pair_and_the_time():

@@ -12,6 +12,53 @@ ALONE = "from tvist_server.kernels import KERNELS" + LISTED
 AFTER_ALL = (
     "import tvist_lab.demo, tvist_lab.studies.evaluate, tvist_view.live, tvist_server.workers;" + ALONE
 )
+TICKING = """
+import sys
+from pathlib import Path
+
+from tvist_kernels.cache import KernelCache
+from tvist_protocol import commands as c
+from tvist_server.config_file import from_mapping
+from tvist_server.robot import ServedRobot
+
+setup = from_mapping({"clock": "realtime"}, "configuration").setup()
+controller = ServedRobot(setup, None, Path(sys.argv[1])).controller
+token = controller.receive(c.TakeControl(client="a")).token
+load, ticking = KernelCache.load_overload, False
+
+
+def told(kernel, sig, context):
+    if ticking:
+        print(kernel.name)
+    return load(kernel, sig, context)
+
+
+def tick(count):
+    global ticking
+    ticking = True
+    for _ in range(count):
+        controller.begin_tick()
+        report, _ = controller.complete_tick()
+        report.encoded, report.state
+    ticking = False
+
+
+KernelCache.load_overload = told
+q = controller.cycle.sample.reference
+for period in (1, 4):
+    controller.receive(c.ServoStart(token=token, period=0.002 * period))
+    for number in range(100):
+        controller.receive_setpoint(c.Setpoint(token=token, sequence=number, q=tuple(q + 1e-5 * number)))
+        tick(period)
+    controller.receive(c.ServoStop(token=token))
+    tick(500)
+for turn, name in enumerate(("elastic", "auto", "zv")):
+    controller.receive(c.MoveJ(token=token, q=tuple(q + 0.1 * turn)))
+    tick(100)
+    print(controller.receive(c.SetShaper(token=token, name=name)), file=sys.stderr)
+    tick(1500)
+"""
+"""What a served robot loads while it ticks, one line for each kernel."""
 SLEEP = "import time; print('{}', flush=True); time.sleep(1000)"
 
 
@@ -85,6 +132,14 @@ def test_the_kernels_of_a_robot_are_the_same_whatever_else_is_imported():
     )
     assert len(alone) > 50
     assert alone == after_all
+
+
+def test_a_served_robot_loads_no_kernel_while_it_ticks(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", TICKING, str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    assert done.stderr.count("Done(") == 3, done.stderr
+    assert done.stdout == ""
 
 
 @pytest.mark.nightly

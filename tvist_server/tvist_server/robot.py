@@ -82,6 +82,9 @@ class ServedRobot:
         if self._realtime:
             rehearse(self.controller.cycle)
             self.controller.motion.ahead.rehearse()
+            _ = (
+                self.controller.report.encoded
+            )  # or the first client that subscribes would have a tick load the code
         info_of(self.controller)  # computes the slowest part of the description once, before the first tick
         self.recorder: Recorder | None = None
         if record is not None:

@@ -256,7 +256,7 @@ class CollisionModel:
         """Largest distance of any point of the arm from each joint's axis, in any posture, shape (n,) [m]."""
         joints = self._model.nv
         own = np.zeros(joints)  # from the joint's origin to the farthest point of its own link
-        for body in self._geometry.geometryObjects[: len(self._names) - 1]:
+        for body in self._geometry.geometryObjects:
             if body.parentJoint > 0 and not body.disableCollision:
                 axis = body.placement.rotation[:, 2] * body.geometry.halfLength
                 ends = [np.linalg.norm(body.placement.translation + sign * axis) for sign in (-1.0, 1.0)]

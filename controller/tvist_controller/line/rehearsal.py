@@ -53,6 +53,7 @@ def rehearse(cycle: ControlCycle) -> None:
     other.line.filter.rehearse(q)  # a transition between filters has kernels of its own
     for _ in range(3):
         other.step()
+    _ = other.line.shaped.joints.published  # as a state of a shaped motion needs it
     limits, room = arm_limits(description), StreamTorqueRoom(description, other.line.dynamics)
     for period in (
         PERIOD,

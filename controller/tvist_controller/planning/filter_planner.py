@@ -22,6 +22,8 @@ from tvist_shaping.named import AnyShaper
 
 SURPLUSES = deque[tuple[ModeSource, AnyShaper | None, str, int, tuple[float, float]]](maxlen=32)
 """`surplus` of the latest filters of all robots: source of modes, own shaper, name, number of modes, what was found."""
+REHEARSED = 9
+"""Ticks of a rehearsal: some filters compute new weights at every fourth tick alone."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,6 @@ class FilterPlanner:
             and wanted_modes("elastic-auto", 1, "shaper", self._known) <= self._modal.most
         ):
             ready = self.choose("elastic-auto", 1, self._modal, setup.payload)
-            ready.tvist.filter(np.zeros(setup.description.joints))
             if ready.elastic is not None:
                 ready.elastic.rehearse()
         return chosen
@@ -91,6 +92,7 @@ class FilterPlanner:
         if wanted > source.most and self._modal is not None:
             source = self._modal
         tvist = self._make(name, wanted, source, declared, where, "modes" if modes > 1 else where)
+        _rehearse(tvist)
         return self._with_feed_forward(source, tvist, where)
 
     def estimate(self, command: SetEstimator, basis: FilterBasis) -> PlannedFilter:
@@ -101,7 +103,9 @@ class FilterPlanner:
         """
         source = choose_source(command, self._setup)
         where = "f_d" if source.calibration is None else "calibration"
-        return self._with_feed_forward(source, self._again(basis, source, basis.declared, where), where)
+        tvist = self._again(basis, source, basis.declared, where)
+        _rehearse(tvist)
+        return self._with_feed_forward(source, tvist, where)
 
     def with_payload(self, payload: Payload, basis: FilterBasis) -> Filter | None:
         """Return the present filter with the modes for another payload; None if these are not known."""
@@ -157,3 +161,10 @@ class FilterPlanner:
         except EstimatorError as error:
             raise RefusalError("out_of_range", where, f"{tvist.name}: {error}") from error
         return PlannedFilter(source, tvist, elastic, law)
+
+
+def _rehearse(tvist: Filter) -> None:
+    """Shape a small motion with a copy, so that a tick of the robot loads none of the code that the filter needs."""
+    copy = tvist.fork()
+    for tick in range(REHEARSED):
+        copy.filter(np.full(tvist.joints, 1e-4 * tick))
