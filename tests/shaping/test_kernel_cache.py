@@ -265,6 +265,12 @@ def test_code_of_another_user_does_not_run_and_one_sentence_says_so(kernel, chan
     refuses(kernel)
 
 
+def test_a_link_is_no_code_that_is_there_and_nobody_is_told_to_change_its_mode(kernel):
+    cache, file, _ = kernel
+    linked(file)
+    assert not cache.holds()  # a warning would be an error
+
+
 @pytest.mark.parametrize("change", [linked, pipe])
 def test_a_link_or_a_pipe_is_no_code(kernel, change):
     cache, file, mark = kernel
