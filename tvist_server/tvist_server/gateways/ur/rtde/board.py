@@ -50,7 +50,7 @@ class Board:
         """
         try:
             gathered = self._at(snapshot)
-        except Exception:  # a variable that cannot be written is the fault of those alone who read it
+        except Exception:  # noqa: BLE001  what a variable raises concerns those alone who read it
             self._bytes = self._snapshot = None
             alone = _Bytes([recipe], snapshot)
             alone.write(snapshot)
