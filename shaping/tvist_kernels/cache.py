@@ -161,30 +161,43 @@ class _Content(CompileResultCacheImpl):
 
 def held(some: "Iterable[KernelCache]") -> "list[KernelCache]":
     """Return those of some kernels of which there is machine code for this processor, for any types."""
-    listed, machines = cache(_listed), _machines(cpu_target.target_context)
-    return [
-        kernel
-        for kernel in some
-        if any(
-            (kernel.name, f"{kernel.sources}-{machine}") in listed(folder)
+    machines, listed, real = _machines(cpu_target.target_context), cache(_listed), cache(_real)
+
+    def there(kernel: KernelCache, folder: Path) -> bool:
+        listing = listed(folder)
+        files = [
+            file
             for machine in machines
-            for folder in kernel.places
-        )
-    ]
+            for file in listing.get(f"{kernel.name}.{kernel.sources}-{machine}", ())
+        ]
+        # A folder without such files is nobody's concern, whoever can write there.
+        place = real(folder) if files else None
+        return place is not None and any(_may_be_loaded(place / file) for file in files)
+
+    return [kernel for kernel in some if any(there(kernel, folder) for folder in kernel.places)]
 
 
-def _listed(folder: Path) -> set[tuple[str, str]]:
-    """Return what is in a folder that may be loaded: kernels' names, each with the hashes of sources and machine."""
-    found = set()
-    with _trusting(folder):
-        names = [name for name in os.listdir(folder) if name.endswith(".kernel")]  # noqa: PTH208  fast
-        real = trust.real_folder(folder)
-        for file in names:
-            with _trusting(folder):
-                trust.check_file(real / file)
-                name, _, hashes = file.removesuffix(".kernel").rpartition("-")[0].rpartition(".")
-                found.add((name, hashes))
+def _listed(folder: Path) -> dict[str, list[str]]:
+    """Return the names of a folder's files, each below its beginning, which tells all but types."""
+    found: dict[str, list[str]] = {}
+    with contextlib.suppress(OSError):
+        for file in os.listdir(folder):  # noqa: PTH208  fast
+            if file.endswith(".kernel"):
+                found.setdefault(file.rpartition("-")[0], []).append(file)
     return found
+
+
+def _real(folder: Path) -> Path | None:
+    with _trusting(folder):
+        return trust.real_folder(folder)
+    return None
+
+
+def _may_be_loaded(file: Path) -> bool:
+    with _trusting(file.parent):
+        trust.check_file(file)
+        return True
+    return False
 
 
 def folders(sources: Path) -> list[Path]:

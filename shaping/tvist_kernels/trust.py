@@ -1,5 +1,6 @@
 """Whether what lies in a folder can be run: nobody but this user and root can have put it there."""
 
+import errno
 import os
 import stat
 import sys
@@ -55,10 +56,13 @@ def check_file(file: Path) -> None:
 
     Raises:
         DistrustError: Somebody else owns it or can write it.
-        OSError: It is not there.
+        OSError: It is not there, or is a link.
     """
     if sys.platform != "win32":
-        _check(file, file.lstat(), {0, os.geteuid()}, sticky=False)
+        found = file.lstat()
+        if stat.S_ISLNK(found.st_mode):  # whose mode says nothing
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(file))
+        _check(file, found, {0, os.geteuid()}, sticky=False)
 
 
 def make_folder(folder: Path) -> Path:

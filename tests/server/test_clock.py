@@ -178,6 +178,18 @@ def test_threads_with_the_messages_of_every_tick_get_the_priority_next_to_it(mon
     assert asked == [(0, punctual.PRIORITY), (courier._thread.native_id, punctual.PRIORITY - 1)]
 
 
+def test_a_thread_that_has_just_ended_takes_no_priority_from_the_tick(monkeypatch):
+    def ask(which, *_):
+        if which != 0:
+            raise ProcessLookupError(3, "No such process")
+
+    courier = Courier([])
+    courier.start()
+    monkeypatch.setattr(os, "sched_setscheduler", ask)
+    assert punctual.take_priority()
+    courier.close()
+
+
 def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypatch, caplog):
     def refuse(*_):
         raise PermissionError(1, "Operation not permitted")

@@ -352,3 +352,12 @@ def test_whoever_asks_leaves_room_for_commands(served):
     assert kinds.count(Accepted) == 1
     assert kinds.count(ToolPose) >= 1
     assert all(reply.code == "busy" for reply in served.replies if isinstance(reply, Refused))
+
+
+def test_a_robot_whose_programs_cannot_be_compiled_still_moves(monkeypatch, caplog):
+    monkeypatch.setattr(Planner, "rehearse_scripts", lambda _: 1 / 0)
+    served = Served()
+    assert isinstance(served.ask(served.of(c.MoveJ, q=tuple(Q2.tolist()))), Accepted)
+    served.ahead.end()
+    served.ahead.close()
+    assert "programs cannot be compiled" in caplog.text

@@ -258,11 +258,27 @@ def test_code_where_others_can_write_does_not_run_and_one_sentence_says_so(kerne
     refuses(kernel)
 
 
+def test_a_folder_where_others_can_write_is_nobody_s_concern_as_long_as_no_code_is_there(kernel):
+    cache, file, _ = kernel
+    assert cache.places  # of a folder that becomes so later
+    file.unlink()
+    file.parent.chmod(0o775)
+    assert not cache.holds()  # a warning would be an error
+    file.with_name("tvist_elsewhere.other.0-0-0.kernel").write_bytes(b"of another kernel")
+    assert not cache.holds()
+
+
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
 @pytest.mark.parametrize("change", list(OF_OTHERS))
 def test_code_of_another_user_does_not_run_and_one_sentence_says_so(kernel, change):
     OF_OTHERS[change](kernel[1])
     refuses(kernel)
+
+
+def test_a_link_is_no_code_that_is_there_and_nobody_is_told_to_change_its_mode(kernel):
+    cache, file, _ = kernel
+    linked(file)
+    assert not cache.holds()  # a warning would be an error
 
 
 @pytest.mark.parametrize("change", [linked, pipe])

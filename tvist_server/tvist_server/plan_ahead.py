@@ -121,8 +121,11 @@ class PlanAhead:
             self._post(lambda: answer(_BUSY))
 
     def _run(self) -> None:
-        with _REHEARSING:  # the robots of a process share what the first of them makes
-            self._planner.rehearse_scripts()  # hundreds of milliseconds, for which no start waits
+        try:
+            with _REHEARSING:  # the robots of a process share what the first of them makes
+                self._planner.rehearse_scripts()  # hundreds of milliseconds, for which no start waits
+        except Exception:  # motions need no program
+            log.exception("programs cannot be compiled")
         while (waiting := self._queue.get()) is not None:
             try:
                 self._hand_over(waiting)

@@ -1,5 +1,6 @@
 """What is asked of the system so that ticks are on time; what it refuses is logged, and the robot runs without it."""
 
+import contextlib
 import ctypes
 import logging
 import os
@@ -33,7 +34,8 @@ def take_priority() -> bool:
         os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
         for thread in threading.enumerate():
             if thread.name in EVERY_TICK and thread.native_id is not None:
-                os.sched_setscheduler(thread.native_id, policy, os.sched_param(PRIORITY - 1))
+                with contextlib.suppress(ProcessLookupError):  # it has just ended
+                    os.sched_setscheduler(thread.native_id, policy, os.sched_param(PRIORITY - 1))
     except OSError as error:
         log.warning(
             "real-time priority is not permitted (%s), so the control loop runs at normal priority: "

@@ -117,6 +117,28 @@ def test_who_else_reads_what_changes_nothing(snapshots, changes):
             assert board.package(recipe, snapshot, b"\x01") == alone(recipe.names, snapshot)
 
 
+def test_a_variable_that_cannot_be_written_ends_only_those_who_read_it(ur5e, monkeypatch):
+    robot = ur5e()
+    board, sound, faulty = (
+        Board(),
+        OutputRecipe(("actual_q", "timestamp")),
+        OutputRecipe(("actual_momentum",)),
+    )
+    board.begin("one", sound)
+    before = robot.tick()
+    board.package(sound, before, b"\x01")
+    board.begin("other", faulty)
+    monkeypatch.setattr(type(robot.instruments._rigid), "momentum", lambda *_: 1 / 0)
+    now = robot.tick()
+    assert board.package(sound, now, b"\x01") == alone(sound.names, now) != alone(sound.names, before)
+    with pytest.raises(ZeroDivisionError):
+        board.package(faulty, now, b"\x01")
+    assert board.package(sound, now, b"\x01") == alone(sound.names, now)
+    board.end("other")
+    now = robot.tick()
+    assert board.package(sound, now, b"\x01") == alone(sound.names, now)
+
+
 def test_what_is_read_only_when_io_changes_depends_on_nothing_else(snapshots):
     early, late = snapshots[3], snapshots[90]
     assert early.io is late.io

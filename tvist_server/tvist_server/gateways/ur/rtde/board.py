@@ -48,19 +48,32 @@ class Board:
             snapshot: Values of the tick.
             head: Bytes in front of the variables: the recipe's id in protocol version 2, nothing in version 1.
         """
+        try:
+            gathered = self._at(snapshot)
+        except Exception:  # noqa: BLE001  what a variable raises concerns those alone who read it
+            self._bytes = self._snapshot = None
+            alone = _Bytes([recipe], snapshot)
+            alone.write(snapshot)
+            return _package(head, alone.of(recipe))
+        key = head, recipe.text
+        package = self._packages.get(key)
+        if package is None:
+            package = self._packages[key] = _package(head, gathered.of(recipe))
+        return package
+
+    def _at(self, snapshot: Snapshot) -> "_Bytes":
+        """Return the bytes of a tick."""
         if self._bytes is None:
             self._bytes = _Bytes(self._recipes.values(), snapshot)
         if snapshot is not self._snapshot:
             self._bytes.write(snapshot)
             self._packages.clear()
             self._snapshot = snapshot
-        key = head, recipe.text
-        package = self._packages.get(key)
-        if package is None:
-            size = HEADER.size + len(head) + recipe.size
-            package = HEADER.pack(size, PackageKind.DATA) + head + self._bytes.of(recipe)
-            self._packages[key] = package
-        return package
+        return self._bytes
+
+
+def _package(head: bytes, data: bytes) -> bytes:
+    return HEADER.pack(HEADER.size + len(head) + len(data), PackageKind.DATA) + head + data
 
 
 class _Bytes:
