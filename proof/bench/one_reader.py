@@ -21,7 +21,7 @@ SAID = {
     "paced_line": "the line alone, once every 2 ms",
     "bare_put": "a bare put() of a state to one client, once every 2 ms",
 }
-"""What is measured, besides the line in process."""
+"""Name of each measurement in the table, besides the line in process."""
 
 
 async def one_reader(seconds: float, tell: Callable[[str], None]) -> dict[str, Figure]:

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from statistics import median
 from tempfile import TemporaryDirectory
 
 from proof.bench.figure import Figure, figure, in_alternation
@@ -51,9 +52,9 @@ def start(tell: Callable[[str], None]) -> dict[str, Figure]:
         "first_start_s": figure(
             "tvist serve until its first state, without what this machine has compiled",
             "s",
-            [first] * REPETITIONS,
+            [first],
             "with kernels on disk",
-            found["serve"],
+            [median(found["serve"])],
         ),
         "help_s": figure("tvist --help", "s", found["help"], small, found["small"]),
         "import_client_s": figure("import tvist_client", "s", found["client"], small, found["small"]),

@@ -55,10 +55,8 @@ def rehearse(cycle: ControlCycle) -> None:
         other.step()
     _ = other.line.shaped.joints.published  # as a state of a shaped motion needs it
     limits, room = arm_limits(description), StreamTorqueRoom(description, other.line.dynamics)
-    for period in (
-        PERIOD,
-        4.0 * PERIOD,
-    ):  # the curves through set-points at the line's own rate and at a lower one
+    # Curves through set-points at the line's own rate and at a lower one.
+    for period in (PERIOD, 4.0 * PERIOD):
         stream = SetpointStream(q, period, limits, PERIOD, torque=room)
         for number in range(4):
             stream.offer(number, q)

@@ -49,8 +49,6 @@ PAUSE = 0.02
 """Time between two checks for room, in lockstep [s]."""
 UNREAD = 10
 """States that are handed over at once while there is no client: they count for temperatures and energies alone."""
-
-
 Tick = State | Report
 """A tick whose state is made already, and one whose state is yet to be made."""
 
@@ -109,7 +107,7 @@ class UrInterfaces(Gateway):
         self._news = deque[Tick | Message]()
         """What was published and waits for the interfaces' thread."""
         self._woken = False
-        """Whether that thread is about to look at it."""
+        """Whether that thread has been asked to take it, and has not begun."""
         self._unread: Tick | None = None
         """Last tick that only temperatures and energies have followed."""
         self._room = threading.Event()

@@ -97,7 +97,7 @@ class _Bytes:
         self._buffer = bytearray(self._zero + 1)
         self._numbers = np.frombuffer(self._buffer, np.uint8)
         self._spans: dict[str, slice] = {}
-        """Where the bytes of each recipe are among those gathered, by its text."""
+        """Slice of the gathered bytes that belongs to each recipe, by the text of the recipe."""
         first = 0
         for recipe in different:
             self._spans[recipe.text] = slice(first, first + recipe.size)
@@ -137,14 +137,14 @@ class _Bytes:
 
 
 class _Place(NamedTuple):
-    """Where a part is written."""
+    """Place of a part in the buffer."""
 
     first: int
     """Place of its first byte."""
     entries: int
     """Number of its entries."""
     of_machine: bool
-    """Whether its bytes have the machine's order."""
+    """Whether its bytes are in the machine's order."""
 
 
 class _Packing:

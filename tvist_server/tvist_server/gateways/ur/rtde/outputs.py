@@ -16,7 +16,7 @@ OUTPUTS: dict[str, Wire] = {name: Wire[word] for name, word in VARIABLES.items()
 
 
 class Part(NamedTuple):
-    """What is read at once: one variable, or several with the same number of entries."""
+    """One variable, or several with the same number of entries that are read together."""
 
     read: Callable[[Snapshot], Any]
     """Returns a number, a list of numbers, or doubles as bytes in the machine's order."""
@@ -25,7 +25,7 @@ class Part(NamedTuple):
     variables: int = 1
     """Number of variables."""
     of_io: bool = False
-    """Whether it depends on nothing but the terminals and registers, which rarely change."""
+    """Whether its values depend on terminals and registers alone, which rarely change."""
 
 
 def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
