@@ -9,7 +9,6 @@ from contextlib import suppress
 
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.line.rehearsal import rehearse
 from tvist_controller.loopback import LoopbackHost
 from tvist_kernels.cache import held, kernels, unkept
 from tvist_protocol.codec import decode_reply, encode
@@ -20,6 +19,7 @@ from tvist_protocol.replies import Accepted, Refused, Reply, ToolPose
 from tvist_protocol.simulation import SimulationStep, StepSetpoint
 from tvist_server.config_file import from_mapping
 from tvist_server.gateways.starting import Tell
+from tvist_server.rehearsal import rehearse
 
 MOVE_TICKS = 1000
 """Longest time of a motion that uses kernels [ticks]."""
@@ -127,7 +127,7 @@ def _line() -> None:
         reply = ask(command)
         assert not isinstance(reply, Refused), reply
     Instruments(host.controller.setup.description)
-    rehearse(host.controller.cycle)  # as a served robot does before its first tick
+    rehearse(host.controller)  # as a served robot does before its first tick
 
 
 def _postures() -> None:

@@ -11,7 +11,6 @@ from tvist_controller.dispatch.planner import Planner
 from tvist_controller.experience.lesson import Student
 from tvist_controller.experience.own_students import experience_of
 from tvist_controller.host import Host
-from tvist_controller.line.rehearsal import rehearse
 from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.reporting.sink import Sink
 from tvist_controller.setup import Setup
@@ -32,6 +31,7 @@ from tvist_server.program_folder import ProgramFolder
 from tvist_server.publisher import Publisher
 from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
+from tvist_server.rehearsal import rehearse
 from tvist_server.studies import Studies
 
 if TYPE_CHECKING:
@@ -80,11 +80,7 @@ class ServedRobot:
         self.controller = Controller(setup, order=None if self._plans is None else self._plans.order)
         self.setup = setup = self.controller.setup
         if self._realtime:
-            rehearse(self.controller.cycle)
-            self.controller.motion.ahead.rehearse()
-            _ = (
-                self.controller.report.encoded
-            )  # or the first client that subscribes would have a tick load the code
+            rehearse(self.controller)
         info_of(self.controller)  # computes the slowest part of the description once, before the first tick
         self.recorder: Recorder | None = None
         if record is not None:

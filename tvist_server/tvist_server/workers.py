@@ -20,7 +20,6 @@ from typing import Any
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
-from tvist_controller.line.rehearsal import rehearse
 from tvist_controller.setup import Setup
 from tvist_server.assembly import protected
 from tvist_server.config import ConfigError, ServeConfig
@@ -29,6 +28,7 @@ from tvist_server.gateways.access import with_robots_behind
 from tvist_server.gateways.endpoints import protocol
 from tvist_server.gateways.starting import Prepare
 from tvist_server.own_folder import OwnFolder
+from tvist_server.rehearsal import rehearse
 from tvist_server.server import Recording
 from tvist_server.spread import LOCAL, Share, check_together, shares
 from tvist_server.ur_ports import InterfaceName
@@ -283,8 +283,7 @@ def _rehearse(setup: Setup) -> None:
     planner.rehearse_scripts()
     controller = Controller(setup)
     Host(controller).tick()
-    rehearse(controller.cycle)
-    controller.motion.ahead.rehearse()
+    rehearse(controller)
 
 
 def _listed(names: Sequence[str], part: range) -> str:
