@@ -18,7 +18,9 @@ from tvist_lab.served import Served, served
 from tvist_plant.plant import PERIOD
 
 SEGMENT = 4.0
-"""Duration of a segment [s]: shorter than Zenoh's lease, so that a robot which is halted meanwhile loses no client."""
+"""Duration of a segment [s]; with Zenoh's 2.5 s between signs of life it is shorter than its lease of 10 s, so that a
+robot which is halted for one segment loses no client.
+"""
 SETTLE_TICKS = 200
 """Ticks after a halt that are not counted, as the robot makes up for some of the time."""
 CLIENTS = 10
@@ -131,6 +133,8 @@ async def _in_turn(
     """Add pairs for as long as there is time for a further one; one at least."""
 
     async def halted() -> float:
+        # Two halts in a row would outlast the lease: between them the robot reads what has come.
+        await server.robot.advance(SETTLE_TICKS)
         os.kill(server.pid, signal.SIGSTOP)
         try:
             return await bare()
