@@ -7,6 +7,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 WORKERS ?= auto
 # How many examples Hypothesis tries in `make test-all`: full, half or quick.
 PROFILE ?= full
+# Which of the cases that are not quick `make test-all` runs: all, or those of one turn, such as 1/2.
+TURN ?=
 READY := .venv/.ready
 # The folders of the distributions: tvist-protocol, tvist-shaping, tvist-urscript and tvist.
 DISTRIBUTIONS := ./protocol ./shaping ./urscript .
@@ -40,7 +42,7 @@ test: setup
 	$(BESIDE) --hypothesis-profile quick --quick
 
 test-all: setup
-	$(BESIDE) --hypothesis-profile $(PROFILE) -m "not nightly" --durations 20
+	$(BESIDE) --hypothesis-profile $(PROFILE) -m "not nightly" --durations 20 $(if $(TURN),--turn $(TURN))
 
 lint: setup
 	$(BIN)/ruff check

@@ -6,7 +6,7 @@ import signal
 import pytest
 import tests.examples  # noqa: F401  registers the profiles
 from hypothesis import settings
-from tests.durations import Durations, arrange, quick
+from tests.durations import Durations, arrange, in_turn, quick, turn_of
 
 settings.load_profile("full")
 
@@ -16,6 +16,7 @@ def pytest_addoption(parser):
         "--keep-durations", action="store_true", help="write how long tests took: durations.json"
     )
     parser.addoption("--quick", action="store_true", help="run what is quick by durations.json")
+    parser.addoption("--turn", help="run what is quick, and every n-th of the other cases: 1/2 or 2/2")
 
 
 def pytest_configure(config):
@@ -26,8 +27,10 @@ def pytest_configure(config):
 @pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(config, items):
     """Mark what needs no mark of its own, see README.md, choose what is quick, and order what runs side by side."""
-    if config.option.quick:
-        chosen = quick(items)
+    chosen = quick(items) if config.option.quick else items
+    if config.option.turn:
+        chosen = in_turn(chosen, *turn_of(config.option.turn))
+    if len(chosen) < len(items):
         config.hook.pytest_deselected(items=list(set(items) - set(chosen)))
         items[:] = chosen
     for item in items:

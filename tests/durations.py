@@ -1,9 +1,10 @@
 """How long tests took, kept in durations.json: it says what begins first, and what is quick.
 
 When tests run side by side, what is longest begins first. `pytest --quick` runs of each test function as many cases as
-fit into a short time, spread over all, and none of one whose single case takes long. `pytest --keep-durations` writes
-the seconds of every test function that it ran, set-up and end included, its cases taken together; what it did not run
-keeps its figure, and what is no longer there is dropped.
+fit into a short time, spread over all, and none of one whose single case takes long. `pytest --turn 1/2` runs all that
+is quick and, of what is not, every second case. `pytest --keep-durations` writes the seconds of every test function
+that it ran, set-up and end included, its cases taken together; what it did not run keeps its figure, and what is no
+longer there is dropped.
 """
 
 import json
@@ -37,6 +38,31 @@ def quick(items):
         if not item.get_closest_marker("nightly"):
             functions[_function(item.nodeid)].append(item)
     return [item for (file, test), cases in functions.items() for item in _few(cases, seconds, file, test)]
+
+
+def in_turn(items, turn, turns):
+    """All cases that are quick, and an equal share of the others, the longest dealt out first."""
+    seconds = kept()
+    cases = defaultdict(int)
+    for item in items:
+        cases[_function(item.nodeid)] += 1
+
+    def took(item):
+        file, test = _function(item.nodeid)
+        return seconds.get(file, {}).get(test, 0.0)
+
+    slow = [item for item in items if took(item) > QUICK]
+    slow.sort(key=lambda item: -took(item) / cases[_function(item.nodeid)])
+    others = {item for at, item in enumerate(slow) if at % turns != turn - 1}
+    return [item for item in items if item not in others]
+
+
+def turn_of(text):
+    """The number of a turn and of all turns, from such as 1/2."""
+    turn, _, turns = text.partition("/")
+    if not (turn.isdigit() and turns.isdigit() and 1 <= int(turn) <= int(turns)):
+        raise pytest.UsageError(f"--turn {text}: it must be a number of a number, as in 1/2")
+    return int(turn), int(turns)
 
 
 def _few(cases, seconds, file, test):

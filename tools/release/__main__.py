@@ -17,7 +17,7 @@ from tools.release.versions import ReleaseError, common_version
 ROOT = Path(__file__).parents[2]
 NEXT = """version {version} is in all distributions and, with a date, in CHANGELOG.md and CITATION.cff. Next:
 
-  .ci/run && make rehearse
+  TURN= .ci/run && make rehearse
   git commit --all --message "Version {version}"
   git tag --annotate v{version} --message "Version {version}"
   git push --follow-tags
