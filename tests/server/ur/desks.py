@@ -39,8 +39,8 @@ class Desk(Sink):
         lease = self.controller.session.lease
         return None if lease is None else lease.client
 
-    def state(self, state):
-        self.interfaces.publish("state", state, b"")
+    def report(self, report):
+        self.interfaces.report(report)
 
     def event(self, event):
         self.interfaces.publish("event", event, b"")

@@ -16,7 +16,7 @@ from tvist_controller.reporting.sink import Topic
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.io import Io
-from tvist_protocol.stream import Event, State
+from tvist_protocol.stream import Event
 from tvist_server.gateways.base import Desk, Gateway, Message
 from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.connection import Connection
@@ -49,8 +49,6 @@ PAUSE = 0.02
 """Time between two checks for room, in lockstep [s]."""
 UNREAD = 10
 """States that are handed over at once while there is no client: they count for temperatures and energies alone."""
-Tick = State | Report
-"""A tick whose state is made already, and one whose state is yet to be made."""
 
 
 class UrInterfaces(Gateway):
@@ -95,7 +93,7 @@ class UrInterfaces(Gateway):
         self.robot = UrRobot(description, name, self._tell, external, self._scripts.tell, self._refusals.tell)
         self._instruments, self._boards = Instruments(description), defaultdict[int, Board](Board)
         self._io: Io | None = None
-        self._early = deque[Tick](maxlen=FIRST)
+        self._early = deque[Report](maxlen=FIRST)
         """States from before the interfaces open, since temperatures and energies begin with the first tick."""
         self._connections: set[Connection] = set()
         """Connections that have a place while the interfaces are open."""
@@ -104,11 +102,11 @@ class UrInterfaces(Gateway):
         self._adopted: HostLease | None = None
         """Lease that this process holds in the name of a host."""
         self._lockstep = lockstep
-        self._news = deque[Tick | Message]()
+        self._news = deque[Report | Message]()
         """What was published and waits for the interfaces' thread."""
         self._woken = False
         """Whether that thread has been asked to take it, and has not begun."""
-        self._unread: Tick | None = None
+        self._unread: Report | None = None
         """Last tick that only temperatures and energies have followed."""
         self._room = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -171,10 +169,8 @@ class UrInterfaces(Gateway):
         self._alive = asyncio.create_task(self._keep_alive())
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  not MessagePack here
-        """Pass a message to the interfaces' thread."""
-        if isinstance(message, State):
-            self._pass_on(message)
-        elif self._loop is None:
+        """Pass a message to the interfaces' thread; states come by `report`."""
+        if self._loop is None:
             if isinstance(message, Io):
                 self._io = message
         elif isinstance(message, Io | Event):
@@ -183,15 +179,12 @@ class UrInterfaces(Gateway):
 
     def report(self, report: Report) -> None:
         """Pass a tick to the interfaces' thread, which makes its state for clients alone."""
-        self._pass_on(report)
-
-    def _pass_on(self, tick: Tick) -> None:
         if self._loop is None:  # the interfaces are not open
-            self._early.append(tick)
+            self._early.append(report)
         elif not self._has_room():
             self.dropped += 1
         else:
-            self._news.append(tick)
+            self._news.append(report)
             if self._connections or len(self._news) >= UNREAD:
                 self._wake()
 
@@ -241,7 +234,7 @@ class UrInterfaces(Gateway):
             message = self._news.popleft()
             if self._lockstep:
                 self._room.set()
-            if isinstance(message, Tick):
+            if isinstance(message, Report):
                 self._see(message)
             elif isinstance(message, Io):
                 self._on_io(message)
@@ -250,28 +243,23 @@ class UrInterfaces(Gateway):
         if self._unread is not None:
             self._read(self._unread)
 
-    def _see(self, tick: Tick) -> None:
+    def _see(self, report: Report) -> None:
         if self._io is None:
             return
         if self._connections:
-            snapshot = self._read(tick)
+            snapshot = self._read(report)
             # All is made before any of it is sent: the readers' process then stays awake for all, and wakes up once.
             for connection, data in [(one, one.sample(snapshot)) for one in tuple(self._connections)]:
                 if data:
                     connection.put(data)
             return
-        self._unread = tick
-        if isinstance(tick, State):
-            self._instruments.follow(tick.tick, tick.robot_mode, tick.actual_moment, tick.actual_qd)
-        else:
-            measured = tick.sample.measured
-            self._instruments.follow(tick.tick, tick.modes[0], measured.moment.tolist(), measured.qd.tolist())
+        self._unread, measured = report, report.sample.measured
+        self._instruments.follow(report.tick, report.modes[0], measured.moment.tolist(), measured.qd.tolist())
 
-    def _read(self, tick: Tick) -> Snapshot:
+    def _read(self, report: Report) -> Snapshot:
         assert self._io is not None
-        state = tick if isinstance(tick, State) else tick.state
         self._unread = None
-        self.robot.latest = self._instruments.snapshot(state, self._io)
+        self.robot.latest = self._instruments.snapshot(report.state, self._io)
         return self.robot.latest
 
     def _on_io(self, io: Io) -> None:
