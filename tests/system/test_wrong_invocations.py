@@ -125,7 +125,7 @@ MISUSE = [
     (("shapers", "--format", "pdf"), ["--format is about figures", "--figures DIR"]),
     (("shapers", "--figures", "x", "--format", "gif"), ["--format is 'gif'", "png, pdf, svg"]),
     (("shapers", "--figures", "x", "--dpi", "5"), ["dpi is 5", "30 to 2400"]),
-    (("shapers", "--figures", "x", "--columns", "3"), ["--columns is '3'", "1, 2"]),
+    (("shapers", "--figures", "x", "--width", "3"), ["--width is '3'", "1, 2"]),
     (("identify", "--configurations", "0"), ["configurations"]),
     (("identify", "--payload", "5", "--payload", "6"), ["5 and 6"]),
     (("identify", "--payload", "heavy"), ["payload"]),
