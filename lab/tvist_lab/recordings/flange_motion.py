@@ -11,9 +11,9 @@ from tvist_plant.description import RobotDescription
 
 RATE = 100.0
 """Rows of what is compared per second: some ten times what is left after smoothing [Hz]."""
-SMOOTHING = 0.025
-"""Standard deviation of the smoothing of both signals [s]: of ringing at 10 Hz, which joint angles hardly show, a third
-stays."""
+SMOOTHING = {False: 0.025, True: 0.06}
+"""Standard deviation of the smoothing of rotation and of force [s]: joint angles hardly show how an arm rings, which is
+most of its force at 10 Hz, while a gyroscope's bias wanders slowly."""
 GRAVITY = np.array([0.0, 0.0, 9.80665])
 AT_REST = 0.2
 """Share of a log in which the arm is taken to rest [-]."""
@@ -105,9 +105,8 @@ def _resampled(time: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
 def _smoothed(grid: Floats, values: Floats, known: Floats, lever: Floats) -> Felt:
     """Smooth equally spaced rows and thin them out to `RATE`."""
     every = round(1.0 / (RATE * (grid[1] - grid[0])))
-    smooth, arms = (
-        gaussian_filter1d(one, SMOOTHING * RATE * every, axis=0)[::every] for one in (values, lever)
-    )
+    width = SMOOTHING[bool(lever.shape[2])] * RATE * every
+    smooth, arms = (gaussian_filter1d(one, width, axis=0)[::every] for one in (values, lever))
     return Felt(grid[::every], smooth, arms, known[::every])
 
 

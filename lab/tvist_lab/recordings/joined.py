@@ -155,10 +155,10 @@ def _told(imu: Path, felt: Felt, sensor: Recording, *, force: bool) -> tuple[Clo
 
 
 def _said(imu: Path, clocks: Clocks, *, force: bool) -> str:
-    offset, drift = clocks.half
+    ahead, (offset, drift) = clocks.offset(clocks.span[0]), clocks.half
     return (
         f"{imu} joined by its {'accelerometer' if force else 'gyroscope'}: at {clocks.span[0]:.3f} s of the robot its "
-        f"clock is {clocks.offset(clocks.span[0]):.4f} s ahead (± {1e3 * offset:.1f} ms), and it runs "
+        f"clock is {abs(ahead):.4f} s {'ahead' if ahead > 0.0 else 'behind'} (± {1e3 * offset:.1f} ms), and it runs "
         f"{100.0 * abs(clocks.drift):.3f} % (± {100.0 * drift:.3f} %) {'fast' if clocks.drift > 0.0 else 'slow'}; "
         f"correlation {clocks.correlation:.3f}"
     )
