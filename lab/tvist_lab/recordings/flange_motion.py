@@ -11,7 +11,7 @@ from tvist_plant.description import RobotDescription
 
 RATE = 100.0
 """Rows of what is compared per second: some ten times what is left after smoothing [Hz]."""
-SMOOTHING = {False: 0.025, True: 0.06}
+SMOOTHING = {False: 0.02, True: 0.06}
 """Standard deviation of the smoothing of rotation and of force [s]: joint angles hardly show how an arm rings, which is
 most of its force at 10 Hz, while a gyroscope's bias wanders slowly."""
 GRAVITY = np.array([0.0, 0.0, 9.80665])

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import correlate, find_peaks
 from scipy.spatial.transform import Rotation
+from scipy.stats import t as student
 
 from tvist_lab.recordings.flange_motion import RATE, Felt
 from tvist_lab.recordings.recording import Floats
@@ -27,6 +28,12 @@ APART = 0.25
 """Offsets that differ by more are different ones, and a step of a fit is at most half of it [s]."""
 BLOCK = 0.5
 """Time after which what a fit leaves counts as new [s]."""
+FAR = 2.0
+"""What is left beyond so many times the median counts less (Huber 1964)."""
+RANK = 1e-9
+"""Share of the largest eigenvalue below which parameters cannot be told apart [-]."""
+MOVING = 1e-3
+"""Least weight of a block, over the largest, that tells of the clocks [-]."""
 ITERATIONS = 30
 CONVERGED = 1e-6
 """Change of the offset, anywhere in a log, with which a fit ends [s]."""
@@ -98,23 +105,27 @@ def _places(first: Felt, other: Felt) -> Iterator[tuple[float, float]]:
 
 def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | None:
     """Fit everything from a place on, by Gauss and Newton; None if that leads out of what both felt."""
-    rate = np.gradient(other.vector, 1.0 / RATE, axis=0)
-    t, rotation = first.time - first.time[0], None
+    # The first one's change counts: joint angles neither ring nor have much noise.
+    rate = np.gradient(first.vector, 1.0 / RATE, axis=0)
+    t, rotation, weight = first.time - first.time[0], None, np.ones(len(first.time))
     for _ in range(ITERATIONS):
         then = start + (1.0 + drift) * t
         both = (first.known > 0.0) & (np.interp(then, other.time, other.known, 0.0, 0.0) == 1.0)
         if np.count_nonzero(both) < RATE or abs(drift) > 1.5 * DRIFT:
             return None
         middle = float(t[both].mean())
-        w, u, since = first.vector[both], _at(other, other.vector, then[both]), t[both] - middle
+        w, moved, since = first.vector[both], rate[both], t[both] - middle
+        u = np.column_stack([np.interp(then[both], other.time, axis) for axis in other.vector.T])
         if rotation is None:
             rotation = Rotation.align_vectors(w - w.mean(0), u - u.mean(0))[0]
-        u, moved = rotation.apply(u), rotation.apply(_at(other, rate, then[both]))
+        u = rotation.apply(u)
         X = np.concatenate(
             [np.stack([moved, moved * since[:, None]], axis=2), _turns(u),
              np.broadcast_to(np.eye(3), (len(w), 3, 3)), -first.lever[both]], axis=2,
         )  # fmt: skip
-        p, left, inverse = _solved(X, w - u)
+        p, left = _solved(X, w - u, weight[both])
+        far = np.linalg.norm(left, axis=1)
+        weight[both] = np.minimum(1.0, FAR * float(np.median(far)) / np.maximum(far, 1e-12))
         step = p[:2] * min(1.0, 0.5 * APART / max(abs(p[0]), CONVERGED))
         start, drift = start + step[0] - step[1] * middle, drift + step[1]
         rotation = Rotation.from_rotvec(p[TURN]) * rotation
@@ -123,13 +134,11 @@ def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | No
     w = w - X[:, :, LEVER] @ p[LEVER]
     around, around_u = w - w.mean(0), u - u.mean(0)
     energy, lost = float(np.square(around).sum()), float(np.square(left).sum())
-    errors = _covariance(X, left, inverse, since)
-    at_ends = [errors[0, 0] + 2.0 * errors[0, 1] * end + errors[1, 1] * end**2 for end in since[[0, -1]]]
     return Clocks(
         middle=float(first.time[0] + middle),
         other=float(start + (1.0 + drift) * middle),
         drift=float(drift),
-        half=(1.96 * float(np.sqrt(max(at_ends))), 1.96 * float(np.sqrt(errors[1, 1]))),
+        half=_intervals(X, left, weight[both], since),
         correlation=float(np.sqrt(max(0.0, 1.0 - lost / max(energy, 1e-30)))),
         scale=float(np.sum(around * around_u) / max(np.square(around_u).sum(), 1e-30)),
         explained=max(0.0, energy - lost) / RATE,
@@ -137,33 +146,34 @@ def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | No
     )
 
 
-def _at(felt: Felt, values: Floats, then: Floats) -> Floats:
-    return np.column_stack([np.interp(then, felt.time, axis) for axis in values.T])
-
-
 def _turns(u: Floats) -> Floats:
     """Change of vectors with a small rotation about each axis, shape (T, 3, 3)."""
     return np.stack([np.cross(axis, u) for axis in np.eye(3)], axis=2)
 
 
-def _solved(X: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """Least squares: parameters, what is left of shape (T, 3), and the pseudo-inverse of XᵀX.
+def _solved(X: Floats, y: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Weighted least squares: parameters, and what is left, shape (T, 3).
 
     Where all turns about one axis, the rotation about that axis shows in nothing and stays.
     """
-    flat = X.reshape(-1, X.shape[2])
-    size = np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
-    inverse = np.linalg.pinv((flat / size).T @ (flat / size), rcond=1e-9) / np.outer(size, size)
-    p = inverse @ (flat.T @ y.ravel())
-    return p, y - X @ p, inverse
+    G, g = (np.einsum("tik,t,ti...->k...", X, weight, one) for one in (X, y))
+    p: Floats = np.linalg.pinv(G, RANK, hermitian=True) @ g
+    return p, y - X @ p
 
 
-def _covariance(X: Floats, left: Floats, inverse: Floats, since: Floats) -> Floats:
-    """Covariance of parameters where what is left is correlated in time: the sandwich of White (1980), by blocks."""
-    block = ((since - since[0]) // BLOCK).astype(np.intp)
-    pulls = np.zeros((block[-1] + 1, X.shape[2]))
-    np.add.at(pulls, block, np.einsum("tik,ti->tk", X, left))
-    strong = np.abs(pulls[:, 0])
-    used = max(2, int(np.count_nonzero(strong > 0.01 * strong.max())))
-    found: Floats = inverse @ (pulls.T @ pulls) @ inverse * (used / (used - 1))
-    return found
+def _intervals(X: Floats, left: Floats, weight: Floats, since: Floats) -> tuple[float, float]:
+    """Half of the 95 % intervals of the offset, at the end where it is wider, and of the drift.
+
+    What is left is correlated in time, and few fast motions weigh most: the fit is repeated, to first order, without
+    each block of `BLOCK` (the jackknife of Tukey 1958, with Student's quantile for the blocks with motion).
+    """
+    first = np.searchsorted(since, np.arange(since[0], since[-1], BLOCK))
+    pulls = np.add.reduceat(np.einsum("tik,t,ti->tk", X, weight, left), first)
+    grams = np.add.reduceat(np.einsum("tik,t,til->tkl", X, weight, X), first)
+    without = np.linalg.pinv(grams.sum(axis=0) - grams, RANK, hermitian=True)
+    moved = np.einsum("bkl,bl->bk", without, pulls)[:, :2]
+    at_start, at_end, drift = (moved @ np.array(of) for of in ((1.0, since[0]), (1.0, since[-1]), (0.0, 1.0)))
+    offset, rate = max(np.linalg.norm(at_start), np.linalg.norm(at_end)), np.linalg.norm(drift)
+    moving = np.count_nonzero(grams[:, 0, 0] > MOVING * grams[:, 0, 0].max())
+    quantile = float(student.ppf(0.975, max(1, moving - 2)))
+    return quantile * float(offset), quantile * float(rate)
