@@ -61,6 +61,7 @@ class TwoDevices:
     encoder: float = 1e-5
     dropped: float = 0.0
     repeated: float = 0.0
+    held: int = 1  # rows in which the robot logs the same measurement
     same: bool = False  # each motion goes the same way to and fro, at the same pace
     robot_start: float = 0.0  # what the robot's clock shows at its first row
     knots: list = field(default_factory=list, init=False)
@@ -75,7 +76,7 @@ class TwoDevices:
             if self.same:
                 way = random.uniform(-1, 1, 6) if way is None else way
                 step[list(self.moving)] = self.stroke * (-1) ** number * way[list(self.moving)]
-                length, rest = self.stroke / self.speed, 1.2
+                length, rest = self.stroke / self.speed, 2.0
             else:
                 goal = self.home + self.stroke * random.uniform(-0.7, 0.7, 6)
                 step[list(self.moving)] = (goal - at)[list(self.moving)]
@@ -83,7 +84,7 @@ class TwoDevices:
                 rest = random.uniform(0.8, 2.0)
             self.knots.append((time, length, at, step))
             at, time = at + step, time + length + rest
-        self.end = time + 0.5
+        self.end = time - rest + 1.0
         self.mounting = rotation(random)
         self.arm = self.lever * rotation(random)[0]
 
@@ -122,22 +123,33 @@ class TwoDevices:
 
     def robot_rows(self):
         """Times and joint angles as the robot logs them."""
-        t = np.arange(0.0, self.end, 1.0 / self.robot_rate)
-        q = self.q(t) + self.encoder * self.random.standard_normal((len(t), 6))
-        return self._faulty(t + self.robot_start, q)
+        measured = np.arange(0.0, self.end, 1.0 / self.robot_rate)
+        q = self.q(measured)
+        q = np.round((q + self.encoder * self.random.standard_normal(q.shape)) / 1e-6) * 1e-6
+        t = np.arange(len(measured) * self.held) / (self.robot_rate * self.held)
+        return self._faulty(t + self.robot_start, np.repeat(q, self.held, axis=0))
 
     def sensor_rows(self):
         """Times on the sensor's clock, angular velocities and specific forces."""
         random = self.random
         t = np.arange(-self.spare, self.end + self.spare, 1.0 / self.sensor_rate)
         omega, force = self.felt(t)
-        omega = omega + self.bias[0] * random.standard_normal(3) + self.noise[0] * random.standard_normal(omega.shape)
-        force = force + self.bias[1] * random.standard_normal(3) + self.noise[1] * random.standard_normal(force.shape)
+        omega = (
+            omega
+            + self.bias[0] * random.standard_normal(3)
+            + self.noise[0] * random.standard_normal(omega.shape)
+        )
+        force = (
+            force
+            + self.bias[1] * random.standard_normal(3)
+            + self.noise[1] * random.standard_normal(force.shape)
+        )
         return self._faulty(self.shown(t + self.robot_start), np.hstack([force, omega]))
 
     def _faulty(self, t, values):
         kept = self.random.random(len(t)) >= self.dropped
         t, values = t[kept], values[kept]
+        self.rows = t, values  # those that were written last, without repetitions
         times = 1 + (self.random.random(len(t)) < self.repeated)
         return np.repeat(t, times), np.repeat(values, times, axis=0)
 
@@ -146,7 +158,9 @@ class TwoDevices:
         t, q = self.robot_rows()
         return write(path, header, t, [q], **how)
 
-    def sensor(self, path: Path, header="timestamp,actual_tool_accelerometer_{},actual_tool_gyroscope_{}", **how) -> Path:
+    def sensor(
+        self, path: Path, header="timestamp,actual_tool_accelerometer_{},actual_tool_gyroscope_{}", **how
+    ) -> Path:
         """Write the sensor's log; without a gyroscope where the header names none."""
         t, values = self.sensor_rows()
         vectors = [values[:, :3], values[:, 3:]]
@@ -167,7 +181,7 @@ def write(path, header, t, vectors, units=(1.0, 1.0, 1.0), separator=",", comma=
         lines.append(separator.join(cells))
     table = np.column_stack([t / units[0], *(v / unit for v, unit in zip(vectors, units[1:], strict=False))])
     for row in table:
-        line = separator.join(f"{value:.{digits}g}" for value in row)
+        line = separator.join([repr(float(row[0])), *(f"{value:.{digits}g}" for value in row[1:])])
         lines.append(line.replace(".", ",") if comma else line)
     path.write_text("\n".join(lines) + "\n")
     return path

@@ -22,7 +22,7 @@ COARSE = 5
 """One of so many rows counts in the search."""
 BLURRED = 0.2
 """Time by which a drift may be wrong between the ends of a log in the search [s]."""
-TRIED = 8
+TRIED = 24
 """Number of places that are fitted."""
 APART = 0.25
 """Offsets that differ by more are different ones, and a step of a fit is at most half of it [s]."""
