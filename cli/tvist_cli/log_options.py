@@ -48,7 +48,7 @@ class LogOptions:
                 raise Failure(f"--{name.replace('_', '-')} is about --imu: give --imu FILE too", code=2)
         if self.imu is not None and len(self.imu) != len(files):
             raise Failure(
-                f"--imu is given {len(self.imu)} times for {len(files)} logs: give one for each", code=2
+                f"{len(self.imu)} --imu for {len(files)} logs: give one for each", code=2
             )
         with told(RecordingError):
             logs = [read(file, self.columns) for file in files]

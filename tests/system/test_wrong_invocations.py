@@ -102,7 +102,7 @@ MISUSE = [
     (("log", "export", "x.mcap", "--to", "foxglove", "--imu", "i.csv"), ["--imu", "needs a recording"]),
     (("log", "analyze", "x.csv", "--imu-columns", "time=t"), ["--imu-columns is about --imu"]),
     (("log", "info", "x.csv", "--robot", "ur10e"), ["--robot is about --imu"]),
-    (("log", "compare", "x.csv", "y.csv", "--imu", "i.csv"), ["--imu is given 1 times for 2 logs", "one for each"]),
+    (("log", "compare", "x.csv", "y.csv", "--imu", "i.csv"), ["1 --imu for 2 logs", "one for each"]),
     (("shaperbench", "--moves", "0"), ["moves is 0", "1 to 10000"]),
     (("evaluate", "--random", "0"), ["random is 0"]),
     (("evaluate", "--random", "2", "--modes", "9"), ["modes is 9", "1 to 6"]),
