@@ -47,9 +47,7 @@ class LogOptions:
             if self.imu is None and getattr(self, name) is not None:
                 raise Failure(f"--{name.replace('_', '-')} is about --imu: give --imu FILE too", code=2)
         if self.imu is not None and len(self.imu) != len(files):
-            raise Failure(
-                f"{len(self.imu)} --imu for {len(files)} logs: give one for each", code=2
-            )
+            raise Failure(f"{len(self.imu)} --imu for {len(files)} logs: give one for each", code=2)
         with told(RecordingError):
             logs = [read(file, self.columns) for file in files]
             if self.imu is None:

@@ -81,7 +81,7 @@ def test_rows_are_right_to_3_ms_and_the_drift_to_2e_4_or_the_join_is_refused(
         assert fault not in SURE, why
         return
     late, slope = wrong_by(found, devices)
-    # Limits hold for half of a 95 % interval: where a join is nearly refused, one in twenty is a little beyond.
+    # Limits hold for 95 % intervals: where a join is nearly refused, one in twenty is a little beyond.
     slack = 1.0 if fault in SURE else 1.5
     assert late < slack * 3e-3
     assert slope < slack * 2e-4
@@ -182,6 +182,36 @@ def test_a_join_that_cannot_be_trusted_is_refused_with_what_to_do(tmp_path, kind
     attempt, words = REFUSED[kind]
     with pytest.raises(RecordingError, match=words):
         attempt(tmp_path)
+
+
+@pytest.mark.parametrize("gyroscope", [True, False])
+@pytest.mark.parametrize(
+    "kind", ["nothing", "zeros", "noise", "three rows", "a jump in time", "one axis", "huge"]
+)
+def test_a_sensors_log_without_sense_is_refused_and_never_ends_in_another_error(tmp_path, kind, gyroscope):
+    devices = TwoDevices(6)
+    t, values = devices.sensor_rows()
+    random = np.random.default_rng(1)
+    match kind:
+        case "nothing":
+            values = np.full_like(values, np.nan)
+        case "zeros":
+            values = np.zeros_like(values)
+        case "noise":
+            values = random.standard_normal(values.shape)
+        case "three rows":
+            t, values = t[:3], values[:3]
+        case "a jump in time":
+            t = t + np.where(np.arange(len(t)) > 40, 1e7, 0.0)
+        case "one axis":
+            values[:, [0, 1, 3, 4]] = 0.0
+        case "huge":
+            values *= 1e4
+    vectors = [values[:, :3], values[:, 3:]] if gyroscope else [values[:, :3]]
+    header = "timestamp,actual_tool_accelerometer_{},actual_tool_gyroscope_{}" if gyroscope else FORCE
+    imu = write(tmp_path / "imu.csv", header, t, vectors)
+    with pytest.raises(RecordingError, match=r"join|imu\.csv"):
+        joined(read(devices.robot(tmp_path / "robot.csv")), imu)
 
 
 def test_repeated_motions_are_joined_where_the_sensor_rested_before_and_after_them(tmp_path):

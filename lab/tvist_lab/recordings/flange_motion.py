@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from tvist_controller.api.planning import ToolKinematics
-from tvist_lab.recordings.recording import Floats
+from tvist_lab.recordings.recording import Floats, RecordingError
 from tvist_plant.description import RobotDescription
 
 RATE = 100.0
@@ -17,6 +17,8 @@ most of its force at 10 Hz, while a gyroscope's bias wanders slowly."""
 GRAVITY = np.array([0.0, 0.0, 9.80665])
 AT_REST = 0.2
 """Share of a log in which the arm is taken to rest [-]."""
+SPARSE = 10.0
+"""Time of a log over that of its rows from which on it is mostly gaps [-]."""
 HELD = 0.05
 """Longest time for which a log repeats angles between two measurements [s]; for longer, the arm rests."""
 
@@ -94,6 +96,10 @@ def _resampled(time: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
     """Rows at `RATE` or a multiple of it: their times, values by straight lines, and 0 in a gap of the log."""
     seen = np.isfinite(values).all(axis=1)
     time, values = time[seen], values[seen]
+    if len(time) < 2 or not 1.0 < time[-1] - time[0] < SPARSE * len(time) * float(np.median(np.diff(time))):
+        raise RecordingError(
+            f"{len(time)} rows with numbers cannot be joined: there must be a second of them, without long gaps"
+        )
     step = np.diff(time)
     rate = RATE * max(1, round(1.0 / (RATE * float(np.median(step)))))
     grid = time[0] + np.arange(int((time[-1] - time[0]) * rate) + 1) / rate

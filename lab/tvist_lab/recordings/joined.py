@@ -21,7 +21,7 @@ ALIKE = 3.0
 """Share that a second fit leaves unexplained, over that of the best, up to which it fits as well [-]."""
 NOISE = 2e-3
 """Share that noise leaves unexplained of any fit [-]."""
-OFFSET, DRIFT = 3e-3, 2e-4
+OFFSET, DRIFT = 2.5e-3, 2e-4
 """Widest half intervals of the offset [s] and of the drift [-]."""
 MOVED = {
     False: (0.3, "the flange turns by {:.2g} rad in all"),
@@ -72,7 +72,7 @@ def joined(
         raise JoinError(
             f"the log has {q.shape[1]} joints, a {arm.robot.model} has {arm.joints}: give the robot with --robot"
         )
-    force = GYROSCOPE not in sensor
+    force = GYROSCOPE not in sensor or not np.isfinite(sensor[GYROSCOPE]).any()
     clocks, size = _told(imu, at_flange(arm, recording.time, q, force=force), sensor, force=force)
     at = clocks.first(sensor.time)
     kept = (at >= recording.time[0]) & (at <= recording.time[-1])

@@ -34,8 +34,8 @@ RANK = 1e-9
 """Share of the largest eigenvalue below which parameters cannot be told apart [-]."""
 MOVING = 1e-3
 """Least weight of a block, over the largest, that tells of the clocks [-]."""
-ITERATIONS = 30
-CONVERGED = 1e-6
+ITERATIONS = 15
+CONVERGED = 1e-5
 """Change of the offset, anywhere in a log, with which a fit ends [s]."""
 TURN, BIAS, LEVER = slice(2, 5), slice(5, 8), slice(8, None)
 """Places among the parameters of a fit, after offset and drift."""
@@ -117,7 +117,9 @@ def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | No
         w, moved, since = first.vector[both], rate[both], t[both] - middle
         u = np.column_stack([np.interp(then[both], other.time, axis) for axis in other.vector.T])
         if rotation is None:
-            rotation = Rotation.align_vectors(w - w.mean(0), u - u.mean(0))[0]
+            left_basis, _, right_basis = np.linalg.svd((w - w.mean(0)).T @ (u - u.mean(0)))
+            left_basis[:, 2] *= np.linalg.det(left_basis @ right_basis)
+            rotation = Rotation.from_matrix(left_basis @ right_basis)
         u = rotation.apply(u)
         X = np.concatenate(
             [np.stack([moved, moved * since[:, None]], axis=2), _turns(u),
@@ -156,9 +158,17 @@ def _solved(X: Floats, y: Floats, weight: Floats) -> tuple[Floats, Floats]:
 
     Where all turns about one axis, the rotation about that axis shows in nothing and stays.
     """
-    G, g = (np.einsum("tik,t,ti...->k...", X, weight, one) for one in (X, y))
-    p: Floats = np.linalg.pinv(G, RANK, hermitian=True) @ g
+    G, g = (np.einsum("tik,t,ti...->k...", X, weight, one, optimize=True) for one in (X, y))
+    p: Floats = _inverse(G, G) @ g
     return p, y - X @ p
+
+
+def _inverse(G: Floats, whole: Floats) -> Floats:
+    """Pseudo-inverse of one matrix or several, parameters scaled by the diagonal of `whole`."""
+    size = np.sqrt(np.maximum(np.diag(whole), 1e-24))
+    scale = np.outer(size, size)
+    inverse: Floats = np.linalg.pinv(G / scale, RANK, hermitian=True) / scale
+    return inverse
 
 
 def _intervals(X: Floats, left: Floats, weight: Floats, since: Floats) -> tuple[float, float]:
@@ -167,10 +177,10 @@ def _intervals(X: Floats, left: Floats, weight: Floats, since: Floats) -> tuple[
     What is left is correlated in time, and few fast motions weigh most: the fit is repeated, to first order, without
     each block of `BLOCK` (the jackknife of Tukey 1958, with Student's quantile for the blocks with motion).
     """
-    first = np.searchsorted(since, np.arange(since[0], since[-1], BLOCK))
+    first = np.unique(np.searchsorted(since, np.arange(since[0], since[-1], BLOCK)))
     pulls = np.add.reduceat(np.einsum("tik,t,ti->tk", X, weight, left), first)
     grams = np.add.reduceat(np.einsum("tik,t,til->tkl", X, weight, X), first)
-    without = np.linalg.pinv(grams.sum(axis=0) - grams, RANK, hermitian=True)
+    without = _inverse(grams.sum(axis=0) - grams, grams.sum(axis=0))
     moved = np.einsum("bkl,bl->bk", without, pulls)[:, :2]
     at_start, at_end, drift = (moved @ np.array(of) for of in ((1.0, since[0]), (1.0, since[-1]), (0.0, 1.0)))
     offset, rate = max(np.linalg.norm(at_start), np.linalg.norm(at_end)), np.linalg.norm(drift)
