@@ -28,7 +28,7 @@ class FigureOptions:
     """Format of figures: png, pdf or svg [png]."""
     dpi: int | None = None
     """Resolution of figures in dots per inch; in pdf and svg, of the bitmaps within them [150]."""
-    columns: Literal[1, 2] | None = None
+    width: Literal[1, 2] | None = None
     """Width of figures in columns of a journal: 1 for 89 mm, 2 for 183 mm [2]."""
     style: str | None = None
     """Style of figures: paper, with headings and explanations in a text beside each; slides, with larger type; or a
@@ -42,7 +42,7 @@ class FigureOptions:
 
         self.check(folder)
         style = self.style if self.style in STYLES else None
-        return FigureFiles(folder, self.format or "png", self.dpi or DPI, self.columns or 2, style or "")
+        return FigureFiles(folder, self.format or "png", self.dpi or DPI, self.width or 2, style or "")
 
     def check(self, folder: Path | None, *files: Path | None) -> None:
         """Refuse what cannot be done, before anything is computed.
@@ -58,7 +58,7 @@ class FigureOptions:
         for file in files:
             if file is not None and not file.parent.is_dir():
                 raise Failure(f"{file} cannot be written: there is no folder {file.parent}")
-        for name in ("format", "dpi", "columns", "style"):
+        for name in ("format", "dpi", "width", "style"):
             if folder is None and getattr(self, name) is not None:
                 raise Failure(f"--{name} is about figures: give --figures DIR too, or leave it out", code=2)
         if self.dpi is not None and not LEAST_DPI <= self.dpi <= MOST_DPI:

@@ -10,8 +10,12 @@ from tvist_lab.recordings import Recording, RecordingError, mcap_file, read
 from tvist_lab.recordings.description import meaning_of, ordered
 
 
-def summary(path: str | os.PathLike[str], columns: str | None = None) -> dict[str, Any]:
+def summary(path: str | os.PathLike[str], read_as: Recording | None = None) -> dict[str, Any]:
     """Describe a file that `tvist_lab.recordings.read` reads.
+
+    Args:
+        path: The file.
+        read_as: What was read from it, if it was not read as it is.
 
     Returns:
         Times in s on the recording's own clock. `complete`, `dropped`, `replayable`, `from_tick` and `messages` are
@@ -25,9 +29,9 @@ def summary(path: str | os.PathLike[str], columns: str | None = None) -> dict[st
     content: mcap_file.RecordingFile | None = None
     try:
         content = mcap_file.read(path)
-        recording = content.recording
+        recording = read_as or content.recording
     except mcap_file.RecordingFileError:
-        recording = read(path, columns)
+        recording = read_as or read(path)
     info = recording.info
     return {
         "file": str(path),

@@ -196,7 +196,7 @@ REFUSED = {
         broken(lambda lines: [line.split(",")[0] + ",1" for line in lines]),
         "no column|neither target_q_0",
     ),
-    "no header": (broken(lambda lines: lines[1:]), "line 1.*header"),
+    "no header": (broken(lambda lines: lines[1:]), "line 1.*header.*counted from 1: --columns time=1,q=2-7"),
     "only a header": (broken(lambda lines: lines[:1]), "no rows"),
     "time in days": (
         broken(
@@ -402,3 +402,77 @@ def test_notes_count_motions_instead_of_listing_them():
 
     results = [MotionResult(0.0, 1.0, notes={"f_d_hz": f"only 0.{n} s"} if n < 8 else {}) for n in range(10)]
     assert grouped_notes(results) == ["8 of 10 motions, frequency: as only 0.0 s"]
+
+
+DEGREES = 180.0 / np.pi
+TORQUES = [f"state.tau_J[{i}]" for i in range(2)]
+VENDORS = {
+    "libfranka": (
+        ["time", "success_rate", *(f"state.{what}[{i}]" for what in ("q", "q_d", "dq") for i in range(2)), *TORQUES],
+        lambda t, q, qd: [1e3 * t, 1.0 + 0 * t, *q, *q, *qd, *q],
+    ),
+    "abb_libegm": (
+        ["TIMESTAMP", *(f"R_{what}_RJ{i}" for what in ("FB_POS", "FB_VEL", "PL_POS") for i in (1, 2))],
+        lambda t, q, qd: [1e3 * t, *(DEGREES * q), *(DEGREES * qd), *(DEGREES * q)],
+    ),
+    "abb_motion_program_exec": (
+        ["timestamp", "cmdnum", "J1", "J2"], lambda t, q, _: [t, 0 * t, *(DEGREES * q)],
+    ),
+    "FRI": (["index", "time", "mp1", "mp2", "ip1", "ip2"], lambda t, q, _: [0 * t, t, *q, *q]),
+    "RSI": (["IPOC", "AIPos.A1", "AIPos.A2"], lambda t, q, _: [1e3 * t, *(DEGREES * q)]),
+    "RSIPI": (
+        ["Receive.IPOC", "Receive.AIPos.A1", "Receive.AIPos.A2"], lambda t, q, _: [1e3 * t, *(DEGREES * q)],
+    ),
+    "Doosan": (
+        ["time_stamp", *(f"actual_joint_{what}_{i}" for what in ("position", "velocity") for i in (0, 1))],
+        lambda t, q, qd: [t, *(DEGREES * q), *(DEGREES * qd)],
+    ),
+    "Doosan's": (
+        ["time_stamp", "actual_joint_position[0]", "actual_joint_position[1]"], lambda t, q, _: [t, *(DEGREES * q)],
+    ),
+}  # fmt: skip
+"""A header as each program writes it, and rows; angles are too small for their unit to show in the numbers."""
+
+
+@pytest.mark.parametrize("vendor", VENDORS)
+def test_names_of_other_vendors_are_recognised_with_their_units_and_said(tmp_path, vendor):
+    header, rows = VENDORS[vendor]
+    t = 10.0 + 0.004 * np.arange(500)
+    q, qd = np.array([np.sin(t), 0.1 * np.cos(t)]), np.array([np.cos(t), -0.1 * np.sin(t)])
+    path = tmp_path / "log.csv"
+    np.savetxt(path, np.array(rows(t, q, qd)).T, "%.12g", ",", header=",".join(header), comments="")
+    found = read(path)
+    assert any("the names of" in note and vendor.split("'")[0] in note for note in found.notes)
+    assert found.time == pytest.approx(t)
+    assert found["actual_q"] == pytest.approx(q.T)
+    if "target_q" in found:
+        assert found["target_q"] == pytest.approx(q.T)
+    if "actual_qd" in found:
+        assert found["actual_qd"] == pytest.approx(qd.T)
+
+
+@pytest.mark.parametrize("separator", [",", ";", " ", "\t"])
+@pytest.mark.parametrize("comma", [False, True])
+def test_a_file_without_a_header_is_read_by_the_places_of_its_columns(tmp_path, separator, comma):
+    t = 0.01 * np.arange(300)
+    table = np.column_stack([np.arange(300), t, np.sin(t), np.cos(t), 20 * t])
+    lines = [separator.join(f"{value:.6f}" for value in row) for row in table]
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join(line.replace(".", ",") if comma else line for line in lines) + "\n")
+    if comma and separator == ",":
+        with pytest.raises(RecordingError, match="row"):  # nobody can tell these commas apart
+            read(path, "time=2,q=3-4:rad,target_q=5-5:deg")
+        return
+    found = read(path, "time=2,q=3-4:rad,target_q=5-5:deg")
+    assert len(found) == 300
+    assert found.time == pytest.approx(t, abs=1e-6)
+    assert found["actual_q"] == pytest.approx(table[:, 2:4], abs=1e-6)
+    assert found["target_q"] == pytest.approx(np.radians(table[:, 4:]), abs=1e-6)
+
+
+@pytest.mark.parametrize("columns", ["time=1,q=2-9", "time=0,q=2-3", "time=1,q=3-2"])
+def test_places_that_a_file_does_not_have_are_refused_with_those_that_it_has(tmp_path, columns):
+    path = tmp_path / "log.txt"
+    path.write_text("".join(f"{0.01 * n},1,{n}\n" for n in range(50)))
+    with pytest.raises(RecordingError, match=r"1 to 3, as in .*=2-7"):
+        read(path, columns)

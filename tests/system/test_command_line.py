@@ -13,6 +13,7 @@ import pytest
 from tests import forked
 from tests.conformance.served import NOISE, PATIENCE, Served, finished, free_endpoint
 from tests.conformance.wire import STOPPED, Wire
+from tests.lab.two_device_logs import TwoDevices
 
 from tvist_cli.output import out, table
 from tvist_client.blocking import Robot
@@ -512,3 +513,26 @@ def test_a_table_wider_than_the_screen_is_folded_with_its_first_column_in_each_p
     assert max(map(len, lines)) <= 30
     assert [line.split()[0] for line in lines if "0123456789" in line] == ["one", "one"]
     assert sum(line.count("0123456789") for line in lines) == 3
+
+
+def test_every_log_command_reads_the_log_of_a_robot_and_that_of_a_sensor_with_its_own_clock(tmp_path):
+    devices = TwoDevices(4, 2.5, 0.003)
+    log = devices.robot(tmp_path / "robot.csv", "zeit,achse {}", first=1, units=(1e-3, math.pi / 180.0))
+    imu = devices.sensor(tmp_path / "imu.csv", header=None)
+    of_robot = ("--columns", "time=zeit:ms,q=achse {}:deg")
+    of_imu = ("--imu", imu, "--imu-columns", "time=1,accelerometer=2-4,gyroscope=5-7", "--robot", "ur5e")
+    given = (*of_robot, *of_imu)
+    analysed = tvist("log", "analyze", log, *given, "--json").assert_done().json
+    assert len(analysed["motions"]) == devices.motions
+    assert any("joined by its gyroscope" in note for note in analysed["notes"])
+    assert "actual_tool_gyroscope" in tvist("log", "info", log, *given).assert_done().out
+    page = tmp_path / "page.html"
+    tvist("log", "report", log, *given, "--output", page).assert_done()
+    assert "joined by its gyroscope" in page.read_text()
+    joined = tmp_path / "joined.csv"
+    tvist("log", "export", log, *given, "--to", "csv", "--output", joined).assert_done()
+    again = tvist("log", "analyze", joined, "--json").assert_done().json["motions"]
+    assert [one["stop_s"] for one in again] == [one["stop_s"] for one in analysed["motions"]]
+    twice = tvist("log", "compare", log, log, *given, "--imu", imu, "--json").assert_done().json
+    assert len(twice["motions"]) == devices.motions
+    tvist("log", "analyze", log, *of_robot, "--imu", log).assert_failed(1, "name them with --imu-columns")

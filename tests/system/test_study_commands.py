@@ -135,7 +135,7 @@ def ever_less(told, _):
 
 RANDOM = "evaluate --random 2 --seed 5 --payload uniform --clean --shaper auto --no-baselines --save-moves drawn.json"
 MAP = (
-    "study map --points 5 --payload 1 --calibration ur5e_modal --shaper zvd --figures . --format svg --columns 1 "
+    "study map --points 5 --payload 1 --calibration ur5e_modal --shaper zvd --figures . --format svg --width 1 "
     "--output out.json"
 )
 RUNS = {

@@ -9,10 +9,20 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from tvist_lab.recordings.log_columns import STRANGE, LogError, Rows, check_known, check_names, recording_of
+from tvist_lab.recordings.log_columns import (
+    ROBOT,
+    STRANGE,
+    LogError,
+    Needs,
+    Rows,
+    check_known,
+    check_names,
+    recording_of,
+)
 from tvist_lab.recordings.named_columns import in_si, named
 from tvist_lab.recordings.packed import content
 from tvist_lab.recordings.recording import Floats, Recording
+from tvist_lab.recordings.vendor_columns import vendor_of
 from tvist_lab.words import counted
 
 SEPARATORS = (";", "\t", ",", " ")
@@ -33,6 +43,7 @@ REALTIME = {
     "tool_accelerometer": "actual_tool_accelerometer",
 }
 """Names of UR's real-time interface, and RTDE's for the same."""
+_NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -48,29 +59,46 @@ class _Lines:
     notes: tuple[str, ...]
 
 
-def read_csv(path: Path, columns: str | None = None) -> Recording:
+def read_csv(path: Path, columns: str | None = None, needs: Needs = ROBOT) -> Recording:
     """Read a log in CSV: separated by spaces, commas, semicolons or tabs, with a header of RTDE's names or others.
+
+    A file without a header has columns with the names 1, 2, …, for those who say what they are.
 
     Torn lines, which have too few or too many cells, are left out, and a note names the first. Numbers may have decimal
     commas where these do not separate cells.
 
     Args:
         path: The file.
-        columns: Names of its columns, as `named` reads them; None for RTDE's.
+        columns: Names of its columns, as `named` reads them; None for RTDE's, or those of `VENDORS`.
+        needs: What it must have.
 
     Raises:
         LogError: The file has no header of several names, cells that are no numbers, decimal commas between commas, or
             no rows; or see `named` and `recording_of`.
         OSError: The file cannot be read.
     """
-    lines = _lines(path, known=columns is None)
+    lines = _lines(path, needs, known=columns is None)
     values = _numbers(path, lines)
-    if columns is None:
-        names, units = [_rtde_name(name, lines.names) for name in lines.names], dict[str, str]()
-    else:
-        names, units = named(path, columns, lines.names)
+    names, units, whose = _named(path, lines.names, columns)
     values, notes = in_si(names, values, units)
-    return recording_of(Rows(path, names, values, lines.numbers, notes=(*lines.notes, *notes)))
+    return recording_of(
+        Rows(path, names, values, lines.numbers, notes=(*lines.notes, *whose, *notes), needs=needs)
+    )
+
+
+def _named(
+    path: Path, header: list[str], columns: str | None
+) -> tuple[list[str], dict[str, str], tuple[str, ...]]:
+    """RTDE's names of a header's columns, their units, and a note about whose names they are."""
+    if columns is not None:
+        return *named(path, columns, header), ()
+    own = [_rtde_name(name, header) for name in header]
+    vendor = vendor_of(header)
+    if vendor is None:
+        return own, {}, ()
+    names, units = named(path, vendor[1], header)
+    names = [name or ("" if other in names else other) for name, other in zip(names, own, strict=True)]
+    return names, units, (f"the columns have the names of {vendor[0]}",)
 
 
 def _rtde_name(name: str, names: list[str]) -> str:
@@ -81,11 +109,11 @@ def _rtde_name(name: str, names: list[str]) -> str:
     return f"{REALTIME[stem]}_{index}" if stem in REALTIME else name
 
 
-def _lines(path: Path, *, known: bool) -> _Lines:
+def _lines(path: Path, needs: Needs, *, known: bool) -> _Lines:
     raw = content(path).removeprefix(b"\xef\xbb\xbf")
     ends_whole = raw.endswith(b"\n")
     all_lines = raw.splitlines()
-    top, names, separator = _header(path, all_lines, known=known)
+    top, names, separator = _header(path, all_lines, needs, known=known)
     below = enumerate(all_lines[top + 1 :], top + 2)
     body = [(at, line) for at, line in below if line.strip() and not line.lstrip().startswith(b"#")]
     if separator == " ":
@@ -124,8 +152,11 @@ def _lines(path: Path, *, known: bool) -> _Lines:
     )
 
 
-def _header(path: Path, lines: list[bytes], *, known: bool) -> tuple[int, list[str], str]:
-    """Index of the header, its names, of which some must be known unless they are given, and what separates them."""
+def _header(path: Path, lines: list[bytes], needs: Needs, *, known: bool) -> tuple[int, list[str], str]:
+    """Index of the header, its names, of which some must be known unless they are given, and what separates them.
+
+    Without a header the index is that of the line before the first row.
+    """
     top = _top(lines)
     if top is None:
         raise LogError(f"{path} holds no rows")
@@ -134,6 +165,8 @@ def _header(path: Path, lines: list[bytes], *, known: bool) -> tuple[int, list[s
     except UnicodeDecodeError:
         raise LogError(f"{path} {STRANGE}: its line {top + 1} is no text") from None
     separator = next((one for one in SEPARATORS if one in header), ",")
+    if len(cells := header.split()) > 1 and all(map(_NUMBER.fullmatch, cells)):
+        separator = " "  # and any comma is a decimal one
     names = [
         name.strip().strip('"') for name in (header.split() if separator == " " else header.split(separator))
     ]
@@ -141,12 +174,15 @@ def _header(path: Path, lines: list[bytes], *, known: bool) -> tuple[int, list[s
         raise LogError(
             f"{path} {STRANGE}: its line {top + 1} does not name columns, as in timestamp,actual_q_0"
         )
+    if not known and all(name in EMPTY or _NUMBER.fullmatch(name) for name in names):
+        return top - 1, [str(place) for place in range(1, len(names) + 1)], separator
     if not any(re.match(r"[A-Za-z_]", name) for name in names):
         raise LogError(
-            f"{path}, line {top + 1}: there must be a header with RTDE's names, as in timestamp,actual_q_0"
+            f"{path}, line {top + 1}: there must be a header with RTDE's names, as in timestamp,actual_q_0; without "
+            f"one, say where columns are, counted from 1: {needs.positions}"
         )
     if known:
-        check_known(path, top + 1, [_rtde_name(name, names) for name in names])
+        check_known(path, top + 1, _named(path, names, None)[0], needs)
     check_names(f"{path}, line {top + 1}", names)
     if twice := sorted(name for name, count in Counter(names).items() if name and count > 1):
         raise LogError(f"{path}, line {top + 1}: the column {twice[0]} is there twice")

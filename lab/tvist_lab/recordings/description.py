@@ -9,6 +9,7 @@ from typing import Annotated
 
 import msgspec
 
+from tvist_lab.recordings.log_columns import GYROSCOPE
 from tvist_lab.recordings.recording import TRUTH_PREFIX, Floats, Recording, RecordingError
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
@@ -49,6 +50,8 @@ class ColumnMeaning:
 @cache
 def meaning_of(column: str) -> ColumnMeaning:
     """Describe a column of a recording: a field of `state`, `truth` (with its prefix) or `io`, or RTDE's variable."""
+    if column == GYROSCOPE:
+        return ColumnMeaning("Angular velocity of the tool, in the axes of its sensor", ("rad/s",))
     if column.startswith(TRUTH_PREFIX):
         return _of_fields(Truth).get(column.removeprefix(TRUTH_PREFIX), ColumnMeaning(""))
     return _of_fields(State).get(column) or _of_fields(Io).get(column) or _of_rtde(column)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tvist_lab.recordings.apart import Arrays, in_words, read_apart, unpacked
 from tvist_lab.recordings.description import KEY, Description, checked_description, described, sidecar
-from tvist_lab.recordings.log_columns import Rows, recording_of
+from tvist_lab.recordings.log_columns import ROBOT, Needs, Rows, recording_of
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_plant.user_file import check_is_file
 from tvist_protocol.content import parse_json
@@ -20,7 +20,7 @@ class ExportedError(RecordingError):
     """A file is no recording that was exported; the message names it."""
 
 
-def read_exported(path: Path) -> Recording:
+def read_exported(path: Path, needs: Needs = ROBOT) -> Recording:
     """Read a table in Parquet, arrays that NumPy saved, or a MAT-file of version 4 to 7, by the ending of its name.
 
     Raises:
@@ -31,7 +31,7 @@ def read_exported(path: Path) -> Recording:
         arrays = unpacked(path) if kind == ".npz" else read_apart(path)
     except Exception as error:  # a damaged file can raise nearly anything
         raise ExportedError(f"{path} cannot be read: {in_words(error)}") from error
-    return _of_table(path, arrays) if kind == ".parquet" else _of_arrays(path, arrays)
+    return _of_table(path, arrays, needs) if kind == ".parquet" else _of_arrays(path, arrays, needs)
 
 
 def with_sidecar(recording: Recording, path: Path) -> Recording:
@@ -51,11 +51,11 @@ def with_sidecar(recording: Recording, path: Path) -> Recording:
     return replace(added, notes=(*added.notes, *recording.notes))
 
 
-def _of_table(path: Path, flat: Arrays) -> Recording:
+def _of_table(path: Path, flat: Arrays, needs: Needs) -> Recording:
     """Columns for each entry of a vector."""
     text = flat.pop(KEY, None)
     if text is None:
-        return _log(path, flat)
+        return _log(path, flat, needs)
     description = _described(path, str(text))
     columns = {}
     rows = len(next(iter(flat.values()), ()))
@@ -68,7 +68,7 @@ def _of_table(path: Path, flat: Arrays) -> Recording:
     return _recording(path, description, columns)
 
 
-def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> Recording:
+def _of_arrays(path: Path, arrays: Mapping[str, Any], needs: Needs) -> Recording:
     numbers = {
         name: array.astype(np.float64)
         for name, array in arrays.items()
@@ -81,7 +81,7 @@ def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> Recording:
                 flat[name] = array.reshape(-1)
             else:
                 flat |= {f"{name}_{index}": array[:, index] for index in range(array.shape[1])}
-        return _log(path, flat)
+        return _log(path, flat, needs)
     description = _described(path, "".join(map(str, arrays[KEY].reshape(-1)[:1])))
     columns = {}
     for name, about in description.columns.items():
@@ -100,13 +100,15 @@ def _joined(parts: list[Floats], rows: int) -> Floats:
     return np.column_stack(parts) if parts else np.empty((rows, 0))
 
 
-def _log(path: Path, flat: Mapping[str, Floats]) -> Recording:
+def _log(path: Path, flat: Mapping[str, Floats], needs: Needs) -> Recording:
     """Columns without our description, as of a log."""
     lengths = {len(values) for values in flat.values()}
     if len(lengths) != 1:
         raise ExportedError(f"{path} holds no columns of numbers of equal lengths")
     rows = np.arange(1.0, lengths.pop() + 1.0)
-    return recording_of(Rows(path, list(flat), np.column_stack(list(flat.values())), rows, "row"))
+    return recording_of(
+        Rows(path, list(flat), np.column_stack(list(flat.values())), rows, "row", needs=needs)
+    )
 
 
 def _described(path: Path, text: str) -> Description:

@@ -16,7 +16,11 @@ from tvist_protocol.errors import quoted
 
 TIME = "timestamp"
 """Name of the column of times, as in RTDE [s]."""
-WIDTHS = {"actual_TCP_pose": 6, "target_TCP_pose": 6, "actual_TCP_speed": 6, "actual_tool_accelerometer": 3}
+ACCELEROMETER, GYROSCOPE = "actual_tool_accelerometer", "actual_tool_gyroscope"
+"""Names of what a sensor at the tool measures; RTDE has the first alone."""
+WIDTHS = {
+    "actual_TCP_pose": 6, "target_TCP_pose": 6, "actual_TCP_speed": 6, ACCELEROMETER: 3, GYROSCOPE: 3,
+}  # fmt: skip
 """Number of entries that a vector needs to be of use; joint angles have as many as the arm has joints."""
 OURS = ("tick", "reference_q", "unshaped_q", "target_q", "actual_TCP_pose")
 """Columns that only recordings of this controller have, all together."""
@@ -34,12 +38,32 @@ SWAPPED = 3
 SHOWN = 6
 """Largest number of missing entries of a vector that a note names."""
 
-_MEASURED = re.compile(r"(actual|target|shaped)_(q|qd|qdd|TCP_pose|TCP_speed|tool_accelerometer)_\d+")
+_MEASURED = re.compile(
+    r"(actual|target|shaped)_(q|qd|qdd|TCP_pose|TCP_speed|tool_accelerometer|tool_gyroscope)_\d+"
+)
 _INDEXED = re.compile(r"(?P<name>.*\D)_(?P<index>\d{1,6})", re.ASCII)
 
 
 class LogError(RecordingError):
     """A file is no log that can be measured; the message names the file and, where there is one, the line."""
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What a log must have beside its times."""
+
+    columns: tuple[str, ...]
+    """Vectors, of which one must be there."""
+    option: str
+    """How to name columns that have other names."""
+    positions: str
+    """How to say where they are in a file without a header."""
+
+
+ROBOT = Needs(("target_q", "actual_q"), "--columns time=…,q=joint_{}", "--columns time=1,q=2-7")
+SENSOR = Needs(
+    (ACCELEROMETER,), "--imu-columns time=…,accelerometer=a{}", "--imu-columns time=1,accelerometer=2-4"
+)
 
 
 @dataclass(frozen=True)
@@ -57,6 +81,7 @@ class Rows:
     """What `lines` counts, for messages."""
     notes: tuple[str, ...] = ()
     """What the reader of the file left out."""
+    needs: Needs = ROBOT
 
 
 def recording_of(rows: Rows) -> Recording:
@@ -66,23 +91,25 @@ def recording_of(rows: Rows) -> Recording:
     are sorted by their time; notes count them.
 
     Raises:
-        LogError: A number is beyond 1e6; there is no time or no joint angles, fewer than two rows, or time goes back
-            or is not in seconds.
+        LogError: A number is beyond 1e6; there is no time or nothing of what the log needs, fewer than two rows, or
+            time goes back or is not in seconds.
     """
     check_names(rows.path, rows.names)
     _check_numbers(rows)
     columns, notes = _vectors(rows)
     if TIME not in columns or columns[TIME].ndim != 1:
         raise LogError(f"{rows.path} has no column {TIME}: {_remedy(rows)}")
-    if not any(name in columns and columns[name].ndim == 2 for name in ("target_q", "actual_q")):
-        raise LogError(f"{rows.path} has neither target_q_0 … nor actual_q_0 …: {_remedy(rows)}")
+    if not any(name in columns and columns[name].ndim == 2 for name in rows.needs.columns):
+        lacking = [f"{name}_0 …" for name in rows.needs.columns]
+        has = f"neither {' nor '.join(lacking)}" if len(lacking) > 1 else f"no {lacking[0]}"
+        raise LogError(f"{rows.path} has {has}: {_remedy(rows)}")
     kept, more = _increasing(rows, columns[TIME])
     _check_period(rows, columns[TIME][kept])
     notes += more
     columns = {name: column[kept] for name, column in columns.items()}
     ours = all(name in columns for name in OURS)
     if not ours:
-        columns["tick"], gaps = _ticks(columns[TIME])
+        columns["tick"], gaps = ticks_of(columns[TIME])
         notes += gaps
         columns = _shaped(columns)
     return Recording(columns, notes=(*rows.notes, *notes), foreign=not ours)
@@ -95,13 +122,13 @@ def check_names(where: object, names: Sequence[str]) -> None:
             raise LogError(f"{where}: {quoted(name)} is no column's name: it must be short and printable")
 
 
-def check_known(path: Path, line: int, names: Sequence[str]) -> None:
+def check_known(path: Path, line: int, names: Sequence[str], needs: Needs) -> None:
     """Refuse a text none of whose columns has a name of a robot's log, which is some other text mostly."""
     if not any(name == TIME or _MEASURED.fullmatch(name) for name in names):
         found = f"; {found_columns(names)}" if all(map(is_name, names)) else ""
         raise LogError(
             f"{path} {STRANGE}: its line {line} does not name columns, as in timestamp,actual_q_0. If it is a log, "
-            f"name them with --columns time=…,q=joint_{{}}{found}"
+            f"name them with {needs.option}{found}"
         )
 
 
@@ -118,7 +145,7 @@ def _check_numbers(rows: Rows) -> None:
 
 
 def _remedy(rows: Rows) -> str:
-    return f"name them with --columns time=…,q=joint_{{}}; {found_columns(rows.names)}"
+    return f"name them with {rows.needs.option}; {found_columns(rows.names)}"
 
 
 def found_columns(names: Sequence[str]) -> str:
@@ -203,7 +230,7 @@ def _left_out(rows: Rows, count: int, what: str, first: int) -> str:
     return f"{counted(count, 'row')} {what} left out, the first in {rows.unit} {first}"
 
 
-def _ticks(time: Floats) -> tuple[Floats, list[str]]:
+def ticks_of(time: Floats) -> tuple[Floats, list[str]]:
     """Number the rows by their time, so that missing rows are missing numbers, and describe long gaps."""
     step = np.diff(time)
     period = float(np.median(step))

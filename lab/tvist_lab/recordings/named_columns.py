@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tvist_lab.recordings.log_columns import PERIODS, TIME, LogError, found_columns
+from tvist_lab.recordings.log_columns import ACCELEROMETER, GYROSCOPE, PERIODS, TIME, LogError, found_columns
 from tvist_lab.recordings.recording import Floats
 from tvist_protocol.errors import quoted
 
@@ -14,7 +14,8 @@ SHORT = {
     "time": TIME,
     "q": "actual_q",
     "qd": "actual_qd",
-    "accelerometer": "actual_tool_accelerometer",
+    "accelerometer": ACCELEROMETER,
+    "gyroscope": GYROSCOPE,
     "pose": "actual_TCP_pose",
 }
 """Short names of the columns that matter, and RTDE's."""
@@ -30,6 +31,8 @@ WIDEST = 7.0
 GRAVITY_IN_G = (0.8, 1.2)
 """Range of the length of an accelerometer's vector in units of gravity, at the median."""
 
+_SPAN = re.compile(r"(\d{1,6})(?:-(\d{1,6}))?", re.ASCII)
+
 
 def named(path: Path, columns: str, header: Sequence[str]) -> tuple[list[str], dict[str, str]]:
     """RTDE's names of a header's columns, and the units that were given.
@@ -38,7 +41,7 @@ def named(path: Path, columns: str, header: Sequence[str]) -> tuple[list[str], d
         path: The file, for messages.
         columns: Such as `time=t:ms,q=joint_{}:deg,accelerometer=a{}:g`: a short name or one of RTDE's, the header's
             name with `{}` for the number or the letter x, y, z of an entry, and after a colon the unit if it is not
-            SI.
+            SI. A position counted from 1, as in `time=1,q=2-7`, does as well.
         header: Names of the file's columns.
 
     Raises:
@@ -51,20 +54,38 @@ def named(path: Path, columns: str, header: Sequence[str]) -> tuple[list[str], d
         rtde = SHORT.get(key, key)
         if not key.isidentifier() or not pattern or (unit and unit not in SI):
             raise LogError(
-                f"{path}: columns has {quoted(item)}: write NAME=COLUMN or NAME=COLUMN:UNIT, as in q=joint_{{}}:deg, "
-                f"with a unit of {', '.join(SI)}"
+                f"{path}: columns has {quoted(item)}: write NAME=COLUMN or NAME=COLUMN:UNIT, as in q=joint_{{}}:deg or "
+                f"q=2-7:deg, with a unit of {', '.join(SI)}"
             )
-        before, braces, after = pattern.partition("{}")
-        entry = re.compile(re.escape(before) + (r"(\d{1,6}|[xyz])" if braces else "") + re.escape(after))
-        hits = [(at, found) for at, name in enumerate(header) if (found := entry.fullmatch(name))]
-        if not hits:
-            raise LogError(f"{path} has no column {quoted(pattern)} for {key}; {found_columns(header)}")
-        hits.sort(key=lambda hit: int(AXES.get(hit[1][1], hit[1][1])) if braces else 0)
-        for index, (at, _) in enumerate(hits):
-            names[at] = f"{rtde}_{index}" if braces else rtde
+        several = "{}" in pattern or "-" in pattern
+        for index, at in enumerate(_places(path, key, pattern, header)):
+            names[at] = f"{rtde}_{index}" if several else rtde
         if unit:
             units[rtde] = unit
     return names, units
+
+
+def entry_of(pattern: str) -> re.Pattern[str]:
+    """Return what matches the names of one column, or of the entries of a vector."""
+    before, braces, after = pattern.partition("{}")
+    return re.compile(re.escape(before) + (r"(\d{1,6}|[xyz])" if braces else "") + re.escape(after))
+
+
+def _places(path: Path, key: str, pattern: str, header: Sequence[str]) -> list[int]:
+    """Places of one column, or of the entries of a vector in their order."""
+    entry, braces = entry_of(pattern), "{}" in pattern
+    hits = [(at, found) for at, name in enumerate(header) if (found := entry.fullmatch(name))]
+    if not hits and (span := _SPAN.fullmatch(pattern)):
+        first, last = int(span[1]), int(span[2] or span[1])
+        if 1 <= first <= last <= len(header):
+            return list(range(first - 1, last))
+        raise LogError(
+            f"{path}: {key}={pattern} are no columns: they are 1 to {len(header)}, as in {key}=2-7"
+        )
+    if not hits:
+        raise LogError(f"{path} has no column {quoted(pattern)} for {key}; {found_columns(header)}")
+    hits.sort(key=lambda hit: int(AXES.get(hit[1][1], hit[1][1])) if braces else 0)
+    return [at for at, _ in hits]
 
 
 def in_si(names: Sequence[str], values: Floats, given: Mapping[str, str]) -> tuple[Floats, tuple[str, ...]]:

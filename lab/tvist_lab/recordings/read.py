@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+from tvist_lab.recordings.log_columns import ROBOT, Needs
 from tvist_lab.recordings.mcap_records import MAGIC as MCAP
 from tvist_lab.recordings.packed import GZIP, content
 from tvist_lab.recordings.recording import Recording, RecordingError
@@ -12,7 +13,7 @@ SHOWN = 4096
 """Number of first bytes by which text is told from packets."""
 
 
-def read(path: str | os.PathLike[str], columns: str | None = None) -> Recording:
+def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs = ROBOT) -> Recording:
     """Read a recording of this controller, or a log of another one.
 
     Recordings: MCAP, and what `tvist log export` writes (CSV, Parquet, npz, mat). Logs: CSV with RTDE's names, dumps of
@@ -21,6 +22,7 @@ def read(path: str | os.PathLike[str], columns: str | None = None) -> Recording:
     Args:
         path: The file.
         columns: How a CSV names what is needed, as in `time=t:ms,q=joint_{}:deg`; see `named_columns.named`.
+        needs: What a log must have.
 
     Returns:
         Named columns in SI units; `notes` say what was left out.
@@ -31,16 +33,16 @@ def read(path: str | os.PathLike[str], columns: str | None = None) -> Recording:
     """
     path = Path(path)
     try:
-        return _read(path, columns)
+        return _read(path, columns, needs)
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror or error}") from error
     except UserFileError as error:
         raise RecordingError(str(error)) from error
 
 
-def _read(path: Path, names: str | None) -> Recording:
+def _read(path: Path, names: str | None, needs: Needs) -> Recording:
     if path.is_dir():
-        return _read(_bag(path), names)
+        return _read(_bag(path), names, needs)
     check_is_file(path, "recording")
     with path.open("rb") as stream:
         head = stream.read(SHOWN)
@@ -51,11 +53,11 @@ def _read(path: Path, names: str | None) -> Recording:
     if path.suffix == ".mcap" and not head.startswith(MCAP):
         raise RecordingError(f"{path} is no MCAP file")
     if head.startswith(MCAP):
-        return _read_mcap(path)
+        return _read_mcap(path, needs)
     if path.suffix.lower() in (".parquet", ".npz", ".mat"):
         from tvist_lab.recordings.exported import read_exported
 
-        return read_exported(path)
+        return read_exported(path, needs)
     if b"\0" in head:
         from tvist_lab.recordings.realtime_dump import read_dump
 
@@ -63,7 +65,7 @@ def _read(path: Path, names: str | None) -> Recording:
     from tvist_lab.recordings.csv_log import read_csv
     from tvist_lab.recordings.exported import with_sidecar
 
-    return with_sidecar(read_csv(path, names), path)
+    return with_sidecar(read_csv(path, names, needs), path)
 
 
 def _bag(folder: Path) -> Path:
@@ -74,7 +76,7 @@ def _bag(folder: Path) -> Path:
     return files[0]
 
 
-def _read_mcap(path: Path) -> Recording:
+def _read_mcap(path: Path, needs: Needs) -> Recording:
     from tvist_lab.recordings import mcap_file
 
     try:
@@ -84,6 +86,6 @@ def _read_mcap(path: Path) -> Recording:
 
         if not has_ros(path):
             raise error from None
-        return read_rosbag(path)
+        return read_rosbag(path, needs)
     recording = content.recording
     return recording if content.note is None else recording.noted(content.note.removeprefix(f"{path} "))

@@ -13,7 +13,7 @@ from mcap.records import Channel, Message, Schema
 from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
-from tvist_lab.recordings.log_columns import LogError, Rows, recording_of
+from tvist_lab.recordings.log_columns import GYROSCOPE, ROBOT, LogError, Needs, Rows, recording_of
 from tvist_lab.recordings.mcap_records import DAMAGE, records
 from tvist_lab.recordings.recording import Floats, Recording
 from tvist_protocol.errors import quoted
@@ -42,7 +42,7 @@ class _Topic:
     unstamped: int = 0
 
 
-def read_rosbag(path: Path) -> Recording:
+def read_rosbag(path: Path, needs: Needs = ROBOT) -> Recording:
     """Read a rosbag2 recording: `JointState`, `Imu`, `JointTrajectoryControllerState` and the TCP's `PoseStamped`.
 
     Of each type the topic with the most messages counts. Times are those of the headers. The rows are those of the
@@ -66,9 +66,10 @@ def read_rosbag(path: Path) -> Recording:
             notes.append(
                 f"{topic.unstamped} messages of {name} have no time in their header: the time of recording counts"
             )
-    if JOINTS not in chosen and TARGET not in chosen:
+    wanted, *others = (JOINTS, TARGET) if needs == ROBOT else (ACCELEROMETER,)
+    if not any(kind in chosen for kind in (wanted, *others)):
         there = ", ".join(sorted(topics)) or "nothing that is read"
-        raise LogError(f"{path} has no sensor_msgs/msg/JointState; it has {there}")
+        raise LogError(f"{path} has no sensor_msgs/msg/{wanted}; it has {there}")
     base = chosen.get(ACCELEROMETER) or chosen.get(JOINTS) or chosen[TARGET]
     columns = _columns(chosen, base)
     names, values = ["timestamp"], [np.array(base.times)[:, None]]
@@ -77,7 +78,7 @@ def read_rosbag(path: Path) -> Recording:
         values.append(column)
     order = np.argsort(base.times, kind="stable")
     table = np.hstack(values)[order]
-    return recording_of(Rows(path, names, table, order + np.float64(1.0), "message", tuple(notes)))
+    return recording_of(Rows(path, names, table, order + np.float64(1.0), "message", tuple(notes), needs))
 
 
 def has_ros(path: Path) -> bool:
@@ -168,6 +169,11 @@ def _row(topic: _Topic, message: Any) -> dict[str, list[float]]:
         case "Imu":
             force = message.linear_acceleration
             row = {"actual_tool_accelerometer": list(map(float, (force.x, force.y, force.z)))}
+            turning = message.angular_velocity
+            if any(
+                speed := list(map(float, (turning.x, turning.y, turning.z)))
+            ):  # all zero: it has no gyroscope
+                row[GYROSCOPE] = speed
         case _:
             pose = message.pose
             turn = pose.orientation

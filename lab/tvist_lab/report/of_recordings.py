@@ -21,7 +21,7 @@ from tvist_lab.metrics import (
     pairs,
 )
 from tvist_lab.metrics.columns import number
-from tvist_lab.recordings import read
+from tvist_lab.recordings import Recording, read
 from tvist_lab.report.page import Page, PageTable, Picture, Section, picture
 from tvist_lab.report.verdict import shaping_of, verdict_on_one, verdict_on_pairs, verdict_on_two
 from tvist_lab.words import counted
@@ -57,18 +57,20 @@ class _File:
     pairs: Sequence[Pair]
 
 
-def recordings_page(paths: Sequence[Path], command: str, columns: str | None = None) -> Page:
+def recordings_page(
+    paths: Sequence[Path], command: str, recordings: Sequence[Recording] | None = None
+) -> Page:
     """Build the report of recordings or logs; the first one is what the others are compared with.
 
     Args:
         paths: Files of any format that `tvist_lab.recordings.read` reads, at least one.
         command: The command that makes the report, for its provenance.
-        columns: Names of the columns of a CSV, as `read` takes them.
+        recordings: What was read from them already; None reads them.
 
     Raises:
         RecordingError: A file cannot be read, or has no joint angles; the message names it.
     """
-    files = _files(paths, columns)
+    files = _files(paths, recordings)
     base, *others = files
     compared = [(other, compare(base.measured, other.measured)) for other in others]
     paired = [_pairs(file) for file in files if file.pairs]
@@ -111,10 +113,10 @@ def _verdict(base: _File, compared: Sequence[tuple[_File, Comparison]]) -> list[
     return list(dict.fromkeys(sentences))
 
 
-def _files(paths: Sequence[Path], columns: str | None = None) -> list[_File]:
+def _files(paths: Sequence[Path], recordings: Sequence[Recording] | None = None) -> list[_File]:
     found = []
-    for path, name in zip(paths, _names(paths), strict=True):
-        measured = Measured.of(read(path, columns))
+    for path, name, recording in zip(paths, _names(paths), recordings or map(read, paths), strict=True):
+        measured = Measured.of(recording)
         found.append(_File(path, name, measured, pairs(measured)))
     return found
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import out, print_json, progress, say, table
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ def analyze(
     *,
     figures: Path | None = None,
     look: FigureOptions = AS_USUAL,
-    columns: str | None = None,
+    logs: LogOptions = AS_IT_IS,
     predict: bool = False,
     json: bool = False,
 ) -> None:
@@ -31,18 +32,17 @@ def analyze(
             CSV with RTDE's names, a dump of UR's port 30003, a rosbag2 in MCAP.
         figures: Folder for the figures of each motion: what was recorded, and the ring-down after it.
         look: How to write the figures.
-        columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
-            after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
+        logs: How to read logs.
         predict: Predict from repetitions of the same motion what zv for one and for two modes would leave of each.
         json: Print one JSON object.
     """
     look.check(figures)
     from tvist_lab.metrics import COLUMNS, Measured, grouped_notes, measure, motion_cells, motions
-    from tvist_lab.recordings import RecordingError, read
+    from tvist_lab.recordings import RecordingError
     from tvist_lab.words import counted
 
+    (recording,) = logs.read(file)
     with told(RecordingError):
-        recording = read(file, columns)
         found = motions(recording)
     results = []
     with progress(len(found), "motions") as bar:

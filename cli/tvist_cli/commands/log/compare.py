@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
+from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import number, out, print_json, say, table
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def compare(a: Path, b: Path, *, columns: str | None = None, json: bool = False) -> None:
+def compare(a: Path, b: Path, *, logs: LogOptions = AS_IT_IS, json: bool = False) -> None:
     """Compare two recordings or logs of the same motions, as without and with shaping.
 
     Motions correspond if they start and end at the same joint angles within 0.02 rad. Those that only one file
@@ -24,16 +25,15 @@ def compare(a: Path, b: Path, *, columns: str | None = None, json: bool = False)
     Args:
         a: First file, in any format that `tvist log analyze` reads.
         b: Second file; its format may be another one.
-        columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
-            after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
+        logs: How to read logs.
         json: Print one JSON object with all figures of each motion.
     """
     from tvist_lab.metrics import Measured
     from tvist_lab.metrics import compare as compared
-    from tvist_lab.recordings import RecordingError, read
+    from tvist_lab.recordings import RecordingError
 
+    first, second = logs.read(a, b)
     with told(RecordingError):
-        first, second = read(a, columns), read(b, columns)
         result = compared(Measured.of(first), Measured.of(second))
     for file, recording in ((a, first), (b, second)):
         for note in recording.notes:

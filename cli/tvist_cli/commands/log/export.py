@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from tvist_cli.failure import Failure, told
+from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.misuse import lower
 from tvist_cli.output import print_json, say
 
@@ -13,7 +14,7 @@ def export(
     to: str,
     output: Path | None = None,
     force: bool = False,
-    columns: str | None = None,
+    logs: LogOptions = AS_IT_IS,
     json: bool = False,
 ) -> None:
     """Write a recording or a log as CSV, Parquet, npz or mat, in full precision, or a recording for Foxglove.
@@ -26,19 +27,18 @@ def export(
             a layout for both.
         output: File to write [FILE with its ending replaced, such as run.csv or run.foxglove.mcap for run.mcap].
         force: Replace an existing file.
-        columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
-            after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
+        logs: How to read logs.
         json: Print one JSON object.
     """
-    from tvist_lab.recordings import RecordingError, mcap_file, read
+    from tvist_lab.recordings import RecordingError, mcap_file
     from tvist_lab.recordings.export import FORMATS, FOXGLOVE, written_by
     from tvist_lab.recordings.export import export as write
 
     kind = lower(to)
     if kind not in (*FORMATS, FOXGLOVE):
         raise Failure(f"to is {to!r}: must be one of {', '.join((*FORMATS, FOXGLOVE))}", code=2)
-    if kind == FOXGLOVE and columns is not None:
-        raise Failure("columns is for a CSV: --to foxglove needs a recording", code=2)
+    if kind == FOXGLOVE and logs.given:
+        raise Failure("--columns and --imu are for logs: --to foxglove needs a recording", code=2)
     ending = f".{kind}.mcap" if kind == FOXGLOVE else f".{kind}"
     path = output or file.with_name(file.name.removesuffix(".gz")).with_suffix(ending)
     written = written_by(path, kind)
@@ -54,7 +54,7 @@ def export(
             content = mcap_file.read(file)
             recording = content.recording.noted(*filter(None, [content.note]), *draw(content, path))
         else:
-            recording = read(file, columns)
+            (recording,) = logs.read(file)
             write(recording, path, kind)
     for note in recording.notes:
         say(f"{file}: {note.removeprefix(f'{file} ')}")

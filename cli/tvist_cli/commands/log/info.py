@@ -4,23 +4,23 @@ from pathlib import Path
 from typing import Any
 
 from tvist_cli.failure import told
+from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import out, print_json, table, words
 
 
-def info(file: Path, *, columns: str | None = None, json: bool = False) -> None:
+def info(file: Path, *, logs: LogOptions = AS_IT_IS, json: bool = False) -> None:
     """Print what a recording or a log holds: its robot, time, events, and its columns with their shapes and units.
 
     Args:
         file: A recording, an exported file, or any log that tvist log analyze reads.
-        columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
-            after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
+        logs: How to read logs.
         json: Print one JSON object.
     """
     from tvist_lab.recordings import RecordingError
     from tvist_lab.summary import summary
 
     with told(RecordingError):
-        found = summary(file, columns)
+        found = summary(file, logs.read(file)[0] if logs.given else None)
     if json:
         print_json(found)
         return

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from tvist_cli.failure import Failure, told
+from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import out, print_json, typed, write_report
 
 
@@ -10,7 +11,7 @@ def report(
     *files: Path,
     output: Path = Path("report.html"),
     force: bool = False,
-    columns: str | None = None,
+    logs: LogOptions = AS_IT_IS,
     json: bool = False,
 ) -> None:
     """Write a report of recordings or logs as one web page that needs no network.
@@ -22,8 +23,7 @@ def report(
             with.
         output: File to write.
         force: Replace an existing file.
-        columns: Names of a CSV's columns if they are not RTDE's, with {} for the number of a joint or axis, and a unit
-            after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g. Also qd, pose, target_q, target_qd.
+        logs: How to read logs.
         json: Print the verdict as one JSON object.
     """
     if not files:
@@ -33,8 +33,9 @@ def report(
     from tvist_lab.recordings import RecordingError
     from tvist_lab.report import recordings_page
 
+    recordings = logs.read(*files)
     with told(RecordingError):
-        page = recordings_page(files, typed(), columns)
+        page = recordings_page(files, typed(), recordings)
     write_report(output, page)
     if json:
         print_json(

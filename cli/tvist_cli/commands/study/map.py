@@ -72,7 +72,7 @@ def map(  # noqa: A001  the command's name
     free = points**2 - result["left_out"]
     if not free:
         raise Failure(f"robot {robot} touches itself or the floor in each of the {points**2} configurations")
-    places.write(result, draw=lambda: _figures(found, words, look.columns or 2))
+    places.write(result, draw=lambda: _figures(found, words, look.width or 2))
     title = f"{words}: {free} of {points**2} configurations of {found.names[0]} and {found.names[1]}"
 
     def say_it(result: dict[str, Any]) -> None:

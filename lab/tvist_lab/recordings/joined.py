@@ -1,0 +1,174 @@
+"""A robot's log and that of a sensor at its tool, from two devices, as one recording on the robot's clock."""
+
+from pathlib import Path
+
+import numpy as np
+
+from tvist_lab.recordings.flange_motion import RATE, Felt, at_flange, by_sensor
+from tvist_lab.recordings.log_columns import ACCELEROMETER, GYROSCOPE, SENSOR, TIME, ticks_of
+from tvist_lab.recordings.read import read
+from tvist_lab.recordings.recording import Floats, Recording, RecordingError
+from tvist_lab.recordings.two_clocks import Clocks, fits
+from tvist_lab.words import counted
+from tvist_plant.description import DescriptionError, RobotDescription, load, robots
+from tvist_plant.user_file import UserFileError
+
+CORRELATED = 0.9
+"""Smallest correlation of what both felt [-]."""
+AS_WELL = 0.3
+"""A second fit that explains at least this share of the motion makes a join ambiguous, if it fits as well [-]."""
+ALIKE = 3.0
+"""Share that a second fit leaves unexplained, over that of the best, up to which it fits as well [-]."""
+NOISE = 2e-3
+"""Share that noise leaves unexplained of any fit [-]."""
+OFFSET, DRIFT = 2.5e-3, 2e-4
+"""Widest half intervals of the offset [s] and of the drift [-]."""
+MOVED = {
+    False: (0.3, "the flange turns by {:.2g} rad in all"),
+    True: (3.0, "its force changes by {:.2g} m/s² in all"),
+}
+"""Least motion of a log, and how it is said: by rotation, and by force."""
+SIZES = (0.8, 1.25)
+"""Range of what the joints' motion may be over the sensor's [-]."""
+DEFAULT = "ur5e"
+REMEDY = (
+    "record both at once for 20 s or more, the sensor fixed to the tool: fast motions of several joints, others at the "
+    "end than at the beginning, and 5 s of rest before and after them"
+)
+"""What makes a join possible."""
+
+
+class JoinError(RecordingError):
+    """Two logs cannot be joined, or it could not be trusted; the message says what to record instead."""
+
+
+def joined(
+    recording: Recording, imu: Path, imu_columns: str | None = None, robot: str | None = None
+) -> Recording:
+    """Put a sensor's rows on the robot's clock and interpolate the robot's columns there.
+
+    Offset and drift are those with which the gyroscope, or without one the accelerometer, agrees best with the forward
+    kinematics of the logged joint angles.
+
+    Args:
+        recording: The robot's log.
+        imu: The sensor's log, in any format that `read` reads.
+        imu_columns: Names of its columns, as `read` takes them.
+        robot: Name or file of the robot; None for that of the recording, or a UR5e.
+
+    Returns:
+        Columns of the robot, with `actual_tool_accelerometer` and `actual_tool_gyroscope` of the sensor, at the
+        sensor's rows within the robot's time; notes say how the clocks differ.
+
+    Raises:
+        JoinError: The robot is unknown or has another number of joints, or the clocks cannot be told well enough.
+        RecordingError: The sensor's log cannot be read.
+    """
+    sensor = read(imu, imu_columns, SENSOR)
+    arm, assumed = _robot(recording, robot)
+    name = "actual_q" if "actual_q" in recording and np.isfinite(recording["actual_q"]).any() else "target_q"
+    q = recording[name]
+    if q.shape[1] != arm.joints:
+        raise JoinError(
+            f"the log has {q.shape[1]} joints, a {arm.robot.model} has {arm.joints}: give the robot with --robot"
+        )
+    force = GYROSCOPE not in sensor or not np.isfinite(sensor[GYROSCOPE]).any()
+    clocks, size = _told(imu, at_flange(arm, recording.time, q, force=force), sensor, force=force)
+    at = clocks.first(sensor.time)
+    kept = (at >= recording.time[0]) & (at <= recording.time[-1])
+    columns = {key: _between(recording.time, column, at[kept]) for key, column in recording.columns.items()}
+    columns |= {TIME: at[kept], ACCELEROMETER: sensor[ACCELEROMETER][kept]}
+    if not force:
+        columns[GYROSCOPE] = size * sensor[GYROSCOPE][kept]
+    columns["tick"], gaps = ticks_of(at[kept])
+    notes = [
+        *recording.notes,
+        *(f"{imu}: {note}" for note in sensor.notes),
+        _said(imu, clocks, force=force),
+        *assumed,
+    ]
+    if size != 1.0:
+        notes.append(f"{imu}: {GYROSCOPE} is taken as deg/s")
+    if name == "target_q":
+        notes.append(
+            "the log has no actual_q: the sensor is put on the target's time, which the arm follows later"
+        )
+    if ACCELEROMETER in recording:
+        notes.append(f"{ACCELEROMETER} is that of {imu}, not the log's own")
+    if outside := int(np.count_nonzero(~kept)):
+        notes.append(f"{counted(outside, 'row')} of {imu} outside of the robot's time left out")
+    return Recording(columns, info=recording.info, notes=(*notes, *gaps), foreign=True)
+
+
+def _robot(recording: Recording, robot: str | None) -> tuple[RobotDescription, list[str]]:
+    """The robot whose kinematics count, and a note if nobody has named it."""
+    assumed = []
+    if robot is None and recording.info is not None:
+        robot = str(recording.info.model).lower()
+        if robot not in robots():
+            raise JoinError(f"the log is of a {recording.info.model}: give its robot file with --robot")
+    elif robot is None:
+        robot = DEFAULT
+        assumed = ["the log does not name its robot: a UR5e's kinematics count, unless --robot names another"]
+    try:
+        return load(robot), assumed
+    except (DescriptionError, UserFileError) as error:
+        raise JoinError(str(error)) from error
+
+
+def _told(imu: Path, felt: Felt, sensor: Recording, *, force: bool) -> tuple[Clocks, float]:
+    """How the clocks differ, and the unit of the gyroscope in SI.
+
+    Raises:
+        JoinError: That cannot be told well enough.
+    """
+    least, moved = MOVED[force]
+    if (amount := float(felt.change.sum()) / RATE) < least:
+        raise JoinError(f"{imu} cannot be joined: {moved.format(amount)}, which is too little: {REMEDY}")
+    found, size = list[Clocks](), 1.0
+    for size in (1.0,) if force else (1.0, np.pi / 180.0):
+        vector = sensor[ACCELEROMETER] if force else size * sensor[GYROSCOPE]
+        found = fits(felt, by_sensor(sensor.time, vector, force=force))
+        if found and found[0].correlation >= CORRELATED and SIZES[0] < found[0].scale < SIZES[1]:
+            break
+    else:
+        most = f"{found[0].correlation:.2f} at best" if found else "none"
+        raise JoinError(
+            f"{imu} cannot be joined: it and the joint angles do not show one motion (correlation {most}, needed "
+            f"{CORRELATED:g}). Is --robot right, and are the units? If so, {REMEDY}"
+        )
+    best, *others = found
+    for other in others:
+        as_well = 1.0 - other.correlation**2 <= ALIKE * (1.0 - best.correlation**2) + NOISE
+        if as_well and other.explained >= AS_WELL * best.explained:
+            apart = abs(other.offset(best.middle) - best.offset(best.middle))
+            raise JoinError(
+                f"{imu} cannot be joined: motions repeat, so that its clock may as well be {apart:.2f} s off: {REMEDY}"
+            )
+    offset, drift = best.half
+    if offset > OFFSET or drift > DRIFT:
+        raise JoinError(
+            f"{imu} cannot be joined: the clocks' offset is known to {1e3 * offset:.1f} ms and their drift to "
+            f"{100.0 * drift:.3f} %, needed are {1e3 * OFFSET:g} ms and {100.0 * DRIFT:g} %: {REMEDY}"
+        )
+    return best, size
+
+
+def _said(imu: Path, clocks: Clocks, *, force: bool) -> str:
+    ahead, (offset, drift) = clocks.offset(clocks.span[0]), clocks.half
+    return (
+        f"{imu} joined by its {'accelerometer' if force else 'gyroscope'}: at {clocks.span[0]:.3f} s of the robot its "
+        f"clock is {abs(ahead):.4f} s {'ahead' if ahead > 0.0 else 'behind'} (± {1e3 * offset:.1f} ms), and it runs "
+        f"{100.0 * abs(clocks.drift):.3f} % (± {100.0 * drift:.3f} %) {'fast' if clocks.drift > 0.0 else 'slow'}; "
+        f"correlation {clocks.correlation:.3f}"
+    )
+
+
+def _between(time: Floats, column: Floats, at: Floats) -> Floats:
+    """A column at other times: whole numbers, such as modes, hold; others follow straight lines."""
+    known = column[np.isfinite(column)]
+    if np.array_equal(known, np.round(known)):
+        return column[np.searchsorted(time, at, side="right") - 1]
+    if column.ndim == 1:
+        return np.interp(at, time, column)
+    return np.column_stack([np.interp(at, time, axis) for axis in column.T])

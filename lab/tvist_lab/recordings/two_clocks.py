@@ -1,0 +1,189 @@
+"""Offset and drift between the clocks of two devices, by what both felt of the same motion.
+
+The axes of the two may be turned against each other in any way. A motion is first looked for by how much happens,
+which no rotation changes, at any offset and at drifts of up to 2 %; then offset, drift, rotation (at first by Wahba's
+problem, with a singular value decomposition: Markley 1988), bias and lever are fitted together to the vectors.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import correlate, find_peaks
+from scipy.spatial.transform import Rotation
+from scipy.stats import t as student
+
+from tvist_lab.recordings.flange_motion import RATE, Felt
+from tvist_lab.recordings.recording import Floats
+
+DRIFT = 0.02
+"""Largest drift that is looked for [-]."""
+COARSE = 5
+"""One of so many rows counts in the search."""
+BLURRED = 0.2
+"""Time by which a drift may be wrong between the ends of a log in the search [s]."""
+TRIED = 24
+"""Number of places that are fitted."""
+APART = 0.25
+"""Offsets that differ by more are different ones, and a step of a fit is at most half of it [s]."""
+BLOCK = 0.5
+"""Time after which what a fit leaves counts as new [s]."""
+FAR = 2.0
+"""What is left beyond so many times the median counts less (Huber 1964)."""
+RANK = 1e-9
+"""Share of the largest eigenvalue below which parameters cannot be told apart [-]."""
+MOVING = 1e-3
+"""Least weight of a block, over the largest, that tells of the clocks [-]."""
+ITERATIONS = 15
+CONVERGED = 1e-5
+"""Change of the offset, anywhere in a log, with which a fit ends [s]."""
+TURN, BIAS, LEVER = slice(2, 5), slice(5, 8), slice(8, None)
+"""Places among the parameters of a fit, after offset and drift."""
+
+
+@dataclass(frozen=True)
+class Clocks:
+    """The other clock shows `other + (1 + drift) (t - middle)` when the first one shows t."""
+
+    middle: float
+    """Middle of what both felt, on the first clock [s]."""
+    other: float
+    """The other clock then [s]."""
+    drift: float
+    """By how much the other clock runs faster [-]."""
+    half: tuple[float, float]
+    """Half of the 95 % interval of the offset, at the end where it is wider [s], and of the drift [-]."""
+    correlation: float
+    """Of the vectors, once turned [-]."""
+    scale: float
+    """Size of the first vector over that of the other [-]."""
+    explained: float
+    """Energy of the first vector's changes that the other explains [its unit squared times s]."""
+    span: tuple[float, float]
+    """First and last time of what both felt, on the first clock [s]."""
+
+    def first(self, other: Floats) -> Floats:
+        """Return times of the first clock for those of the other one."""
+        return self.middle + (other - self.other) / (1.0 + self.drift)
+
+    def offset(self, time: float) -> float:
+        """By how much the other clock shows more than the first one, at a time of the first [s]."""
+        return self.other - self.middle + self.drift * (time - self.middle)
+
+
+def fits(first: Felt, other: Felt) -> list[Clocks]:
+    """Return the ways in which what two devices felt fits together, the one that explains most first."""
+    found: list[Clocks] = []
+    for start, drift in _places(first, other):
+        clocks = _fitted(first, other, start, drift)
+        if clocks is not None and all(
+            abs(clocks.offset(one.middle) - one.offset(one.middle)) > APART for one in found
+        ):
+            found.append(clocks)
+    return sorted(found, key=lambda clocks: -clocks.explained)
+
+
+def _places(first: Felt, other: Felt) -> Iterator[tuple[float, float]]:
+    """The other clock at the first row, and its drift, where much happens in both at once."""
+    length, rows = first.time[-1] - first.time[0], COARSE / RATE
+    moved, moved_there = first.change[::COARSE], other.change
+    count = int(np.ceil(DRIFT * length / BLURRED))
+    found: list[tuple[float, float, float]] = []
+    for drift in np.linspace(-DRIFT, DRIFT, 2 * count + 1).tolist():
+        step = rows * (1.0 + drift)
+        there = np.interp(np.arange(other.time[0], other.time[-1], step), other.time, moved_there)
+        alike = np.pad(correlate(there, moved, "full", "fft"), 1)
+        peaks = find_peaks(alike, distance=max(1, round(APART / rows)))[0]
+        found += [(float(alike[at]), float(other.time[0] + (at - len(moved)) * step), drift) for at in peaks]
+    taken: list[float] = []
+    for _, start, drift in sorted(found, reverse=True):
+        middle = start + 0.5 * (1.0 + drift) * length
+        if len(taken) < TRIED and all(abs(middle - one) > APART for one in taken):
+            taken.append(middle)
+            yield start, drift
+
+
+def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | None:
+    """Fit everything from a place on, by Gauss and Newton; None if that leads out of what both felt."""
+    # The first one's change counts: joint angles neither ring nor have much noise.
+    rate = np.gradient(first.vector, 1.0 / RATE, axis=0)
+    t, rotation, weight = first.time - first.time[0], None, np.ones(len(first.time))
+    for _ in range(ITERATIONS):
+        then = start + (1.0 + drift) * t
+        both = (first.known > 0.0) & (np.interp(then, other.time, other.known, 0.0, 0.0) == 1.0)
+        if np.count_nonzero(both) < RATE or abs(drift) > 1.5 * DRIFT:
+            return None
+        middle = float(t[both].mean())
+        w, moved, since = first.vector[both], rate[both], t[both] - middle
+        u = np.column_stack([np.interp(then[both], other.time, axis) for axis in other.vector.T])
+        if rotation is None:
+            left_basis, _, right_basis = np.linalg.svd((w - w.mean(0)).T @ (u - u.mean(0)))
+            left_basis[:, 2] *= np.linalg.det(left_basis @ right_basis)
+            rotation = Rotation.from_matrix(left_basis @ right_basis)
+        u = rotation.apply(u)
+        X = np.concatenate(
+            [np.stack([moved, moved * since[:, None]], axis=2), _turns(u),
+             np.broadcast_to(np.eye(3), (len(w), 3, 3)), -first.lever[both]], axis=2,
+        )  # fmt: skip
+        p, left = _solved(X, w - u, weight[both])
+        far = np.linalg.norm(left, axis=1)
+        weight[both] = np.minimum(1.0, FAR * float(np.median(far)) / np.maximum(far, 1e-12))
+        step = p[:2] * min(1.0, 0.5 * APART / max(abs(p[0]), CONVERGED))
+        start, drift = start + step[0] - step[1] * middle, drift + step[1]
+        rotation = Rotation.from_rotvec(p[TURN]) * rotation
+        if abs(step[0]) + abs(step[1]) * since[-1] < CONVERGED:
+            break
+    w = w - X[:, :, LEVER] @ p[LEVER]
+    around, around_u = w - w.mean(0), u - u.mean(0)
+    energy, lost = float(np.square(around).sum()), float(np.square(left).sum())
+    return Clocks(
+        middle=float(first.time[0] + middle),
+        other=float(start + (1.0 + drift) * middle),
+        drift=float(drift),
+        half=_intervals(X, left, weight[both], since),
+        correlation=float(np.sqrt(max(0.0, 1.0 - lost / max(energy, 1e-30)))),
+        scale=float(np.sum(around * around_u) / max(np.square(around_u).sum(), 1e-30)),
+        explained=max(0.0, energy - lost) / RATE,
+        span=(float(first.time[both][0]), float(first.time[both][-1])),
+    )
+
+
+def _turns(u: Floats) -> Floats:
+    """Change of vectors with a small rotation about each axis, shape (T, 3, 3)."""
+    return np.stack([np.cross(axis, u) for axis in np.eye(3)], axis=2)
+
+
+def _solved(X: Floats, y: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Weighted least squares: parameters, and what is left, shape (T, 3).
+
+    Where all turns about one axis, the rotation about that axis shows in nothing and stays.
+    """
+    G, g = (np.einsum("tik,t,ti...->k...", X, weight, one, optimize=True) for one in (X, y))
+    p: Floats = _inverse(G, G) @ g
+    return p, y - X @ p
+
+
+def _inverse(G: Floats, whole: Floats) -> Floats:
+    """Pseudo-inverse of one matrix or several, parameters scaled by the diagonal of `whole`."""
+    size = np.sqrt(np.maximum(np.diag(whole), 1e-24))
+    scale = np.outer(size, size)
+    inverse: Floats = np.linalg.pinv(G / scale, RANK, hermitian=True) / scale
+    return inverse
+
+
+def _intervals(X: Floats, left: Floats, weight: Floats, since: Floats) -> tuple[float, float]:
+    """Half of the 95 % intervals of the offset, at the end where it is wider, and of the drift.
+
+    What is left is correlated in time, and few fast motions weigh most: the fit is repeated, to first order, without
+    each block of `BLOCK` (the jackknife of Tukey 1958, with Student's quantile for the blocks with motion).
+    """
+    first = np.unique(np.searchsorted(since, np.arange(since[0], since[-1], BLOCK)))
+    pulls = np.add.reduceat(np.einsum("tik,t,ti->tk", X, weight, left), first)
+    grams = np.add.reduceat(np.einsum("tik,t,til->tkl", X, weight, X), first)
+    without = _inverse(grams.sum(axis=0) - grams, grams.sum(axis=0))
+    moved = np.einsum("bkl,bl->bk", without, pulls)[:, :2]
+    at_start, at_end, drift = (moved @ np.array(of) for of in ((1.0, since[0]), (1.0, since[-1]), (0.0, 1.0)))
+    offset, rate = max(np.linalg.norm(at_start), np.linalg.norm(at_end)), np.linalg.norm(drift)
+    moving = np.count_nonzero(grams[:, 0, 0] > MOVING * grams[:, 0, 0].max())
+    quantile = float(student.ppf(0.975, max(1, moving - 2)))
+    return quantile * float(offset), quantile * float(rate)

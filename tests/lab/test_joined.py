@@ -1,0 +1,247 @@
+"""A robot's log and that of a sensor with a clock of its own are put on one clock, or refused with what to record."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.examples import examples
+from tests.lab.two_device_logs import G, TwoDevices, flange, write
+
+from tvist_lab.recordings import RecordingError, read
+from tvist_lab.recordings.flange_motion import at_flange, by_sensor
+from tvist_lab.recordings.joined import joined
+from tvist_lab.recordings.log_columns import SENSOR
+from tvist_lab.recordings.two_clocks import fits
+from tvist_plant.description import load
+
+RECORDED = Path(__file__).parent / "data" / "ur5_that_rings.csv.gz"
+DEGREE = np.pi / 180.0
+FORCE = "timestamp,actual_tool_accelerometer_{}"
+
+
+def wrong_by(found, devices):
+    """Largest error of a row's time [s], and error of the drift."""
+    stamps, values = devices.rows
+    first = np.argmin(np.abs(values[:, :3] - found["actual_tool_accelerometer"][0]).sum(axis=1))
+    true = ((stamps - devices.offset) / (1.0 + devices.drift))[first : first + len(found)]
+    error = found.time - true
+    return np.abs(error).max(), abs((error[-1] - error[0]) / (true[-1] - true[0]))
+
+
+def join(folder, devices, robot=None, sensor=None, columns=None, imu_columns=None):
+    """Write both logs and join them."""
+    log = devices.robot(folder / "robot.csv", **(robot or {}))
+    imu = devices.sensor(folder / "imu.csv", **(sensor or {}))
+    return joined(read(log, columns), imu, imu_columns)
+
+
+def attempted(folder, devices, sensor):
+    """What was joined, or why it was not."""
+    try:
+        return join(folder, devices, sensor=sensor), ""
+    except RecordingError as error:
+        return None, str(error)
+
+
+FAULTS = {
+    "none": {},
+    "rows dropped and repeated": {"dropped": 0.05, "repeated": 0.1},
+    "few motions": {"motions": 3},
+    "one joint": {"moving": (0,)},
+    "slow": {"speed": 0.3},
+    "loud": {"noise": (0.1, 0.3), "ringing": 3.0},
+    "slow rates": {"robot_rate": 50.0, "sensor_rate": 100.0},
+    "fast sensor": {"sensor_rate": 1000.0},
+    "a log of seconds since 1970": {"robot_start": 1.7e9},
+    "angles that are held": {"held": 4},
+    "a long lever": {"lever": 0.3},
+    "little rest around": {"spare": -1.0},
+}
+SURE = set(FAULTS) - {"few motions", "slow", "loud"}
+
+
+@examples(60)
+@given(
+    seed=st.integers(0, 10**6),
+    offset=st.floats(-5.0, 5.0),
+    drift=st.floats(-0.01, 0.01),
+    fault=st.sampled_from(sorted(FAULTS)),
+    gyroscope=st.booleans(),
+)
+def test_rows_are_right_to_3_ms_and_the_drift_to_2e_4_or_the_join_is_refused(
+    tmp_path_factory, seed, offset, drift, fault, gyroscope
+):
+    devices = TwoDevices(seed, offset, drift, **FAULTS[fault])
+    found, why = attempted(tmp_path_factory.mktemp("log"), devices, {} if gyroscope else {"header": FORCE})
+    if found is None:
+        assert "record both at once" in why
+        assert fault not in SURE, why
+        return
+    late, slope = wrong_by(found, devices)
+    # Limits hold for 95 % intervals: where a join is nearly refused, one in twenty is a little beyond.
+    slack = 1.0 if fault in SURE else 1.5
+    assert late < slack * 3e-3
+    assert slope < slack * 2e-4
+
+
+HEADS = {
+    "seconds": ({}, {}, None, None),
+    "units found in the numbers": (
+        {"units": (1e-3, DEGREE)}, {"units": (1e-6, G, DEGREE)}, None, None,
+    ),
+    "decimal commas": ({"separator": ";", "comma": True}, {"separator": "\t", "comma": True}, None, None),
+    "names of its own": (
+        {"header": "zeit,achse {}", "first": 1, "units": (1e-3, DEGREE)},
+        {"header": "t,a{},w{}", "first": "x", "units": (1e-9, 1e-3 * G, DEGREE)},
+        "time=zeit:ms,q=achse {}:deg",
+        "time=t:ns,accelerometer=a{}:mg,gyroscope=w{}:deg/s",
+    ),
+    "no header": ({"header": None}, {"header": None}, "time=1,q=2-7", "time=1,accelerometer=2-4,gyroscope=5-7"),
+    "no header, spaces and decimal commas": (
+        {"header": None, "separator": " ", "comma": True, "units": (1.0, DEGREE)},
+        {"header": None, "separator": ";", "comma": True, "units": (1e-3, G, 1.0)},
+        "time=1,q=2-7:deg",
+        "time=1:ms,accelerometer=2-4:g,gyroscope=5-7:rad/s",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", HEADS)
+def test_both_logs_are_read_in_any_units_and_with_or_without_names(tmp_path, kind):
+    robot, sensor, columns, imu_columns = HEADS[kind]
+    devices = TwoDevices(3, -3.7, 0.004)
+    robot, sensor = {"digits": 15, **robot}, {"digits": 15, **sensor}
+    found = join(tmp_path, devices, robot, sensor, columns, imu_columns)
+    late, slope = wrong_by(found, devices)
+    assert late < 1e-3
+    assert slope < 1e-4
+    _, values = devices.rows
+    place = np.argmin(np.abs(values[:, :3] - found["actual_tool_accelerometer"][0]).sum(axis=1))
+    assert found["actual_tool_accelerometer"] == pytest.approx(values[place:, :3][: len(found)], abs=1e-5)
+    assert found["actual_tool_gyroscope"] == pytest.approx(values[place:, 3:][: len(found)], abs=1e-5)
+    assert found["actual_q"] == pytest.approx(devices.q(found.time), abs=3e-3)
+
+
+def test_the_notes_tell_offset_and_drift_with_their_uncertainty_and_what_was_assumed(tmp_path):
+    notes = " / ".join(join(tmp_path, TwoDevices(5, 2.5, -0.002)).notes)
+    assert "joined by its gyroscope" in notes
+    assert re.search(r"its clock is 2\.(499|500)\d s ahead \(± 0\.\d ms\)", notes)
+    assert re.search(r"runs 0\.(19|20)\d % \(± 0\.0\d\d %\) slow", notes)
+    assert "a UR5e's kinematics count" in notes
+    notes = join(tmp_path, TwoDevices(5), sensor={"header": FORCE}).notes
+    assert any("joined by its accelerometer" in note for note in notes)
+
+
+def test_kinematics_are_those_of_the_vendor(tmp_path):
+    devices = TwoDevices(1, encoder=0.0, lever=0.0, ringing=0.0)
+    t = np.arange(0.0, devices.end, 0.002)
+    omega, force = (one @ devices.mounting.T for one in devices.felt(t))
+    for felt, true in ((omega, False), (force, True)):
+        found = at_flange(load("ur5e"), t, devices.q(t), force=true)
+        smooth = np.column_stack([np.interp(found.time, t, axis) for axis in felt.T])
+        # Apart from smoothing, which takes a little of each peak.
+        assert found.vector == pytest.approx(smooth, abs=0.1 * np.ptp(smooth, axis=0).max())
+        assert np.abs(found.vector - smooth).mean() < 0.01 * np.ptp(smooth, axis=0).max()
+    assert flange(np.zeros((1, 6)))[1] == pytest.approx(np.array([[-0.8172, -0.2329, 0.0628]]))
+
+
+def other_motion(folder):
+    return joined(read(TwoDevices(1).robot(folder / "robot.csv")), TwoDevices(2).sensor(folder / "imu.csv"))
+
+
+def seven_joints(folder):
+    t = np.arange(0.0, 3.0, 0.01)
+    log = write(folder / "robot.csv", "timestamp,actual_q_{}", t, [np.sin(t)[:, None] * np.ones(7)])
+    return joined(read(log), TwoDevices(1).sensor(folder / "imu.csv"))
+
+
+REFUSED = {
+    "another motion": (other_motion, "do not show one motion.*record both"),
+    "too little motion": (lambda folder: join(folder, TwoDevices(1, stroke=0.02)), "too little: record both"),
+    "motions that repeat": (
+        lambda folder: join(folder, TwoDevices(1, same=True, motions=6, spare=-0.4)),
+        "motions repeat.*record both",
+    ),
+    "one motion": (lambda folder: join(folder, TwoDevices(1, motions=1)), "drift to .*record both"),
+    "no accelerometer": (
+        lambda folder: joined(read(TwoDevices(1).robot(folder / "robot.csv")), folder / "robot.csv"),
+        "no actual_tool_accelerometer_0.*--imu-columns",
+    ),
+    "a rate of raw numbers": (
+        lambda folder: join(folder, TwoDevices(1), sensor={"units": (1.0, 1.0, 0.001)}), "are the units"
+    ),
+    "seven joints": (seven_joints, "7 joints, a UR5e has 6: give the robot with --robot"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_a_join_that_cannot_be_trusted_is_refused_with_what_to_do(tmp_path, kind):
+    attempt, words = REFUSED[kind]
+    with pytest.raises(RecordingError, match=words):
+        attempt(tmp_path)
+
+
+@pytest.mark.parametrize("gyroscope", [True, False])
+@pytest.mark.parametrize(
+    "kind", ["nothing", "zeros", "noise", "three rows", "a jump in time", "one axis", "huge"]
+)
+def test_a_sensors_log_without_sense_is_refused_and_never_ends_in_another_error(tmp_path, kind, gyroscope):
+    devices = TwoDevices(6)
+    t, values = devices.sensor_rows()
+    random = np.random.default_rng(1)
+    match kind:
+        case "nothing":
+            values = np.full_like(values, np.nan)
+        case "zeros":
+            values = np.zeros_like(values)
+        case "noise":
+            values = random.standard_normal(values.shape)
+        case "three rows":
+            t, values = t[:3], values[:3]
+        case "a jump in time":
+            t = t + np.where(np.arange(len(t)) > 40, 1e7, 0.0)
+        case "one axis":
+            values[:, [0, 1, 3, 4]] = 0.0
+        case "huge":
+            values *= 1e4
+    vectors = [values[:, :3], values[:, 3:]] if gyroscope else [values[:, :3]]
+    header = "timestamp,actual_tool_accelerometer_{},actual_tool_gyroscope_{}" if gyroscope else FORCE
+    imu = write(tmp_path / "imu.csv", header, t, vectors)
+    with pytest.raises(RecordingError, match=r"join|imu\.csv"):
+        joined(read(devices.robot(tmp_path / "robot.csv")), imu)
+
+
+def test_repeated_motions_are_joined_where_the_sensor_rested_before_and_after_them(tmp_path):
+    devices = TwoDevices(1, 1.25, 0.003, same=True, motions=6, spare=5.0)
+    late, slope = wrong_by(join(tmp_path, devices), devices)
+    assert late < 1e-3
+    assert slope < 1e-4
+
+
+@pytest.mark.parametrize(("offset", "drift"), [(3.4, 0.0033), (-70.0, -0.005)])
+def test_a_real_arms_sensor_is_put_back_on_its_clock(tmp_path, offset, drift):
+    """Nine seconds that others have joined, good to 5 ms: too few for the drift, but offset and drift are right."""
+    recorded = read(RECORDED)
+    robot = write(tmp_path / "robot.csv", "timestamp,actual_q_{}", recorded.time, [recorded["actual_q"]])
+    force = recorded["actual_tool_accelerometer"]
+    imu = write(tmp_path / "imu.csv", FORCE, offset + (1.0 + drift) * recorded.time, [force])
+    with pytest.raises(RecordingError, match=r"drift to .*record both at once for 20 s"):
+        joined(read(robot), imu, robot="ur5-light")
+    angles, sensor = read(robot), read(imu, needs=SENSOR)
+    felt = at_flange(load("ur5-light"), angles.time, angles["actual_q"], force=True)
+    clocks = fits(felt, by_sensor(sensor.time, force, force=True))[0]
+    assert clocks.first(sensor.time) == pytest.approx(recorded.time, abs=0.008)
+    assert clocks.drift == pytest.approx(drift, abs=clocks.half[1])
+    assert clocks.correlation > 0.99
+
+
+def test_what_the_robot_shows_in_whole_numbers_is_not_mixed(tmp_path):
+    devices = TwoDevices(2, 0.5)
+    t, q = devices.robot_rows()
+    mode = np.where(t > 4.0, 7.0, 3.0)[:, None]
+    log = write(tmp_path / "robot.csv", "timestamp,actual_q_{},mode_{}", t, [q, mode], units=(1.0, 1.0, 1.0))
+    found = joined(read(log), devices.sensor(tmp_path / "imu.csv"))
+    assert set(found["mode"].ravel()) == {3.0, 7.0}
