@@ -476,3 +476,12 @@ def test_places_that_a_file_does_not_have_are_refused_with_those_that_it_has(tmp
     path.write_text("".join(f"{0.01 * n},1,{n}\n" for n in range(50)))
     with pytest.raises(RecordingError, match=r"1 to 3, as in .*=2-7"):
         read(path, columns)
+
+
+def test_names_for_a_file_that_has_its_own_are_not_used_and_a_note_says_so(tmp_path):
+    t = 0.002 * np.arange(100)
+    path = tmp_path / "log.npz"
+    np.savez(path, timestamp=t, actual_q=np.column_stack([np.sin(t), np.cos(t)]))
+    found = read(path, "q=joint_{}:deg")
+    assert found["actual_q"][:, 0] == pytest.approx(np.sin(t))
+    assert found.notes[-1] == "its columns have names, so those given were not used"

@@ -43,6 +43,17 @@ def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs 
 def _read(path: Path, names: str | None, needs: Needs) -> Recording:
     if path.is_dir():
         return _read(_bag(path), names, needs)
+    named = _named(path, needs)
+    if named is not None:
+        return named if names is None else named.noted("its columns have names, so those given were not used")
+    from tvist_lab.recordings.csv_log import read_csv
+    from tvist_lab.recordings.exported import with_sidecar
+
+    return with_sidecar(read_csv(path, names, needs), path)
+
+
+def _named(path: Path, needs: Needs) -> Recording | None:
+    """Read a file whose format says what its columns are; None for a CSV."""
     check_is_file(path, "recording")
     with path.open("rb") as stream:
         head = stream.read(SHOWN)
@@ -62,10 +73,7 @@ def _read(path: Path, names: str | None, needs: Needs) -> Recording:
         from tvist_lab.recordings.realtime_dump import read_dump
 
         return read_dump(path)
-    from tvist_lab.recordings.csv_log import read_csv
-    from tvist_lab.recordings.exported import with_sidecar
-
-    return with_sidecar(read_csv(path, names, needs), path)
+    return None
 
 
 def _bag(folder: Path) -> Path:
