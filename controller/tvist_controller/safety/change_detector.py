@@ -1,5 +1,6 @@
 """Whether something that is measured once a motion has changed, by a sequential test of its own past."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,11 +13,11 @@ LEAST = 3
 """Number of measurements that a comparison needs before these."""
 KEPT = 40
 """Largest number of measurements that are kept."""
-SURE = 3.8
-"""Number of standard deviations beyond which a change is told. Of normal measurements 1 in 7,000 would be so far off;
-those of real motions have heavier tails.
+SURE = 3.6
+"""Number of standard deviations beyond which a change is told, if the scatter is known well. Of normal measurements 1
+in 3,000 would be so far off; those of real motions have heavier tails.
 """
-FARTHEST = 4.0
+FARTHEST = 3.5
 """Number of its own deviations by which a measurement counts as far from those before, at most."""
 BELIEVED = 4.0
 """Number of measurements that the expected scatter is worth."""
@@ -68,7 +69,7 @@ class ChangeDetector:
             A change that has shown with this measurement; None if none has.
         """
         self._kept = [*self._kept[1 - KEPT :], (value, error)]
-        found, surest = None, SURE
+        found, surest = None, 0.0
         for number in WINDOWS:
             past = len(self._kept) - number
             if past < LEAST:
@@ -79,9 +80,13 @@ class ChangeDetector:
             farthest = FARTHEST * np.sqrt(own + variance)
             moved = float(np.average(np.clip(latest - mean, -farthest, farthest), weights=1.0 / own))
             error_of_it = float(np.sqrt(1.0 / np.sum(1.0 / own) + variance))
-            if abs(moved) > max(surest * error_of_it, self._least):
-                after = float(np.average(latest, weights=1.0 / own))
-                surest, found = abs(moved) / error_of_it, Change(mean, after, error_of_it, number)
+            # Of few measurements the scatter is not known well, so that more of them are far off.
+            sure = SURE * math.sqrt(1.0 + BELIEVED / (BELIEVED + past))
+            if abs(moved) > max(max(sure, surest) * error_of_it, self._least):
+                new = (latest - mean) / moved > 0.5  # a window may begin before the change
+                after = float(np.average(latest[new], weights=1.0 / own[new]))
+                error_since = float(np.sqrt(1.0 / np.sum(1.0 / own[new]) + variance))
+                surest, found = abs(moved) / error_of_it, Change(mean, after, error_since, int(new.sum()))
         if found is not None:
             self._kept = self._kept[-found.lasting :]
         return found

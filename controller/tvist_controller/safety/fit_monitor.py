@@ -162,6 +162,6 @@ def _of_modes(change: Change | None) -> str:
     higher = 100.0 * (np.exp(change.after - change.before) - 1.0)
     return (
         f"what rings after stops is {abs(higher):.0f} % {'higher' if higher > 0.0 else 'lower'} in frequency than "
-        f"after the stops before (within {200.0 * change.error:.0f} %): look whether mount, base, a joint or the tool is "
-        "loose or another tool is on, then measure the arm anew with tvist identify"
+        f"after the stops before (within {200.0 * change.error:.0f} %): look whether mount, base, a joint or the tool "
+        "is loose or another tool is on, then measure the arm anew with tvist identify"
     )
