@@ -83,7 +83,8 @@ class ChangeDetector:
             # Of few measurements the scatter is not known well, so that more of them are far off.
             sure = SURE * math.sqrt(1.0 + BELIEVED / (BELIEVED + past))
             if abs(moved) > max(max(sure, surest) * error_of_it, self._least):
-                new = (latest - mean) / moved > 0.5  # a window may begin before the change
+                off = (latest - mean) * np.sign(moved)
+                new = off > 0.5 * off.max()  # a window may begin before the change
                 after = float(np.average(latest[new], weights=1.0 / own[new]))
                 error_since = float(np.sqrt(1.0 / np.sum(1.0 / own[new]) + variance))
                 surest, found = abs(moved) / error_of_it, Change(mean, after, error_since, int(new.sum()))
