@@ -27,8 +27,8 @@ CHANGES: dict[str, Change | None] = {
 """What becomes of the arm."""
 LESS = Change("payload changed by -2 kg", mass=-2.0)
 """What becomes of every second arm whose payload changes, if it carries as much."""
-BEFORE, WITHIN = 20, 3
-"""Number of motions before the change, and of those after it in which it should be noticed."""
+BEFORE, WITHIN, LATER = 20, 3, 10
+"""Number of motions before the change, of those after it in which it should be noticed, and of those that are made."""
 SPEEDS = ((0.6, 1.0, 50.0), (1.05, 1.4, 100.0), (1.5, 2.0, 100.0), (1.5, 3.0, 200.0))
 """Velocity, acceleration and jerk of the motions [rad/s, rad/s², rad/s³]."""
 REST = (150, 400)
@@ -115,7 +115,7 @@ def outcome(robot: str, change: str, shaper: str, seed: int) -> Outcome:
     if change == "payload" and worker.mass > -LESS.mass / (1.0 - MASS) and seed % 2:
         becomes = LESS
     worker.arm.change(becomes)
-    for number in range(1, WITHIN + 1):
+    for number in range(1, LATER + 1):
         worker.move()
         if len(worker.warnings) > alarms:
             return Outcome(alarms, BEFORE, number)
@@ -138,7 +138,8 @@ def measure(
                 "shaper": shaper,
                 "change": change,
                 "robots": len(found),
-                "noticed": sum(one.noticed is not None for one in found),
+                f"within_{WITHIN}": sum((one.noticed or LATER + 1) <= WITHIN for one in found),
+                f"within_{LATER}": sum(one.noticed is not None for one in found),
                 "alarms": sum(one.alarms for one in found),
                 "motions": sum(one.motions for one in found),
             }

@@ -7,15 +7,17 @@ import numpy as np
 
 from tvist_controller.line.differentiator import Floats
 
-WINDOWS = (2, 3)
-"""Numbers of latest measurements that are compared with those before; one alone may be an accident."""
+WINDOWS = (2, 3, 5, 8)
+"""Numbers of latest measurements that are compared with those before; one alone may be an accident, and a small change
+shows after more of them.
+"""
 LEAST = 3
 """Number of measurements that a comparison needs before these."""
 KEPT = 40
 """Largest number of measurements that are kept."""
-SURE = 3.6
+SURE = 3.7
 """Number of standard deviations beyond which a change is told, if the scatter is known well. Of normal measurements 1
-in 3,000 would be so far off; those of real motions have heavier tails.
+in 5,000 would be so far off; those of real motions have heavier tails.
 """
 FARTHEST = 3.5
 """Number of its own deviations by which a measurement counts as far from those before, at most."""
@@ -96,7 +98,7 @@ class ChangeDetector:
         """Mean, scatter between motions, and variance of the mean, of measurements of shape (n, 2)."""
         value, error = measured.T
         mean, scatter = float(np.median(value)), self._scatter
-        for _ in range(5):
+        for _ in range(3):
             own = np.sqrt(error**2 + scatter**2)
             off = np.clip(value - mean, -OUTLYING * own, OUTLYING * own)
             weight = 1.0 / own**2

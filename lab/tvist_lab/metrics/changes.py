@@ -6,7 +6,15 @@ from functools import cache
 
 import numpy as np
 
-from tvist_controller.api.monitor import ChangeDetector, FitMonitor, LineMode, PayloadMonitor, Sample
+from tvist_controller.api.monitor import (
+    SIGNALS,
+    ChangeDetector,
+    FitMonitor,
+    LineMode,
+    PayloadMonitor,
+    Q,
+    Sample,
+)
 from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.ring_down import CERTAIN
 from tvist_lab.metrics.table import Measured, MotionResult
@@ -54,15 +62,15 @@ def _as_the_robot(
     payload = Payload(mass=said.mass, com=said.com, inertia=said.inertia)
     felt, fit = PayloadMonitor(description, payload), FitMonitor(description, None, payload)
     names = {name: recording[name] for name in NEEDED}
-    still, signals = np.zeros(description.joints), np.zeros((9, description.joints))
+    still, signals = np.zeros(description.joints), np.zeros((SIGNALS, description.joints))
 
     def tick(row: int, mode: LineMode) -> list[str]:
         q, moment = names["actual_q"][row], names["actual_moment"][row]
-        signals[0] = names["target_q"][row]
+        signals[Q] = names["target_q"][row]
         if mode.at_rest:
             felt.update(signals, names["target_moment"][row], moment, at_rest=True)
         sample = Sample(
-            mode, signals[0], (q, q, q), (q, q, q), signals, DriveCommand(signals[0].copy(), still, still),
+            mode, signals[Q], (q, q, q), (q, q, q), signals, DriveCommand(signals[Q].copy(), still, still),
             Measurement(q, still, moment, names["actual_tool_accelerometer"][row]),
         )  # fmt: skip
         return [why for _, why in fit.update(sample, felt.of_motion)]
