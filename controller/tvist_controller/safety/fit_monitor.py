@@ -25,6 +25,10 @@ VAGUE = 0.25
 """Relative error from which on a gear's compliance is not known in a pose [-]."""
 HEAVY = 0.7
 """Error of a motion's mass from which on it says nothing [kg]."""
+MASS, GEAR, MODES = (1.0, 0.15, 0.7), (0.4, 0.05, 0.15), (0.1, 0.02, 0.03)
+"""Arguments of the detectors: how well the mean is known before any measurement, expected scatter, least change that is
+told; in kg, and for logarithms.
+"""
 FEW = 8
 """Number of payloads whose past is remembered."""
 
@@ -56,7 +60,7 @@ class FitMonitor:
         self._friction = np.array(description.drives.coulomb_friction)
         self._stiffness = np.array(description.drives.gear_stiffness)
         self._listener = RingListener(description, calibration, declared)
-        self._gears = [ChangeDetector(0.4, 0.05, 0.15) for _ in range(n)]
+        self._gears = [ChangeDetector(*GEAR) for _ in range(n)]
         self._of_payload: dict[Payload, tuple[ChangeDetector, ChangeDetector]] = {}
         self._accelerometer = np.empty((LISTENED, 3))
         self._torque, self._twist = np.empty((2, LISTENED, n))
@@ -64,7 +68,7 @@ class FitMonitor:
 
     def declare(self, payload: Payload) -> None:
         """Take another payload into account; what was measured with it before counts again."""
-        fresh = ChangeDetector(1.0, 0.15, 0.7), ChangeDetector(0.1, 0.02, 0.03)
+        fresh = ChangeDetector(*MASS), ChangeDetector(*MODES)
         self._mass, self._modes = self._of_payload.pop(payload, fresh)
         self._of_payload[payload] = self._mass, self._modes
         if len(self._of_payload) > FEW:

@@ -180,8 +180,8 @@ class PayloadMonitor:
 
     @property
     def of_motion(self) -> tuple[float, float]:
-        """The same of all ticks since the present motion has begun [kg]."""
-        return self._estimate(2)
+        """The same of all ticks since the present motion has begun, if the arm is judged at all [kg]."""
+        return self._estimate(2) if self._judges else (0.0, np.inf)
 
     def begin_motion(self) -> None:
         """Note that a motion begins."""
