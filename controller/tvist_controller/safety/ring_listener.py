@@ -147,7 +147,7 @@ class RingListener:
         self._flexible.carry(payload)
 
     def study(self, alpha: Floats, q: Floats) -> Generator[None, None, list[tuple[float, float]]]:
-        """Compare a ring-down with the modes in a pose, in pieces of some 0.1 ms.
+        """Compare a ring-down with the modes in a pose, in pieces of some 0.1 ms, but 0.6 ms for the modes.
 
         Args:
             alpha: Readings of the accelerometer in the flange's axes, with gravity, from the stop on, shape (T, 3)
