@@ -82,6 +82,15 @@ def _parser() -> argparse.ArgumentParser:
     bound.add_argument(
         "--shapers", nargs="+", help="Shapers to compare [zv auto auto-target planned elastic elastic-16]."
     )
+    watch = part(
+        _monitor, "monitor", "Count which changes of hidden robots are noticed within three motions."
+    )
+    watch.add_argument("--robots", type=_up_to(1000), default=5, help="Number of hidden robots [5].")
+    watch.add_argument("--seed", type=_up_to(2**31 - 1), default=1, help="Seed of the first of them.")
+    watch.add_argument(
+        "--arms", nargs="+", default=["ur5e", "ur5-light"], help="Robot files [ur5e ur5-light]."
+    )
+    watch.add_argument("--shapers", nargs="+", default=["none", "zv"], help="Shapers [none zv].")
     return parser
 
 
@@ -166,6 +175,17 @@ def _bound(given: argparse.Namespace) -> int:
         given.refuse(f"there is no shaper {min(unknown)}")
     result = report(compare(given.random, given.seed, given.shapers or SHAPERS))
     _print(result, given.json, tables(result))
+    return 0
+
+
+def _monitor(given: argparse.Namespace) -> int:
+    from proof.monitor.measure import CHANGES, measure
+
+    seeds = range(given.seed, given.seed + given.robots)
+    progress = _counted(len(seeds) * len(given.arms) * len(given.shapers) * len(CHANGES))
+    rows = measure(given.arms, seeds, given.shapers, progress)
+    columns = list(rows[0])
+    _print({"rows": rows}, given.json, [(columns, [[str(row[name]) for name in columns] for row in rows])])
     return 0
 
 

@@ -30,6 +30,7 @@ Code = Literal[
     "unknown_fault",
     "plant_failure",
     "payload_mismatch",
+    "model_mismatch",
     "unsupported_version",
     "script_error",
     "starting",
@@ -60,7 +61,9 @@ CODE_MEANINGS: dict[Code, str] = {
     "unknown_calibration": "there is no calibration of this name; `info` lists them",
     "unknown_fault": "there is no fault of this name, or the plant cannot simulate it; the faults are listed below",
     "plant_failure": "the state of the simulated arm was no longer finite",
-    "payload_mismatch": "the calibration was made with a payload other than the declared one",
+    "payload_mismatch": "the calibration was made with a payload other than the declared one, or the arm carries "
+    "another",
+    "model_mismatch": "the arm has changed: a gear, or what rings after stops, is not what it was in motions before",
     "unsupported_version": "the server does not speak this version of the protocol",
     "script_error": "the text of a program is not valid; `where` is `text:LINE:COLUMN`",
     "starting": "the robot is not ready yet, as after an installation, when a start compiles; `why` says how far it is",

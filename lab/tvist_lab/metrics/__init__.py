@@ -1,5 +1,6 @@
 """Metrics of a recording: those of the paper, and those on a common clock."""
 
+from tvist_lab.metrics.changes import changes
 from tvist_lab.metrics.columns import COLUMNS, grouped_notes, motion_cells
 from tvist_lab.metrics.common_clock import (
     envelope,
@@ -51,6 +52,7 @@ __all__ = [
     "analyze",
     "attained_position",
     "best_tool_acceleration",
+    "changes",
     "compare",
     "distance",
     "envelope",

@@ -15,6 +15,7 @@ from tvist_lab.metrics import (
     Measured,
     NotMeasurableError,
     Pair,
+    changes,
     compare,
     grouped_notes,
     motion_cells,
@@ -103,13 +104,16 @@ def recordings_verdict(paths: Sequence[Path]) -> list[str]:
 def _verdict(base: _File, compared: Sequence[tuple[_File, Comparison]]) -> list[str]:
     if not compared:
         results = base.measured.results
+        changed = changes(base.measured)
         if base.pairs:
-            return verdict_on_pairs(base.pairs, results, base.name)
-        return verdict_on_one(results, base.name)
+            return verdict_on_pairs(base.pairs, results, base.name) + changed
+        return verdict_on_one(results, base.name) + changed
     sentences: list[str] = []
     for other, comparison in compared:
         names = (base.name, other.name)
         sentences += verdict_on_two(comparison, base.measured.results, other.measured.results, names)
+    files = [base, *(other for other, _ in compared)]
+    sentences += [f"{file.name}: {one}" for file in files for one in changes(file.measured)]
     return list(dict.fromkeys(sentences))
 
 

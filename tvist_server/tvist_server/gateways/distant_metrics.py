@@ -32,7 +32,7 @@ class DistantMetrics(MetricsGateway):
         return None if sample is None else decode_state(sample.payload.to_bytes())
 
     def _on_event(self, sample: zenoh.Sample) -> None:
-        self.events[decode_event(sample.payload.to_bytes()).kind] += 1
+        self.count(decode_event(sample.payload.to_bytes()))
 
     def _on_telemetry(self, sample: zenoh.Sample) -> None:
         self.telemetry = decode_telemetry(sample.payload.to_bytes())

@@ -41,12 +41,20 @@ class MetricsGateway(Gateway):
         """Newest telemetry."""
         self.events: Counter[str] = Counter()
         """Number of events of each kind."""
+        self.warnings: Counter[str] = Counter()
+        """Number of warnings of each code; empty for those that have none."""
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  every gateway gets it
         if isinstance(message, Telemetry):
             self.telemetry = message
         elif isinstance(message, Event):
-            self.events[message.kind] += 1
+            self.count(message)
+
+    def count(self, event: Event) -> None:
+        """Count an event."""
+        self.events[event.kind] += 1
+        if event.kind == "warning":
+            self.warnings[event.code or ""] += 1
 
     def look(self) -> None:
         """Take the newest state; before the figures are read."""
@@ -137,11 +145,21 @@ class Metrics(Collector):
                 for labels, value in [one for one in values if one[1] is not None]:
                     family.add_metric(labels, value)
                 yield family
-        events = CounterMetricFamily("tvist_events", "Events of each kind.", labels=(*LABELS, "kind"))
+        yield self._counted("tvist_events", "Events of each kind.", "kind")
+        yield self._counted(
+            "tvist_warnings", "Warnings of each code; with model_mismatch, the arm has changed.", "code"
+        )
+
+    def _counted(self, name: str, what: str, label: str) -> "Metric":
+        """Return how many events or warnings there were of each kind or code."""
+        from prometheus_client.core import CounterMetricFamily
+
+        family = CounterMetricFamily(name, what, labels=(*LABELS, label))
         for robot in self._robots:
-            for kind, count in robot.events.copy().items():
-                events.add_metric((*robot.labels, kind), count)
-        yield events
+            counted = robot.events if label == "kind" else robot.warnings
+            for value, count in counted.copy().items():
+                family.add_metric((*robot.labels, value), count)
+        return family
 
 
 GAUGES = (

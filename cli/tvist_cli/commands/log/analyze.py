@@ -25,7 +25,8 @@ def analyze(
 ) -> None:
     """Measure each motion of a recording or a robot's log, and print the columns of the paper's Table 2.
 
-    Frequency and damping have 95 % intervals. A dash has its reason in a line below the table.
+    Frequency and damping have 95 % intervals. A dash has its reason in a line below the table. A line says from which
+    motion on payload, gears or what rings after stops are not what they were before.
 
     Args:
         file: Recording of `tvist serve --record`, `tvist log record` or `tvist log export`; or a log of another robot:
@@ -37,7 +38,7 @@ def analyze(
         json: Print one JSON object.
     """
     look.check(figures)
-    from tvist_lab.metrics import COLUMNS, Measured, grouped_notes, measure, motion_cells, motions
+    from tvist_lab.metrics import COLUMNS, Measured, changes, grouped_notes, measure, motion_cells, motions
     from tvist_lab.recordings import RecordingError
     from tvist_lab.words import counted
 
@@ -53,13 +54,15 @@ def analyze(
         say(f"{file}: {note}")
     if figures is not None:
         _draw(recording, found, look.into(figures))
-    forecasts = _forecasts(Measured(recording, found, results)) if predict else []
+    measured = Measured(recording, found, results)
+    forecasts, changed = _forecasts(measured) if predict else [], changes(measured)
     if json:
         predicted = {"predicted": [[one._asdict() for one in each] for each in forecasts]} if predict else {}
         print_json(
             {
                 "file": str(file),
                 "motions": [result.as_dict() for result in results],
+                "changes": changed,
                 "notes": list(recording.notes),
                 **predicted,
             }
@@ -72,7 +75,7 @@ def analyze(
     since = f", times from {origin:.3f} s on" if origin else ""
     rows = [[cell.replace("\n", " ") for cell in row] for row in motion_cells(results, origin)]
     table(f"{file}: {counted(len(results), 'motion')}{since}", tuple(COLUMNS), rows)
-    for note in grouped_notes(results):
+    for note in (*changed, *grouped_notes(results)):
         out.print(note, markup=False)
     if predict:
         heads = ("motion", "modes Hz", "leaves % rms", "of the peak %")

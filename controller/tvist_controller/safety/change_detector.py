@@ -1,0 +1,109 @@
+"""Whether something that is measured once a motion has changed, by a sequential test of its own past."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_controller.line.differentiator import Floats
+
+WINDOWS = (2, 3, 5, 8)
+"""Numbers of latest measurements that are compared with those before; one alone may be an accident, and a small change
+shows after more of them.
+"""
+LEAST = 3
+"""Number of measurements that a comparison needs before these."""
+KEPT = 40
+"""Largest number of measurements that are kept."""
+SURE = 3.7
+"""Number of standard deviations beyond which a change is told, if the scatter is known well. Of normal measurements 1
+in 5,000 would be so far off; those of real motions have heavier tails.
+"""
+FARTHEST = 3.5
+"""Number of its own deviations by which a measurement counts as far from those before, at most."""
+BELIEVED = 4.0
+"""Number of measurements that the expected scatter is worth."""
+OUTLYING = 2.5
+"""Number of deviations beyond which a measurement loses weight in what was before."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of what is measured."""
+
+    before: float
+    """Mean before it."""
+    after: float
+    """Mean since."""
+    error: float
+    """Standard error of the difference."""
+    lasting: int
+    """Number of measurements since, the newest one included."""
+
+
+class ChangeDetector:
+    """Compares the latest measurements of a quantity with all before, each with its own error.
+
+    The change-point model: neither the mean before nor the one since is known, and of all moments at which the change
+    may have been, the likeliest one counts (Hawkins, Qiu and Kang, Journal of Quality Technology 35, 2003). What
+    motions differ by beyond their errors is estimated from those before, together with what is expected, and
+    outliers have less weight (Huber, Annals of Mathematical Statistics 35, 1964). After a change has been told, the
+    measurements since are the new past.
+
+    Args:
+        prior: Standard deviation of the mean before, about 0, as far as it is known without any measurement.
+        scatter: Standard deviation that is expected between motions beyond the errors of their measurements.
+        least: Smallest change that is told.
+    """
+
+    def __init__(self, prior: float, scatter: float, least: float) -> None:
+        self._prior, self._scatter, self._least = prior, scatter, least
+        self._kept: list[tuple[float, float]] = []
+
+    def take(self, value: float, error: float) -> Change | None:
+        """Take a measurement.
+
+        Args:
+            value: What was measured.
+            error: Its standard error.
+
+        Returns:
+            A change that has shown with this measurement; None if none has.
+        """
+        self._kept = [*self._kept[1 - KEPT :], (value, error)]
+        found, surest = None, 0.0
+        for number in WINDOWS:
+            past = len(self._kept) - number
+            if past < LEAST:
+                break
+            mean, scatter, variance = self._past(np.array(self._kept[:past]))
+            latest, errors = np.array(self._kept[past:]).T
+            own = errors**2 + scatter**2
+            farthest = FARTHEST * np.sqrt(own + variance)
+            moved = float(np.average(np.clip(latest - mean, -farthest, farthest), weights=1.0 / own))
+            error_of_it = float(np.sqrt(1.0 / np.sum(1.0 / own) + variance))
+            # Of few measurements the scatter is not known well, so that more of them are far off.
+            sure = SURE * math.sqrt(1.0 + BELIEVED / (BELIEVED + past))
+            if abs(moved) > max(max(sure, surest) * error_of_it, self._least):
+                off = (latest - mean) * np.sign(moved)
+                new = off > 0.5 * off.max()  # a window may begin before the change
+                after = float(np.average(latest[new], weights=1.0 / own[new]))
+                error_since = float(np.sqrt(1.0 / np.sum(1.0 / own[new]) + variance))
+                surest, found = abs(moved) / error_of_it, Change(mean, after, error_since, int(new.sum()))
+        if found is not None:
+            self._kept = self._kept[-found.lasting :]
+        return found
+
+    def _past(self, measured: Floats) -> tuple[float, float, float]:
+        """Mean, scatter between motions, and variance of the mean, of measurements of shape (n, 2)."""
+        value, error = measured.T
+        mean, scatter = float(np.median(value)), self._scatter
+        for _ in range(3):
+            own = np.sqrt(error**2 + scatter**2)
+            off = np.clip(value - mean, -OUTLYING * own, OUTLYING * own)
+            weight = 1.0 / own**2
+            variance = 1.0 / (float(np.sum(weight)) + self._prior**-2.0)
+            mean = (float(np.sum(weight * (mean + off)))) * variance
+            beyond = float(np.sum(np.maximum(off**2 - error**2, 0.0)))
+            scatter = float(np.sqrt((BELIEVED * self._scatter**2 + beyond) / (BELIEVED + len(value))))
+        return mean, scatter, variance

@@ -1,0 +1,227 @@
+"""How far the modes that ring after a stop are from those that a model of the arm has there."""
+
+import math
+from collections.abc import Generator, Iterable
+from contextlib import suppress
+
+import numpy as np
+
+from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.calibrations.modal import drivetrain, mass_matrix
+from tvist_controller.line.differentiator import Floats
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.imperfections import YieldingBase, on_base
+from tvist_plant.model import Integers, flexible_model
+from tvist_plant.plant import PERIOD
+from tvist_protocol.calibration import Calibration
+from tvist_shaping.errors import EstimatorError
+from tvist_shaping.estimators.drivetrain import Drivetrain
+from tvist_shaping.estimators.modal import Modal
+
+MODES = 4
+"""Number of modes that may ring, the lowest ones."""
+HIGHEST = 100.0
+"""Largest frequency of one that is looked for [Hz]."""
+SLOW_POLE = 17.5
+"""Rate of the non-oscillatory tail that a position loop adds [1/s]."""
+SKIP = 3
+"""Ticks after the stop that are left out, since the end of the deceleration is no ring-down."""
+SCALES = np.linspace(-0.4, 0.3, 29)
+"""Logarithms of the factors of all frequencies that are tried."""
+BASES = np.geomspace(1e6, 3e4, 20)
+"""Stiffnesses that the arm's base may have [N m/rad]; from the first one on it is rigid."""
+COLOUR = 3.0
+"""Number of samples that count as one, since what the modes leave is correlated in time."""
+EXPECTED = 0.07
+"""Standard deviation of the logarithm of the factor before anything was heard."""
+UNLIKE, ELSEWHERE = 0.05, 0.1
+"""Standard deviation of the factor from pose to pose, and share of the stops that ring in something else."""
+VAGUE = 0.1
+"""Standard error from which on a stop says nothing of the factor: it did not ring."""
+FIRST = 8
+"""Number of stops by which the stiffness of the base is found."""
+PIECE = 4
+"""Number of factors that are tried at a time."""
+
+
+@compiled_for_ticks
+def describe(f_d: Floats, zeta: Floats, T: int, columns: Floats) -> int:
+    """Write a constant, a slow tail, and cosine and sine of each mode into the first rows; return their number."""
+    used = 2
+    for t in range(T):
+        columns[0, t], columns[1, t] = 1.0, math.exp(-SLOW_POLE * PERIOD * t)
+    for k in range(f_d.shape[0]):
+        if f_d[k] > HIGHEST:
+            continue
+        turn = 2.0 * math.pi * f_d[k] * PERIOD
+        fade = math.exp(-turn * zeta[k] / math.sqrt(1.0 - zeta[k] * zeta[k]))
+        c, s, x, y = fade * math.cos(turn), fade * math.sin(turn), 1.0, 0.0
+        for t in range(T):
+            columns[used, t], columns[used + 1, t] = x, y
+            x, y = c * x - s * y, s * x + c * y
+        used += 2
+    return used
+
+
+@compiled_for_ticks
+def along(a: Floats, b: Floats) -> float:
+    """Scalar product of two rows."""
+    product = 0.0
+    for t in range(a.shape[0]):
+        product += a[t] * b[t]
+    return product
+
+
+@compiled_for_ticks
+def unexplained(alpha: Floats, f_d: Floats, zeta: Floats, columns: Floats) -> float:
+    """Return what modes, a constant and a slow tail leave of a ring-down, as a sum of squares [m²/s⁴].
+
+    Args:
+        alpha: Readings of the accelerometer from `SKIP` ticks after the stop on, shape (T, 3) [m/s²].
+        f_d: Damped frequencies, shape (k,) [Hz].
+        zeta: Damping ratios, shape (k,) [-].
+        columns: Scratch, shape (2 k + 5, at least T).
+    """
+    T, left = alpha.shape[0], 0.0
+    used = describe(f_d, zeta, T, columns)
+    for axis in range(3):
+        for t in range(T):
+            columns[used + axis, t] = alpha[t, axis]
+    for i in range(used + 3):  # Gram and Schmidt's, modified: each row loses what the rows before explain
+        row = columns[i, :T]
+        before = along(row, row)
+        for j in range(min(i, used)):
+            product = along(row, columns[j, :T])
+            for t in range(T):
+                row[t] -= product * columns[j, t]
+        after = along(row, row)
+        if i >= used:
+            left += after
+        else:
+            inverse = 1.0 / math.sqrt(after) if after > 1e-10 * before else 0.0
+            for t in range(T):
+                row[t] *= inverse
+    return left
+
+
+class RingListener:
+    """Finds by which factor all modes after a stop are higher or lower than those of a model, f_d = e^u f_model(q).
+
+    The amplitudes of the modes enter linearly and are eliminated (variable projection; Golub and Pereyra, 1973), so
+    that each u has a sum of squares and, by that, a likelihood: a stop that hardly rings says little, and says so.
+    Nobody knows how stiffly an arm is mounted. The model therefore stands on a base that yields, whose stiffness is
+    found once, as the likeliest one for the first `FIRST` stops.
+
+    Args:
+        description: The robot.
+        calibration: Springs and drives, if it is modal; else those of the robot file are taken.
+        payload: Payload that the arm is assumed to carry.
+    """
+
+    def __init__(
+        self, description: RobotDescription, calibration: Calibration | None, payload: Payload
+    ) -> None:
+        arm = flexible_model(description, payload)
+        self._flexible = on_base(arm, YieldingBase())
+        known = None
+        if (
+            calibration is not None
+            and calibration.modal is not None
+            and calibration.robot == description.robot.model
+        ):
+            known = drivetrain(calibration.modal.parameters, description, arm).rows
+        rows = _of_file(description, arm.joints, arm.model.nv) if known is None else known
+        mass = mass_matrix(self._flexible)
+        self._models = [
+            Modal(mass, _standing(rows, float(base)), modes=min(MODES, len(rows[0]))) for base in BASES
+        ]
+        self._columns = np.empty((2 * MODES + 5, 1024))
+        self._heard: list[Floats] = []
+        self._base: int | None = None
+        unexplained(np.zeros((4, 3)), np.ones(1), 0.1 * np.ones(1), self._columns)
+        with suppress(EstimatorError):  # the first call loads compiled code, which takes many ticks
+            self._models[0].settle(np.zeros(description.joints))
+
+    def declare(self, payload: Payload) -> None:
+        """Assume another payload."""
+        self._flexible.carry(payload)
+
+    def study(self, alpha: Floats, q: Floats) -> Generator[None, None, list[tuple[float, float]]]:
+        """Compare a ring-down with the modes in a pose, in pieces of some 0.1 ms, but 0.6 ms for the modes.
+
+        Args:
+            alpha: Readings of the accelerometer in the flange's axes, with gravity, from the stop on, shape (T, 3)
+                [m/s²].
+            q: Joint angles after it, shape (n,) [rad].
+
+        Returns:
+            u and its standard error [-]: none if the stop did not ring, or the base is yet to be found; of all stops
+            so far with the one by which it is found.
+        """
+        alpha, count = alpha[SKIP : self._columns.shape[1]], alpha[SKIP : self._columns.shape[1]].size
+        chosen = range(len(BASES)) if self._base is None else [self._base]
+        left = np.empty((len(chosen), len(SCALES)))
+        for row, base in enumerate(chosen):
+            try:
+                f_d, zeta = self._models[base].settle(q)
+            except EstimatorError:  # so much damping that the arm does not vibrate there
+                return []
+            yield
+            for place, scale in enumerate(np.exp(SCALES)):
+                left[row, place] = unexplained(alpha, scale * f_d, zeta, self._columns)
+                if place % PIECE == PIECE - 1:
+                    yield
+        left = np.maximum(left, 1e-12 * count)
+        likely = -0.5 * count / COLOUR * np.log(left / left.min())
+        if self._base is not None:
+            return _certain([likely[0]])
+        self._heard.append(likely)
+        if len(self._heard) < FIRST:
+            return []
+        self._base = int(
+            np.argmax(np.max(sum(map(_blurred, self._heard)) - 0.5 * (SCALES / EXPECTED) ** 2, axis=1))
+        )
+        heard, self._heard = self._heard, []
+        return _certain([one[self._base] for one in heard])
+
+
+def _certain(likelihoods: Iterable[Floats]) -> list[tuple[float, float]]:
+    """Mean and standard deviation of u for each logarithm of a likelihood that is not vague."""
+    found = []
+    for likely in likelihoods:
+        weights = np.exp(likely - likely.max())
+        mean = float(np.average(SCALES, weights=weights))
+        spread = float(np.average((SCALES - mean) ** 2, weights=weights))
+        error = math.sqrt(spread + (SCALES[1] - SCALES[0]) ** 2 / 12.0)
+        # A maximum at an end belongs to something else that rings, or to one mode taken for another.
+        if error < VAGUE and 0 < np.argmax(likely) < len(SCALES) - 1:
+            found.append((mean, error))
+    return found
+
+
+def _blurred(likely: Floats) -> Floats:
+    """Logarithm of the likelihood of a stop, shape (bases, scales), if poses differ and some stops tell nothing."""
+    spread = np.exp(-0.5 * ((SCALES[:, np.newaxis] - SCALES) / UNLIKE) ** 2)
+    near = np.exp(likely) @ (spread / spread.sum(axis=0))
+    anything = np.exp(likely).mean(axis=1).max()
+    return np.asarray(np.log((1.0 - ELSEWHERE) * near + ELSEWHERE * anything + 1e-300))
+
+
+def _of_file(description: RobotDescription, joints: Integers, size: int) -> Floats:
+    """Rows of a `Drivetrain` with the springs and drives of a robot file."""
+    drives, links = description.drives, description.link_flexibility
+    rows = np.zeros((5, size))
+    rows[:, joints] = [
+        drives.gear_stiffness, drives.rotor_inertia, drives.velocity_gain, drives.position_gain, drives.gear_damping,
+    ]  # fmt: skip
+    bends = np.setdiff1d(np.arange(size), joints)
+    rows[0, bends] = np.repeat(links.stiffness, 2)
+    rows[4, bends] = rows[0, bends] * links.damping_time
+    return rows
+
+
+def _standing(rows: Floats, base: float) -> Drivetrain:
+    """Springs and drives of an arm on a base that yields about two axes."""
+    foot = np.zeros((5, 2))
+    foot[0], foot[4] = base, base * YieldingBase().damping_time
+    return Drivetrain(*(tuple(row.tolist()) for row in np.hstack([foot, rows])))
