@@ -6,6 +6,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -81,6 +82,16 @@ def _parser() -> argparse.ArgumentParser:
     bound.add_argument("--seed", type=_up_to(2**63 - 1), default=0, help="Seed of the random moves.")
     bound.add_argument(
         "--shapers", nargs="+", help="Shapers to compare [zv auto auto-target planned elastic elastic-16]."
+    )
+    ringing = part(_ringing, "ringing", "Judge the modes that are found in recorded and in made-up stops.")
+    ringing.add_argument(
+        "logs", nargs="*", type=Path, help="Logs, or folders of logs [the recorded stops among the tests]."
+    )
+    ringing.add_argument(
+        "--made-up", type=_up_to(100_000), default=100, help="Number of made-up stops of each speed [100]."
+    )
+    ringing.add_argument(
+        "--seed", type=_up_to(2**31 - 1), default=0, help="Another seed makes up other stops."
     )
     return parser
 
@@ -165,6 +176,19 @@ def _bound(given: argparse.Namespace) -> int:
     if unknown := set(given.shapers or ()) - set(BUILT_IN.names()):
         given.refuse(f"there is no shaper {min(unknown)}")
     result = report(compare(given.random, given.seed, given.shapers or SHAPERS))
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _ringing(given: argparse.Namespace) -> int:
+    from proof.ringing.report import files_of, of_logs, of_made_up, report, tables
+
+    try:
+        files = files_of(given.logs)
+    except FileNotFoundError as error:
+        given.refuse(str(error))
+    count = _counted(max(2 * given.made_up, 1))
+    result = report([*of_logs(files, _tell), *of_made_up(given.made_up, given.seed, count)])
     _print(result, given.json, tables(result))
     return 0
 

@@ -28,6 +28,9 @@ SAME = 0.05
 LOUD = 0.3
 """Smallest amplitude of a further mode over the strongest one's [-]."""
 
+LEAST = 0.1
+"""Smallest amplitude of a mode [m/s²]; less may be noise."""
+
 
 class Found(NamedTuple):
     """A mode, median of the orders that have it."""
@@ -66,7 +69,7 @@ def matrix_pencil(time: Floats, alpha: Floats) -> list[Found]:
         if all(abs(agreed.f_d / other.f_d - 1.0) > SAME for other in found):
             found.append(agreed)
     found.sort(key=lambda one: -one.amplitude)
-    return [mode for mode in found if mode.amplitude >= LOUD * found[0].amplitude]
+    return [mode for mode in found if mode.amplitude >= max(LOUD * found[0].amplitude, LEAST)]
 
 
 def _modes(even: Floats, period: float, order: int) -> list[Found]:

@@ -51,8 +51,8 @@ FALL = 0.7
 LATE = 2.0 / 9.0
 """Share of such a change by which a fit with constant f_d and ζ errs [-].
 
-Let f_d go as e^(-σt), like the amplitude. Its mean, weighted by the amplitude's square, has made 1/3 of the change. Least
-squares weight the phase, which grows with time, and give the value after 5/9 of it.
+Let f_d go as e^(-σt), like the amplitude. Its mean, weighted by the square of the amplitude, has made 1/3 of the
+change. Least squares fit the phase, in which late times count more, and give the value after 5/9 of it.
 """
 
 _Fit = tuple[list[Mode], float]
@@ -73,8 +73,8 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
         begin: Time after the stop from which on the arm is not driven any more, as far as one knows [s].
 
     Returns:
-        The strongest mode, midway between the moments at which the fits begin: sooner, it would be extrapolated. `ok` is
-        false, with a `reason`, if the fits do not agree on one.
+        The mode that is strongest midway between the moments at which the fits begin; at the stop itself, amplitudes
+        are extrapolated. `ok` is false, with a `reason`, if the fits do not agree on one.
     """
     first = int(np.searchsorted(time, begin - 1e-9))
     whole = Ring(alpha[first:], time[first:], period, (0.0,))
@@ -193,9 +193,9 @@ def _ordered(modes: Sequence[Mode], middle: float) -> list[Mode]:
     certain = [m for m in modes if m.f_d_error < 0.04 * m.f_d and m.zeta_error < max(0.5 * m.zeta, 0.01)]
     loudest = max((mode.amplitude for mode in certain), default=0.0)
     loud = [mode for mode in certain if mode.amplitude >= FAINT * loudest]
-    return sorted(loud, key=lambda mode: (lighter_beside(mode, loud) is not None, -mode.amplitude_at(middle)))[
-        :MOST
-    ]
+    return sorted(
+        loud, key=lambda mode: (lighter_beside(mode, loud) is not None, -mode.amplitude_at(middle))
+    )[:MOST]
 
 
 def lighter_beside(mode: Mode, modes: Sequence[Mode]) -> Mode | None:
