@@ -64,7 +64,7 @@ class MadeUp:
 
 
 def made_up(speed: Speed, seed: int) -> MadeUp:
-    """Make up a log of one stop: two to four modes, 2 to 4 Hz apart and of like size.
+    """Make up a log of one stop: one to four modes, 2 to 4 Hz apart and of like size.
 
     An oscillation of amplitude a has f_d (1 - .03 a/a_0) and the damping ratio ζ_1 + (ζ_0 - ζ_1) a/a_0, with ζ_0 of .03
     to .06 and ζ_1 of .013 to .03. A joint overshoots, swings back for .3 s, and the tool feels that as well.
@@ -101,7 +101,7 @@ def made_up(speed: Speed, seed: int) -> MadeUp:
 
 def _ring(random: np.random.Generator, speed: Speed, late: Floats) -> tuple[Floats, tuple[Found, ...]]:
     """Sum of the modes at some times after the stop, and what is true of them."""
-    count = int(random.integers(2, 5))
+    count = int(random.integers(1, 5))
     f_d = random.uniform(7.0, 15.0) + np.append(0.0, np.cumsum(random.uniform(2.0, 4.0, count - 1)))
     sizes = random.uniform(0.4, 1.0, count)
     sizes *= random.uniform(*speed.amplitude) / sizes.max()

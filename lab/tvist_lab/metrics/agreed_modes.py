@@ -33,7 +33,7 @@ LONGEST = 0.6
 AUDIBLE = 2.5
 """Smallest amplitude of a mode where its fit begins, over the rms of what the fit leaves [-]."""
 NEAR = 0.07
-"""Largest difference of f_d between two fits of the same mode [-]."""
+"""Largest difference of f_d between two fits of the same mode, and smallest one of two modes [-]."""
 FOUND_IN = 0.7
 """Smallest share of the fits that must have found a mode [-]."""
 MOST = 3
@@ -108,13 +108,22 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
 
 
 def _fits(ring: Ring) -> Iterator[_Fit]:
-    """Fit as many modes as pay, and one more."""
+    """Fit as many modes as pay, and one more.
+
+    A loud mode that changes while it decays would be fitted best as two at the same place, a light one for its end and a
+    heavy one for its beginning. So modes that are near each other are one.
+    """
     fits = []
     for f_d, zeta in _poles(ring):
         inside = (f_d > 3.05) & (f_d < 0.98 * ring.highest) & (np.abs(zeta) < 0.9 * DAMPING[1])
         if inside.any():
             start = np.column_stack([f_d[inside], np.clip(zeta[inside], 2.0 * DAMPING[0], 0.6)])
-            fits.append(ring.refine(start.ravel()))
+            start = start[np.argsort(start[:, 0])]
+            apart = np.flatnonzero(np.diff(np.log(start[:, 0])) > NEAR) + 1
+            merged = [one.mean(axis=0) for one in np.split(start, apart)]
+            cost, found = ring.refine(np.concatenate(merged))
+            if np.all(np.diff(np.log(np.sort(found[::2]))) > NEAR):
+                fits.append((cost, found))
     chosen = 0
     for index in range(1, len(fits)):
         parameters = fits[index][1]
