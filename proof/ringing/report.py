@@ -1,11 +1,12 @@
 """The modes that the laboratory finds, beside those of matrix pencils and those that made-up stops have."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from proof.ringing.course import changes, overshoot
 from proof.ringing.made_up import SPEEDS, made_up
 from proof.ringing.matrix_pencil import Found, matrix_pencil
 from tvist_lab.metrics import NotMeasurableError
@@ -36,6 +37,16 @@ SUMMARY = (
 )
 """Figures of a kind; README.md says what they are."""
 
+COURSE = {
+    "overshoot_mrad": "overshoot mrad",
+    "swings_s": "until still s",
+    "f_d_early": "f_d Hz from .12 s",
+    "f_d_late": "f_d Hz from .42 s",
+    "zeta_early": "ζ from .12 s",
+    "zeta_late": "ζ from .42 s",
+}
+"""How a stop goes on, and the heads of the columns."""
+
 
 class Stop(NamedTuple):
     """One stop."""
@@ -47,6 +58,8 @@ class Stop(NamedTuple):
     expected: Sequence[Found]
     """Modes of the other method, or the true ones, the strongest first; none if the other method finds none."""
     fit: RingDown
+    course: Mapping[str, float | None]
+    """How a recorded stop goes on."""
 
 
 def files_of(paths: Sequence[Path]) -> list[Path]:
@@ -84,7 +97,14 @@ def of_logs(files: Sequence[Path], tell: Callable[[str], None]) -> list[Stop]:
                 tell(f"{where}: left out: {error}")
                 continue
             kind = "fast" if _speed(recording, motion) > FAST else "slow"
-            stops.append(Stop(where, kind, matrix_pencil(time - stop, alpha), fit))
+            goes_on = dict(changes(time - stop, alpha))
+            if (
+                "actual_q" in recording
+                and np.isfinite(recording["actual_q"][motion.shaped_stop : motion.end]).all()
+            ):
+                rest = slice(motion.shaped_stop, motion.end)
+                goes_on |= overshoot(recording.time[rest] - stop, recording["actual_q"][rest])
+            stops.append(Stop(where, kind, matrix_pencil(time - stop, alpha), fit, goes_on))
     return stops
 
 
@@ -95,7 +115,7 @@ def of_made_up(count: int, seed: int, progress: Callable[[str], None]) -> Iterat
             made = made_up(speed, number)
             fits = [ring_down_of(made.recording, motion) for motion in motions(made.recording)]
             progress(f"made-up {name} stop {number}")
-            yield Stop(f"seed {number}", f"{MADE_UP}, {name}", made.modes, fits[-1])
+            yield Stop(f"seed {number}", f"{MADE_UP}, {name}", made.modes, fits[-1], {})
 
 
 def report(stops: Sequence[Stop]) -> dict[str, Any]:
@@ -114,6 +134,7 @@ def report(stops: Sequence[Stop]) -> dict[str, Any]:
                     for mode in stop.fit.found
                 ],
                 "reason": stop.fit.reason,
+                **stop.course,
             }
             for stop in stops
         ],
@@ -131,8 +152,13 @@ def tables(result: dict[str, Any]) -> list[tuple[Sequence[str], list[list[str]]]
         for stop in result["stops"]
         if not stop["kind"].startswith(MADE_UP)
     ]
-    columns = ("stop", "kind", "matrix pencils: f_d Hz / ζ", "found: f_d Hz (95 %) / ζ")
-    return [(("kind", *SUMMARY), rows), *([(columns, stops)] if stops else [])]
+    found: list[tuple[Sequence[str], list[list[str]]]] = [(("kind", *SUMMARY), rows)]
+    if stops:
+        found.append((("stop", "kind", "matrix pencils: f_d Hz / ζ", "found: f_d Hz (95 %) / ζ"), stops))
+        found.append(
+            (("stop", *COURSE.values()), [_course(stop) for stop in result["stops"] if "swings_s" in stop])
+        )
+    return found
 
 
 def _summary(stops: Sequence[Stop]) -> dict[str, float | None]:
@@ -180,6 +206,10 @@ def _speed(recording: Recording, motion: MotionRows) -> float:
     if len(q) <= rows:
         return 0.0
     return float(np.nanmax(np.abs(q[rows:] - q[:-rows]) / (time[rows:] - time[:-rows])[:, None]))
+
+
+def _course(stop: Mapping[str, Any]) -> list[str]:
+    return [stop["where"], *("–" if stop[name] is None else f"{stop[name]:.4g}" for name in COURSE)]
 
 
 def _words(modes: Sequence[dict[str, Any]]) -> str:

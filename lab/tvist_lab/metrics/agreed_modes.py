@@ -110,8 +110,8 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
 def _fits(ring: Ring) -> Iterator[_Fit]:
     """Fit as many modes as pay, and one more.
 
-    A loud mode that changes while it decays would be fitted best as two at the same place, a light one for its end and a
-    heavy one for its beginning. So modes that are near each other are one.
+    A loud mode that changes while it decays would be fitted best as two at the same place, a heavy one for its
+    beginning and a light one for its end. So modes that are near each other are one.
     """
     fits = []
     for f_d, zeta in _poles(ring):
