@@ -6,6 +6,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -91,6 +92,16 @@ def _parser() -> argparse.ArgumentParser:
         "--arms", nargs="+", default=["ur5e", "ur5-light"], help="Robot files [ur5e ur5-light]."
     )
     watch.add_argument("--shapers", nargs="+", default=["none", "zv"], help="Shapers [none zv].")
+    ringing = part(_ringing, "ringing", "Judge the modes that are found in recorded and in made-up stops.")
+    ringing.add_argument(
+        "logs", nargs="*", type=Path, help="Logs, or folders of logs [the recorded stops among the tests]."
+    )
+    ringing.add_argument(
+        "--made-up", type=_up_to(100_000), default=100, help="Number of made-up stops of each speed [100]."
+    )
+    ringing.add_argument(
+        "--seed", type=_up_to(2**31 - 1), default=0, help="Another seed makes up other stops."
+    )
     return parser
 
 
@@ -186,6 +197,19 @@ def _monitor(given: argparse.Namespace) -> int:
     rows = measure(given.arms, seeds, given.shapers, progress)
     columns = list(rows[0])
     _print({"rows": rows}, given.json, [(columns, [[str(row[name]) for name in columns] for row in rows])])
+    return 0
+
+
+def _ringing(given: argparse.Namespace) -> int:
+    from proof.ringing.report import files_of, of_logs, of_made_up, report, tables
+
+    try:
+        files = files_of(given.logs)
+    except FileNotFoundError as error:
+        given.refuse(str(error))
+    count = _counted(max(2 * given.made_up, 1))
+    result = report([*of_logs(files, _tell), *of_made_up(given.made_up, given.seed, count)])
+    _print(result, given.json, tables(result))
     return 0
 
 

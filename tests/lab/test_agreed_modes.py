@@ -48,6 +48,46 @@ def test_two_modes_near_each_other_are_inside_their_intervals(count, correlation
     assert np.mean(inside) > 0.85
 
 
+def test_intervals_hold_what_changes_while_a_mode_decays(measured):
+    """f_d rises by 3 % and ζ falls to a half with the amplitude; the truth is the mean over the energy."""
+    inside = []
+    for seed in range(10):
+        random = np.random.default_rng([seed, 11])
+        f_d, zeta, step = random.uniform(7.0, 18.0), random.uniform(0.03, 0.06), 5e-4
+        amplitude, phase, courses = 1.0, 0.0, []
+        while len(courses) < 2000:
+            now = f_d * (1.0 - 0.03 * amplitude), zeta * (0.5 + 0.5 * amplitude)
+            courses.append((amplitude, phase, *now))
+            phase += 2.0 * np.pi * now[0] * step
+            amplitude *= np.exp(-2.0 * np.pi * now[0] * now[1] * step)
+        course = np.array(courses)
+        true = np.average(course[:, 2:], axis=0, weights=course[:, 0] ** 2)
+        rings, axis = course[::8], random.normal(size=3)
+        alpha = np.outer(4.0 * rings[:, 0] * np.cos(rings[:, 1]), axis / np.linalg.norm(axis))
+        alpha += 0.03 * random.standard_normal(alpha.shape)
+        # One that is loud must not be taken for two at the same place.
+        fit = agreed_modes(alpha, 8 * step * np.arange(len(alpha)), 8 * step, 0.006)
+        assert len(fit.found) == 1, fit.reason
+        for (low, high), value in zip((fit.f_d_interval, fit.zeta_interval), true, strict=True):
+            inside.append(low <= value <= high)
+            assert high - low < value
+    measured("coverage", f"{np.mean(inside):.2f}")
+    assert np.mean(inside) > 0.85
+
+
+def test_of_two_modes_that_is_the_strongest_which_is_so_after_the_first_tenth_of_a_second():
+    for seed in range(6):
+        random = np.random.default_rng([seed, 13])
+        modes = [
+            (9.0, 0.03, 1.0),
+            (13.0, 0.09, 1.5),
+        ]  # equal after 0.1 s, the second by far larger at the stop
+        fit = agreed_modes(*rung(random, modes, 266.0, 0.0), 1.0 / 266.0, 0.04)
+        assert fit.f_d == pytest.approx(9.0, rel=0.02)
+        assert fit.found[1].f_d == pytest.approx(13.0, rel=0.03)
+        assert fit.found[1].amplitude > fit.amplitude
+
+
 def test_noise_alone_is_refused():
     for seed in range(4):
         random = np.random.default_rng(seed)

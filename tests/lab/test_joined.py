@@ -17,7 +17,7 @@ from tvist_lab.recordings.log_columns import SENSOR
 from tvist_lab.recordings.two_clocks import fits
 from tvist_plant.description import load
 
-RECORDED = Path(__file__).parent / "data" / "ur5_that_rings.csv.gz"
+RECORDED = Path(__file__).parent / "data" / "ur5_stops.csv.gz"
 DEGREE = np.pi / 180.0
 FORCE = "timestamp,actual_tool_accelerometer_{}"
 
@@ -223,18 +223,19 @@ def test_repeated_motions_are_joined_where_the_sensor_rested_before_and_after_th
 
 @pytest.mark.parametrize(("offset", "drift"), [(3.4, 0.0033), (-70.0, -0.005)])
 def test_a_real_arms_sensor_is_put_back_on_its_clock(tmp_path, offset, drift):
-    """Nine seconds that others have joined, good to 5 ms: too few for the drift, but offset and drift are right."""
+    """Twenty seconds that others have joined, good to 5 ms, so that their drift is good to 5e-4."""
     recorded = read(RECORDED)
     robot = write(tmp_path / "robot.csv", "timestamp,actual_q_{}", recorded.time, [recorded["actual_q"]])
     force = recorded["actual_tool_accelerometer"]
     imu = write(tmp_path / "imu.csv", FORCE, offset + (1.0 + drift) * recorded.time, [force])
-    with pytest.raises(RecordingError, match=r"drift to .*record both at once for 20 s"):
-        joined(read(robot), imu, robot="ur5-light")
+    found = joined(read(robot), imu, robot="ur5-light")
+    assert len(found) > 0.99 * len(recorded)
+    assert "joined by its accelerometer" in found.notes[0]
     angles, sensor = read(robot), read(imu, needs=SENSOR)
     felt = at_flange(load("ur5-light"), angles.time, angles["actual_q"], force=True)
     clocks = fits(felt, by_sensor(sensor.time, force, force=True))[0]
     assert clocks.first(sensor.time) == pytest.approx(recorded.time, abs=0.008)
-    assert clocks.drift == pytest.approx(drift, abs=clocks.half[1])
+    assert clocks.drift == pytest.approx(drift, abs=5e-4)
     assert clocks.correlation > 0.99
 
 

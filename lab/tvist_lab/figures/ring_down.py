@@ -112,14 +112,24 @@ def _draw_course(panel: Axes, time: Floats, alpha: Floats, after: NDArray[np.boo
 
 
 def _draw_spectrum(panel: Axes, ring: Floats, period: float, fit: RingDown) -> None:
-    """The amplitude spectrum of all axes together, and the fitted frequency with its interval."""
+    """The amplitude spectrum of all axes together, and the frequencies of all modes with their intervals."""
     frequencies = np.fft.rfftfreq(LINES, period)
     size = np.linalg.norm(np.fft.rfft(ring - ring.mean(axis=0), LINES, axis=0), axis=1) * period
     shown = frequencies <= HIGHEST
     panel.plot(frequencies[shown], size[shown], **OF_SHAPED.line(1.3))
-    if fit.ok:
-        panel.axvspan(*fit.f_d_interval, color=tint(OF_UNSHAPED.color), linewidth=0.0)
-        panel.axvline(fit.f_d, **OF_UNSHAPED.line(1.2))
+    for mode in fit.found if fit.ok else ():
+        strongest = mode.f_d == fit.f_d
+        panel.axvspan(*mode.f_d_interval, color=tint(OF_UNSHAPED.color), linewidth=0.0)
+        panel.axvline(mode.f_d, **OF_UNSHAPED.line(1.2 if strongest else 0.6))
+        weight = "bold" if strongest else "normal"
+        note(
+            panel,
+            f"{mode.f_d:.1f}",
+            (mode.f_d, 1.0),
+            (3, -9),
+            xycoords=("data", "axes fraction"),
+            weight=weight,
+        )
     panel.set(xlabel="Frequency (Hz)", ylabel=r"Spectrum of $\alpha$ (m/s)", xlim=(0.0, HIGHEST))
     panel.set_ylim(bottom=0.0)
 

@@ -33,7 +33,7 @@ LONGEST = 0.6
 AUDIBLE = 2.5
 """Smallest amplitude of a mode where its fit begins, over the rms of what the fit leaves [-]."""
 NEAR = 0.07
-"""Largest difference of f_d between two fits of the same mode [-]."""
+"""Largest difference of f_d between two fits of the same mode, and smallest one of two modes [-]."""
 FOUND_IN = 0.7
 """Smallest share of the fits that must have found a mode [-]."""
 MOST = 3
@@ -44,6 +44,16 @@ HEAVY = 0.1
 """Damping ratio from which on a mode beside a lighter one may be a driven motion, or two modes taken for one [-]."""
 BESIDE = 1.5
 """Largest ratio of the frequencies of two such modes [-]."""
+RISE = 0.03
+"""Share by which f_d of a real arm rises while a mode decays [-]."""
+FALL = 0.7
+"""Share by which ζ falls meanwhile [-]."""
+LATE = 2.0 / 9.0
+"""Share of such a change by which a fit with constant f_d and ζ errs [-].
+
+Let f_d go as e^(-σt), like the amplitude. Its mean, weighted by the square of the amplitude, has made 1/3 of the
+change. Least squares fit the phase, in which late times count more, and give the value after 5/9 of it.
+"""
 
 _Fit = tuple[list[Mode], float]
 """Modes and rms of what they leave, each with time counted from the moment at which the fit begins."""
@@ -53,7 +63,8 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
     """Fit damped sines from several moments on, and keep the modes that most of the fits have found.
 
     f_d and ζ are means over the fits, weighted by their variances. The interval is that of the best fit, widened by
-    what the others differ from the mean beyond their own noise (Hausman, Econometrica 46, 1978).
+    what the others differ from the mean beyond their own noise (Hausman, Econometrica 46, 1978), and by what f_d and ζ
+    of a real arm change while it rings.
 
     Args:
         alpha: Acceleration of the tool, shape (T, 3) [m/s²].
@@ -62,7 +73,8 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
         begin: Time after the stop from which on the arm is not driven any more, as far as one knows [s].
 
     Returns:
-        The strongest mode. `ok` is false, with a `reason`, if the fits do not agree on one.
+        The mode that is strongest midway between the moments at which the fits begin; at the stop itself, amplitudes
+        are extrapolated. `ok` is false, with a `reason`, if the fits do not agree on one.
     """
     first = int(np.searchsorted(time, begin - 1e-9))
     whole = Ring(alpha[first:], time[first:], period, (0.0,))
@@ -83,7 +95,8 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
         [mode for mode in modes if mode.amplitude_at(start) > AUDIBLE * rms and mode.zeta < 0.99 * DAMPING[1]]
         for start, (modes, rms) in zip(starts, fits, strict=True)
     ]
-    modes = _ordered([_mean(group, sum(map(bool, heard_in)), begin) for group in _groups(heard_in)], begin)
+    middle = begin + 0.5 * (STARTS - 1) * step
+    modes = _ordered([_mean(group, sum(map(bool, heard_in)), middle) for group in _groups(heard_in)], middle)
     if not modes:
         return not_measurable("fits from several moments after the stop do not agree on any mode")
     rms = float(np.median([rms for _, rms in fits]))
@@ -95,13 +108,22 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
 
 
 def _fits(ring: Ring) -> Iterator[_Fit]:
-    """Fit as many modes as pay, and one more."""
+    """Fit as many modes as pay, and one more.
+
+    A loud mode that changes while it decays would be fitted best as two at the same place, a heavy one for its
+    beginning and a light one for its end. So modes that are near each other are one.
+    """
     fits = []
     for f_d, zeta in _poles(ring):
         inside = (f_d > 3.05) & (f_d < 0.98 * ring.highest) & (np.abs(zeta) < 0.9 * DAMPING[1])
         if inside.any():
             start = np.column_stack([f_d[inside], np.clip(zeta[inside], 2.0 * DAMPING[0], 0.6)])
-            fits.append(ring.refine(start.ravel()))
+            start = start[np.argsort(start[:, 0])]
+            apart = np.flatnonzero(np.diff(np.log(start[:, 0])) > NEAR) + 1
+            merged = [one.mean(axis=0) for one in np.split(start, apart)]
+            cost, found = ring.refine(np.concatenate(merged))
+            if np.all(np.diff(np.log(np.sort(found[::2]))) > NEAR):
+                fits.append((cost, found))
     chosen = 0
     for index in range(1, len(fits)):
         parameters = fits[index][1]
@@ -155,12 +177,14 @@ def _groups(heard: Sequence[Sequence[Mode]]) -> Iterator[list[Mode]]:
         pool = [[mode for mode in modes if mode not in group] for modes in pool]
 
 
-def _mean(group: Sequence[Mode], fits: int, begin: float) -> Mode:
+def _mean(group: Sequence[Mode], fits: int, middle: float) -> Mode:
     """Mean of a mode over its fits; its amplitude is the lower quartile, with nothing where a fit has not found it."""
     f_d, f_d_error = _weighted([mode.f_d for mode in group], [mode.f_d_error for mode in group])
     zeta, zeta_error = _weighted([mode.zeta for mode in group], [mode.zeta_error for mode in group])
-    amplitudes = [mode.amplitude_at(begin) for mode in group] + [0.0] * (fits - len(group))
-    amplitude = float(np.quantile(amplitudes, 0.25)) * math.exp(decay_rate(f_d, zeta) * begin)
+    f_d_error = math.hypot(f_d_error, LATE * RISE * f_d / CERTAIN)
+    zeta_error = math.hypot(zeta_error, LATE * FALL * zeta / CERTAIN)
+    amplitudes = [mode.amplitude_at(middle) for mode in group] + [0.0] * (fits - len(group))
+    amplitude = float(np.quantile(amplitudes, 0.25)) * math.exp(decay_rate(f_d, zeta) * middle)
     return Mode(f_d, zeta, amplitude, f_d_error, zeta_error)
 
 
@@ -173,14 +197,14 @@ def _weighted(values: Sequence[float], errors: Sequence[float]) -> tuple[float, 
     return mean, best + max(float(np.max(beyond)), 0.0) / CERTAIN
 
 
-def _ordered(modes: Sequence[Mode], begin: float) -> list[Mode]:
+def _ordered(modes: Sequence[Mode], middle: float) -> list[Mode]:
     """Return the modes that are loud and certain enough, the strongest first, but one that is suspect last."""
     certain = [m for m in modes if m.f_d_error < 0.04 * m.f_d and m.zeta_error < max(0.5 * m.zeta, 0.01)]
     loudest = max((mode.amplitude for mode in certain), default=0.0)
     loud = [mode for mode in certain if mode.amplitude >= FAINT * loudest]
-    return sorted(loud, key=lambda mode: (lighter_beside(mode, loud) is not None, -mode.amplitude_at(begin)))[
-        :MOST
-    ]
+    return sorted(
+        loud, key=lambda mode: (lighter_beside(mode, loud) is not None, -mode.amplitude_at(middle))
+    )[:MOST]
 
 
 def lighter_beside(mode: Mode, modes: Sequence[Mode]) -> Mode | None:

@@ -18,6 +18,7 @@ COLUMNS = {
     "peak\nm/s²": "Largest acceleration of the tool after the stop and the declared delay.",
     "frequency\nf_d Hz": "Damped frequency of the strongest mode after the stop, with its 95 % interval.",
     "damping\nζ": "Damping ratio of that mode, with its 95 % interval.",
+    "also\nf_d Hz": "Damped frequencies of up to two further modes, the stronger one first.",
 }
 """Heads of the columns, with symbol and unit in a second line, to what they mean."""
 WORDS = {
@@ -53,6 +54,7 @@ def motion_cells(results: Sequence[MotionResult], origin: float) -> list[tuple[s
             number(one.peak_m_s2, 2),
             number(one.f_d_hz, 2, one.f_d_interval_hz),
             number(one.zeta, 3, one.zeta_interval),
+            ", ".join(number(mode["f_d_hz"], 1) for mode in one.modes[1:]) or "–",
         )
         for place, one in enumerate(results, 1)
     ]
