@@ -41,9 +41,8 @@ def choose(
     Returns:
         Indices of candidates and payloads, the most informative first, without repetition.
     """
-    at, knowledge = arm.guess, np.diag(arm.deviation**-2)
-    if known is not None:
-        at, knowledge = known[0], np.linalg.inv(known[1])
+    at, covariance = (arm.guess, np.diag(arm.deviation**2)) if known is None else known
+    knowledge = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
     says = {
         (number, payload): information(arm, predicted(arm, q, payload, jog, at), at)
         for number, q in enumerate(candidates)

@@ -30,6 +30,8 @@ INEXACT = 0.1
 """Share of a ring-down that no linear model explains, since friction and gears are not linear [-]."""
 UNSHAPED = 1.5
 """Number of ticks by which an unshaped reference may seem longer than it is."""
+CONTRADICTS = "it contradicts the other stops"
+"""Reason of a stop whose ring-down no springs and drives explain together with the others'."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,9 @@ class Log:
             return Payload(mass=mass, com=(x, y, z), inertia=ball(mass))
         if recording.info is not None:
             return cast("Payload", recording.info.payload)
-        raise RecordingError(f"{self.name} does not say what the arm carried: give --payload MASS, 0 for nothing")
+        raise RecordingError(
+            f"{self.name} does not say what the arm carried: give --payload MASS, 0 for nothing"
+        )
 
 
 @dataclass(frozen=True)
@@ -95,11 +99,15 @@ def objection(recording: Recording, motion: MotionRows) -> str:
     if SENSOR not in recording:
         return f"the log has no {SENSOR}"
     if recording.period > SLOWEST:
-        return f"the log has a row every {1e3 * recording.period:.0f} ms, {1e3 * SLOWEST:.0f} ms show vibration"
+        return (
+            f"the log has a row every {1e3 * recording.period:.0f} ms, {1e3 * SLOWEST:.0f} ms show vibration"
+        )
     if motion.stopped:
         return "the motion was stopped before its target"
     shaped = "reference_q" in recording and motion.delay(recording) > UNSHAPED * recording.period
-    if shaped or ("shaper_delay" in recording and np.any(recording["shaper_delay"][motion.start : motion.end] > 0.0)):
+    if shaped or (
+        "shaper_delay" in recording and np.any(recording["shaper_delay"][motion.start : motion.end] > 0.0)
+    ):
         return "the motion was shaped"
     return ""
 
@@ -122,13 +130,13 @@ def _stop(log: Log, number: int, motion: MotionRows, payload: int) -> Stop:
     name = "target_q" if "target_q" in recording else "actual_q"
     force = recording[SENSOR][rows]
     q, late = recording[name][stop], time[rows] - time[rows[0]]
-    ringing = Ringing(q, payload, force, _noise(recording, motion), late)
+    ringing = Ringing(q, payload, force, noise_of(recording, motion), late)
     if ringing.rms < QUIET * ringing.noise:
         return Stop(log.name, number, None, "the vibration does not stand out of the noise")
     return Stop(log.name, number, replace(ringing, inexact=INEXACT * ringing.rms))
 
 
-def _noise(recording: Recording, motion: MotionRows) -> float:
+def noise_of(recording: Recording, motion: MotionRows) -> float:
     """Noise of the accelerometer, rms per axis [m/s^2].
 
     It is the smaller of two measures: the spread before the motion, if the arm was at rest by then, and what remains of
@@ -137,7 +145,10 @@ def _noise(recording: Recording, motion: MotionRows) -> float:
     first = int(np.searchsorted(recording.time, recording.time[motion.start] - BEFORE))
     before = _finite(recording[SENSOR][first : motion.start])
     whole = _finite(recording[SENSOR][motion.start : motion.end])
-    found = [float(np.sqrt(np.mean(np.square(np.median(np.abs(np.diff(whole, 3, axis=0)), axis=0))) / 20.0)) / 0.6745]
+    found = [
+        float(np.sqrt(np.mean(np.square(np.median(np.abs(np.diff(whole, 3, axis=0)), axis=0))) / 20.0))
+        / 0.6745
+    ]
     if len(before) > 0.5 * BEFORE / recording.period:
         found.append(float(np.sqrt(np.mean((before - before.mean(axis=0)) ** 2))))
     return max(min(found), LEAST_NOISE)

@@ -86,7 +86,9 @@ class Forecast:
             return np.log(describe(arm.drivetrain(parameters).poles(mass)[0][:modes]))
 
         found = logarithms(here, mass)
-        slopes = np.array([(logarithms(here + step, mass) - found) / STEP for step in STEP * np.eye(len(here))])
+        slopes = np.array(
+            [(logarithms(here + step, mass) - found) / STEP for step in STEP * np.eye(len(here))]
+        )
         heavier = np.array([logarithms(here, other) - found for other in arm.heavier(q, payload)])
         by_mass = heavier + np.einsum("pm,pvk->mvk", self.moved, slopes)
         variance = np.einsum("pvk,pr,rvk->vk", slopes, self.covariance, slopes) + np.sum(by_mass**2, axis=0)

@@ -3,13 +3,14 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from msgspec.structs import replace as with_fields
 
 from tvist_controller.api.line import CollisionModel, MotionLimits, body
 from tvist_lab.identification.design import choose
-from tvist_lab.identification.everyday_stops import Log, Stop, stops_of
+from tvist_lab.identification.everyday_stops import CONTRADICTS, Log, Stop, stops_of
 from tvist_lab.identification.fit import FitError, check_count, fit_polynomials
 from tvist_lab.identification.forecast import Forecast, Known
 from tvist_lab.identification.identify import DEGREES, IdentificationError
@@ -101,11 +102,13 @@ def identify_from_logs(
         IdentificationError: Too few stops can be used, or they contradict each other; the message says why.
         RecordingError: A log cannot be used.
     """
-    _check_logs(description, logs)
+    check_logs(description, logs)
     stops, arm, ringings, agreeing = usable(description, logs, progress)
     progress("fitting springs and drives")
     fingerprints = {getattr(log.recording.info, "arm", None) for log in logs}
-    origin = Origin(name, command, description.robot.model, None, fingerprints.pop() if len(fingerprints) == 1 else None)
+    origin = Origin(
+        name, command, description.robot.model, None, fingerprints.pop() if len(fingerprints) == 1 else None
+    )
     calibration, forecast = calibrated(arm, agreeing, origin, len(stops) - len(agreeing))
     calibration, no_polynomial = _with_polynomials(calibration, arm, agreeing)
     progress("looking for moves that would tell more")
@@ -125,7 +128,7 @@ def identify_from_logs(
     )
 
 
-def _check_logs(description: RobotDescription, logs: Sequence[Log]) -> None:
+def check_logs(description: RobotDescription, logs: Sequence[Log]) -> None:
     """Check that the logs are of this arm."""
     for log in logs:
         info, joints = log.recording.info, log.recording.joints
@@ -156,14 +159,14 @@ def usable(
         raise IdentificationError(
             f"{len(ringings)} of {len(stops)} stops can be used, at least {LEAST} are needed"
             + (f" ({why})" if why else "")
-            + ". Record motions of the unshaped robot, as with tvist move --shaper none, each with half a second of rest"
+            + ". Record motions of the unshaped robot, as by tvist move --shaper none, each with half a second of rest"
         )
     progress("comparing stops")
     arm = ArmModes(description, payloads, unknowns_near(description))
     guilty = set(contradicting(arm, ringings))
     wrong = {id(ringings[number]) for number in guilty}
     stops = [
-        replace(stop, ringing=None, reason="it contradicts the other stops") if id(stop.ringing) in wrong else stop
+        replace(stop, ringing=None, reason=CONTRADICTS) if id(stop.ringing) in wrong else stop
         for stop in stops
     ]
     return stops, arm, ringings, [r for number, r in enumerate(ringings) if number not in guilty]
@@ -194,8 +197,8 @@ def _with_polynomials(
         return calibration, f"with {arm.payloads[payload].mass:g} kg there are {error}"
     if fit.cross_validated_f_d.p90 > ROUGH:
         return calibration, (
-            f"f_d would be off by {fit.cross_validated_f_d.p90:.0f} % and more at one stop in ten: they cover too little "
-            "of the workspace"
+            f"f_d would be off by {fit.cross_validated_f_d.p90:.0f} % and more at one stop in ten: they cover too "
+            "little of the workspace"
         )
     provenance = with_fields(
         calibration.provenance,
@@ -227,10 +230,11 @@ def propose(description: RobotDescription, forecast: Forecast, last: Ringing) ->
 
     def free(*postures: Floats) -> bool:
         """Whether the straight ways from posture to posture, in the space of the joints, are clear."""
-        for before, after in zip(postures[:-1], postures[1:], strict=True):
+        for before, after in pairwise(postures):
             steps = max(int(np.ceil(np.max(np.abs(after - before)) / STEP)), 1)
             if any(
-                collisions.meeting(before + (after - before) * k / steps) is not None for k in range(steps + 1)
+                collisions.meeting(before + (after - before) * k / steps) is not None
+                for k in range(steps + 1)
             ):
                 return False
         return True

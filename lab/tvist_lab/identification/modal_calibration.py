@@ -101,8 +101,8 @@ def calibrate(
             for number in guilty
         )
         raise IdentificationError(
-            f"ring-downs that contradict the other {len(ringings) - len(guilty)}: {names}. Was the payload the declared "
-            "one, and was the arm free? Check this and measure again, or use another seed for other configurations"
+            f"ring-downs that contradict the other {len(ringings) - len(guilty)}: {names}. Was the payload the "
+            "declared one, and was the arm free? Check this and measure again, or use another seed for other configurations"
         )
     return calibrated(arm, ringings, origin, rejected, friction=friction)[0]
 

@@ -166,9 +166,7 @@ def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floa
             for signal, r in zip(signals, ringings, strict=True)
         ]
     )
-    return np.asarray(
-        -np.linalg.solve(changes.T @ changes + np.diag(arm.deviation**-2), changes.T @ heavier)
-    )
+    return np.asarray(-np.linalg.solve(changes.T @ changes + np.diag(arm.deviation**-2), changes.T @ heavier))
 
 
 def sensitivity(arm: ArmModes, signal: _Signal, logarithms: Floats) -> Floats:

@@ -325,7 +325,7 @@ async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Record
 
 
 def ball(mass: float) -> tuple[float, float, float, float, float, float]:
-    """Inertia of a steel ball [kg m^2], since torques do not distinguish the payload's inertia from that of the rotors."""
+    """Inertia of a steel ball [kg m^2], since torques do not tell the payload's inertia from that of the rotors."""
     radius = (3.0 * mass / (4.0 * math.pi * STEEL)) ** (1.0 / 3.0)
     moment = 0.4 * mass * radius**2
     return (moment, 0.0, 0.0, moment, 0.0, moment)

@@ -115,7 +115,11 @@ def unknowns_near(description: RobotDescription) -> tuple[Unknown, ...]:
     found = []
     for unknown in unknowns(description):
         values = per_joint.get(unknown.quantity)
-        own = np.array([bending[link] for link in unknown.joints]) if values is None else values[[*unknown.joints]]
+        own = (
+            np.array([bending[link] for link in unknown.joints])
+            if values is None
+            else values[[*unknown.joints]]
+        )
         positive = own[own > 0.0]
         guess = float(np.exp(np.mean(np.log(positive)))) if len(positive) else unknown.guess
         deviation = SET if unknown.quantity == "position_gain" else unknown.deviation
