@@ -159,8 +159,8 @@ def report_from_logs(done: "FromLogs", output: Path, options: str, *, json: bool
                 "known_percent": done.known_percent,
                 "least_known": {
                     "q": q.tolist(),
-                    "f_d_hz": known.f_d[0],
-                    "interval_percent": known.f_d_percent[0],
+                    "f_d_hz": float(known.f_d[0]),
+                    "interval_percent": float(known.f_d_percent[0]),
                 },
                 "no_polynomial": done.no_polynomial,
                 "proposals": [

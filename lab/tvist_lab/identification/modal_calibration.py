@@ -102,7 +102,8 @@ def calibrate(
         )
         raise IdentificationError(
             f"ring-downs that contradict the other {len(ringings) - len(guilty)}: {names}. Was the payload the "
-            "declared one, and was the arm free? Check this and measure again, or use another seed for other configurations"
+            "declared one, and was the arm free? Check this and measure again, or use another seed for other "
+            "configurations"
         )
     return calibrated(arm, ringings, origin, rejected, friction=friction)[0]
 

@@ -56,7 +56,7 @@ class Observed:
     angles: tuple[Floats, Floats]
     """Ticks and measured angles, means of blocks, shapes (m,) and (m, n) [rad]; empty if they were not recorded."""
     torques: tuple[Floats, Floats]
-    """Ticks and measured torques likewise [N m]."""
+    """Ticks and measured torques likewise, up to the stop: at rest, friction holds what came before [N m]."""
     foreign: bool
     """Whether another controller moved the arm."""
 
@@ -121,13 +121,14 @@ def _observed(log: Log, number: int, motion: MotionRows, payloads: Sequence[Payl
         return None
     rms = float(np.sqrt(np.mean((force[after:] - force[after:].mean(axis=0)) ** 2)))
 
-    def blocks(column: str) -> tuple[Floats, Floats]:
-        if column not in recording or not np.isfinite(recording[column][rows]).all():
+    def blocks(column: str, past: int) -> tuple[Floats, Floats]:
+        own = rows[rows < past]
+        if column not in recording or not np.isfinite(recording[column][own]).all():
             return np.empty(0), np.empty((0, recording.joints))
-        parts = list(np.array_split(np.arange(len(rows)), max(len(rows) // BLOCK, 1)))
+        parts = list(np.array_split(np.arange(len(own)), max(len(own) // BLOCK, 1)))
         return (
             np.array([ticks[part].mean() for part in parts]),
-            np.array([recording[column][rows[part]].mean(axis=0) for part in parts]),
+            np.array([recording[column][own[part]].mean(axis=0) for part in parts]),
         )
 
     return Observed(
@@ -140,8 +141,8 @@ def _observed(log: Log, number: int, motion: MotionRows, payloads: Sequence[Payl
         felt=(ticks[near], force, float(np.hypot(noise, INEXACT * rms))),
         residual=slice(after, None),
         noise=noise,
-        angles=blocks("actual_q"),
-        torques=blocks("actual_moment"),
+        angles=blocks("actual_q", past),
+        torques=blocks("actual_moment", stop),
         foreign=recording.foreign,
     )
 
@@ -187,8 +188,10 @@ def apart(response: Response, motion: Observed, mounting: Floats, torque: Floats
             there = np.maximum(ticks - motion.late, 0.0)
             middle = np.column_stack([np.interp(there, whole, axis) for axis in _smooth(simulated).T])
             difference = middle - values
-            if motion.foreign:  # its angles may be the motors', which do not sag
-                difference = difference - difference[-1]
+            if (
+                values is motion.angles[1]
+            ):  # where friction holds the arm before is history, and angles may not sag
+                difference = difference - difference[0]
             parts.append((difference / scale).ravel())
     return np.concatenate(parts)
 

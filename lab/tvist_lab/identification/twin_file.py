@@ -12,8 +12,6 @@ from tvist_lab.identification.twin import Twin
 from tvist_plant.description import RobotDescription
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-DIGITS = 6
-"""Number of significant digits of a fitted value."""
 
 
 def twin_file(twin: Twin, command: str) -> str:
@@ -36,12 +34,14 @@ def said(twin: Twin) -> list[str]:
         lines.append("No motion vibrates enough to say how well it predicts residual vibration.")
     else:
         lines.append(
-            f"Residual vibration of {len(twin.predictions)} motions of {whose}: predicted within {median:.0f} % in half "
-            f"of them, within {p90:.0f} % in nine of ten."
+            f"Residual vibration of {len(twin.predictions)} motions of {whose}: predicted within {median:.0f} % in "
+            f"half of them, within {p90:.0f} % in nine of ten."
         )
     kept = _kept(twin)
     if kept:
-        lines.append("Not told by the logs, and so about the robot file's: " + "; ".join(kept) + ".")
+        lines.append(
+            "Not told by the logs, and so only assumed, near the robot file's: " + "; ".join(kept) + "."
+        )
     for number, payload in enumerate(twin.parameters.payloads):
         carried = twin.parameters.payload(twin.values, number)
         lines.append(f"When {payload.mass:g} kg were declared, the arm carried {carried.mass:.2f} kg.")
@@ -83,7 +83,7 @@ def with_provenance(twin: Twin) -> RobotDescription:
             provenance[f"{table}.{key}"] = f"measured: fitted to {twin.motions} motions of logs{part}"
         else:
             provenance[f"{table}.{key}"] = (
-                "assumed: about as in the file that the fit began at, since the logs do not tell"
+                "assumed: near the value of the file that the fit began at, since the logs do not tell"
             )
     return replace(twin.robot, provenance=provenance)
 
@@ -92,7 +92,9 @@ def _toml(description: RobotDescription) -> str:
     content: dict[str, Any] = msgspec.to_builtins(description)
     tables = {name: value for name, value in content.items() if isinstance(value, dict) and value}
     lines = [
-        f"{name} = {_value(value)}\n" for name, value in content.items() if isinstance(value, list) and value
+        f"{name} = {_value(value)}\n"
+        for name, value in content.items()
+        if isinstance(value, list | tuple) and value
     ]
     for name, table in tables.items():
         lines += [f"\n[{name}]\n", *(f"{_key(key)} = {_value(value)}\n" for key, value in table.items())]
@@ -105,9 +107,9 @@ def _key(key: str) -> str:
 
 def _value(value: Any) -> str:
     if isinstance(value, float):
-        return repr(float(f"{value:.{DIGITS}g}")) if abs(value) < 1e4 else repr(round(value, 1))
+        return repr(value)
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{_key(key)} = {_value(own)}" for key, own in value.items()) + " }"
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_value, value)) + "]"
     return json.dumps(value)

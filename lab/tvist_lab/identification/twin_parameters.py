@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -13,8 +13,6 @@ from tvist_lab.identification.unknowns import ROTOR, SET, UNSURE
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_protocol.values import Payload
-
-Status = Literal["fitted", "not told by the logs"]
 
 EACH = {
     "gear_stiffness": UNSURE,
@@ -32,6 +30,8 @@ MASS = 0.1
 """Standard deviation of a carried mass from the declared one, over the rated payload [-]."""
 CENTRE = 0.03
 """Standard deviation of each coordinate of its centre [m]."""
+DIGITS = 9
+"""Number of significant digits of a fitted value."""
 TOLD = 0.5
 """A parameter is fitted if the logs reduce its deviation below this share [-]."""
 
@@ -134,5 +134,9 @@ def _times(value: Any, factors: Any) -> Any:
     """Return a number or a tuple, each entry times its factor."""
     if isinstance(value, tuple):
         own = np.broadcast_to(factors, np.shape(factors) or (len(value),))[: len(value)]
-        return tuple((np.array(value) * own).tolist())
-    return float(value * np.ravel(factors)[0])
+        return tuple(_rounded(one) for one in (np.array(value) * own).tolist())
+    return _rounded(float(value * np.ravel(factors)[0]))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
