@@ -61,10 +61,10 @@ def choose(
     return chosen
 
 
-def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog, logarithms: Floats) -> Ringing:
+def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog, logarithms: Floats | None = None) -> Ringing:
     """Predict the ring-down after a jog of an arm, linearized at its end, with perfect feed-forward."""
     flexible, mass = arm.flexible(payload), arm.mass(q, payload)
-    drivetrain = arm.drivetrain(logarithms)
+    drivetrain = arm.drivetrain(arm.guess if logarithms is None else logarithms)
     inertia, damping, stiffness = drivetrain.system(mass)
     N, L = len(inertia), len(mass)
     motors, joints = L + np.arange(N - L), flexible.joints

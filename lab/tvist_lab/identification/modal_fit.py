@@ -53,6 +53,11 @@ class ModalFit:
     """Half the sum of squares, including that of the guess [-]."""
     drivetrain: Drivetrain
 
+    @property
+    def deviations(self) -> Floats:
+        """Standard deviations of the logarithms, shape (P,)."""
+        return np.sqrt(np.diag(self.covariance))
+
 
 class _Signal:
     """One ring-down, its mass matrix, and the projection that eliminates the amplitudes."""

@@ -22,7 +22,7 @@ def twin_file(twin: Twin, command: str) -> str:
         command: Command line that the user typed.
     """
     comments = [f"A twin of a {twin.robot.robot.model}, made by: {command}", *said(twin)]
-    return "".join(f"# {line}\n" for line in comments) + _toml(with_provenance(twin))
+    return "".join(f"# {line}\n" for line in comments) + toml_of(with_provenance(twin))
 
 
 def said(twin: Twin) -> list[str]:
@@ -88,7 +88,8 @@ def with_provenance(twin: Twin) -> RobotDescription:
     return replace(twin.robot, provenance=provenance)
 
 
-def _toml(description: RobotDescription) -> str:
+def toml_of(description: RobotDescription) -> str:
+    """Return a robot file as TOML."""
     content: dict[str, Any] = msgspec.to_builtins(description)
     tables = {name: value for name, value in content.items() if isinstance(value, dict) and value}
     lines = [
