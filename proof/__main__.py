@@ -102,6 +102,21 @@ def _parser() -> argparse.ArgumentParser:
     ringing.add_argument(
         "--seed", type=_up_to(2**31 - 1), default=0, help="Another seed makes up other stops."
     )
+    logs = part(
+        _logs, "logs", "Identify hidden robots from everyday motions, fit twins of them, and judge both."
+    )
+    logs.add_argument("--robot", nargs="+", default=["ur5e", "ur5-light"], help="Robots [ur5e ur5-light].")
+    logs.add_argument(
+        "--hidden",
+        nargs="+",
+        type=_up_to(2**31 - 1),
+        default=[1, 2, 3],
+        help="Seeds of hidden robots [1 2 3].",
+    )
+    logs.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of motions and noise [0].")
+    logs.add_argument(
+        "--no-twins", action="store_true", help="Fit no twins, which takes minutes for each robot."
+    )
     return parser
 
 
@@ -209,6 +224,14 @@ def _ringing(given: argparse.Namespace) -> int:
         given.refuse(str(error))
     count = _counted(max(2 * given.made_up, 1))
     result = report([*of_logs(files, _tell), *of_made_up(given.made_up, given.seed, count)])
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _logs(given: argparse.Namespace) -> int:
+    from proof.logs.report import report, tables
+
+    result = report(given.robot, given.hidden, given.seed, _tell, twins=not given.no_twins)
     _print(result, given.json, tables(result))
     return 0
 

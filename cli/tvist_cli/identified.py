@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 from tvist_cli.output import out, print_json, table
 
 if TYPE_CHECKING:
+    from tvist_lab.identification.from_logs import FromLogs, Proposal
     from tvist_lab.identification.identify import Identification
     from tvist_lab.identification.modal import ModalIdentification
     from tvist_lab.identification.payload import PayloadFound
+    from tvist_lab.recordings import Floats
     from tvist_protocol.calibration import ModalParameter, Spread
 
 UNSEEN = "ring-downs at poses that were left out of the fit"
@@ -116,11 +118,7 @@ def report_modal(done: "ModalIdentification", output: Path, options: str, *, jso
         f"{how.ring_downs} ring-downs in {how.configurations} configurations with {masses} kg; the fit leaves "
         f"{model.residual_to_noise:.2f} times the noise of {model.noise:.3f} m/s²"
     )
-    table(
-        "springs and drives",
-        ("parameter", "joints", "value", "95 % from", "to", "unit", ""),
-        [_parameter(parameter) for parameter in model.parameters if parameter.quantity in QUANTITIES],
-    )
+    _springs(model.parameters)
     rows = _friction([parameter for parameter in model.parameters if parameter.quantity in FRICTION])
     if rows:
         table("friction, 95 % from – to", ("joint", *FRICTION.values()), rows)
@@ -135,16 +133,82 @@ def report_modal(done: "ModalIdentification", output: Path, options: str, *, jso
             ("mode", "f_d median %", "p90 %", "ζ median %", "p90 %"),
             [_row(str(number), *pair) for number, pair in enumerate(crossed, 1)],
         )
-    lost = [p for p in model.parameters if p.status == "not identifiable" and p.quantity in QUANTITIES]
-    if lost:
-        names = ", ".join(f"{QUANTITIES[p.quantity][0]} of {_joints(p)}" for p in lost)
-        out.print(
-            f"Not identifiable from these ring-downs: {names}. The vibration hardly depends on it; the initial guess "
-            "is kept."
-        )
     if done.no_friction:
         out.print(f"Without friction: {done.no_friction}.")
     out.print(f"written to {output}; use it with: tvist serve --calibration {output}{options}")
+
+
+def report_from_logs(done: "FromLogs", output: Path, options: str, *, json: bool) -> None:
+    """Print what logs tell of springs and drives, and the moves that would tell more; see `report_polynomial`."""
+    model, how = done.calibration.modal, done.calibration.provenance
+    if model is None:
+        raise TypeError("an identification from logs has a modal model")
+    crossed = list(zip(model.cross_validated_f_d_percent, model.cross_validated_zeta_percent, strict=True))
+    q, known = done.least_known
+    if json:
+        print_json(
+            {
+                "file": str(output),
+                "stops": len(done.stops),
+                "used": done.used,
+                "unused": done.unused,
+                "payloads_kg": [payload.mass for payload in model.payloads],
+                "f_d_range_hz": how.measured_f_d_range,
+                "cross_validated": [_errors(number, *pair) for number, pair in enumerate(crossed, 1)],
+                "parameters": model.parameters,
+                "known_percent": done.known_percent,
+                "least_known": {
+                    "q": q.tolist(),
+                    "f_d_hz": float(known.f_d[0]),
+                    "interval_percent": float(known.f_d_percent[0]),
+                },
+                "no_polynomial": done.no_polynomial,
+                "proposals": [
+                    {"way": [at.tolist() for at in one.way], "q": one.q.tolist(), "commands": _moves(one)}
+                    for one in done.proposals
+                ],
+            }
+        )
+        return
+    out.print(f"{done.used} of {len(done.stops)} stops were used", markup=False)
+    for reason, count in done.unused.items():
+        out.print(f"  {count} not: {reason}", markup=False)
+    _springs(model.parameters)
+    table(
+        f"deviation of the modes from {UNSEEN}",
+        ("mode", "f_d median %", "p90 %", "ζ median %", "p90 %"),
+        [_row(str(number), *pair) for number, pair in enumerate(crossed, 1)],
+    )
+    out.print(
+        f"f_d of the lowest mode is known within 5 % in {done.known_percent:.0f} % of the workspace. It is known least "
+        f"at {_angles(q)}: {known.f_d[0]:.1f} Hz ± {known.f_d_percent[0]:.0f} %",
+        markup=False,
+    )
+    out.print(
+        f"Without polynomials: {done.no_polynomial}." if done.no_polynomial else "Polynomials are in it, too."
+    )
+    if done.proposals:
+        out.print(
+            f"These {len(done.proposals)} moves would tell most; record them, and give that recording with --from too:"
+        )
+    for one in done.proposals:
+        for line in _moves(one):
+            print(f"  {line}")  # in one line, to be copied
+    out.print(f"written to {output}; use it with: tvist serve --calibration {output}{options}")
+
+
+def _moves(one: "Proposal") -> list[str]:
+    """Commands that make a proposed move: to its start, and the jog."""
+    there = [f"tvist move {_angles(at)} --shaper none" for at in one.way]
+    limits = one.limits
+    jog = (
+        f"--velocity {limits.velocity:.4g} --acceleration {limits.acceleration:.4g} --jerk {limits.jerk:.4g}"
+    )
+    return [*there, f"tvist move {_angles(one.q)} --shaper none {jog}"]
+
+
+def _angles(q: "Floats") -> str:
+    return ",".join(f"{angle:.3f}" for angle in q.tolist())
 
 
 def report_payload(found: "PayloadFound", *, declared: bool, json: bool) -> None:
@@ -195,6 +259,23 @@ def report_payload(found: "PayloadFound", *, declared: bool, json: bool) -> None
         if declared
         else f"To declare it: set_payload {what}, inertia=({inertia})"
     )
+
+
+def _springs(parameters: "Sequence[ModalParameter]") -> None:
+    """Print springs and drives, and which of them the ring-downs do not tell."""
+    own = [parameter for parameter in parameters if parameter.quantity in QUANTITIES]
+    table(
+        "springs and drives",
+        ("parameter", "joints", "value", "95 % from", "to", "unit", ""),
+        [_parameter(parameter) for parameter in own],
+    )
+    lost = [parameter for parameter in own if parameter.status == "not identifiable"]
+    if lost:
+        names = ", ".join(f"{QUANTITIES[p.quantity][0]} of {_joints(p)}" for p in lost)
+        out.print(
+            f"Not identifiable from these ring-downs: {names}. The vibration hardly depends on it; the initial guess "
+            "is kept."
+        )
 
 
 def _median(spread: "Spread | None") -> float | None:

@@ -28,6 +28,7 @@ LOG = {
     "compare": "Compare two recordings of the same motions, motion by motion.",
     "report": "Write a web page about recordings: a verdict, tables and figures in one file.",
     "export": "Write a recording as CSV, Parquet, npz or mat, or for Foxglove.",
+    "fit": "Fit a robot file to logs, with which a simulated arm does what the robot did.",
     "replay": "Run a recording's commands again and compare bit by bit, or publish it.",
 }
 """The commands of `tvist log`."""
@@ -55,7 +56,7 @@ GROUPS = {
         "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",
         "paper": "Run the paper's experiment and print its tables beside ours.",
         "lesson": "Show on an arm with one flexible joint why a fixed shaper is not enough.",
-        "identify": "Calibrate a robot from its own accelerometer.",
+        "identify": "Calibrate a robot from its own accelerometer, or from its logs.",
         "robots": "List the arms: what is measured, what assumed, and how well auto stills each.",
         "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",
         "keys": "Create TLS certificates for a robot and its clients.",

@@ -20,7 +20,7 @@ from tvist_protocol.errors import quoted, short
 if TYPE_CHECKING:
     from cyclopts.argument import ArgumentCollection
 
-_LOG = ("record", "info", "analyze", "compare", "report", "export", "replay")
+_LOG = ("record", "info", "analyze", "compare", "report", "export", "fit", "replay")
 _STUDIES = ("robustness", "match", "paths", "tracking", "map")
 
 INSTEAD = {

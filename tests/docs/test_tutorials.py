@@ -119,6 +119,8 @@ def place(tmp_path_factory):
     folder = with_files(tmp_path_factory.mktemp("examples"), "")
     (folder / "sweep.toml").write_text(SWEEP, encoding="utf-8")
     shutil.copy(Path(__file__).parents[1] / "journals" / "live_moves.mcap", folder / "first.mcap")
+    unshaped = ("--lockstep", "--shaper", "none", "--payload", "2", "--record", "day.mcap")
+    assert finished("-m", "tvist_cli", "run", "wave.script", *unshaped, cwd=folder).returncode == 0
     return folder
 
 

@@ -13,7 +13,7 @@ from tvist_lab.identification import modal_calibration
 from tvist_lab.identification.design import choose, predicted
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.modal import identify_modal
-from tvist_lab.identification.modal_calibration import calibrate
+from tvist_lab.identification.modal_calibration import Origin, calibrate
 from tvist_lab.identification.modal_fit import describe, fit_from_many, own_poles
 from tvist_lab.identification.modal_plan import ModalPlan, free_configurations
 from tvist_lab.identification.ring_downs import Jog
@@ -103,7 +103,7 @@ def test_a_ring_down_with_another_payload_than_declared_is_named(done, wrong):
         for number, ring in enumerate(found.ringings)
     ]
     with pytest.raises(IdentificationError, match="contradict") as error:
-        calibrate(ArmModes(ROBOT, PAYLOADS), mislabelled, info, ModalPlan(), 0, name="x", command="x")
+        calibrate(ArmModes(ROBOT, PAYLOADS), mislabelled, Origin("x", "x", info.model, 0, info.arm), 0)
     assert any(f"number {number + 1} " in str(error.value) for number in wrong)
 
 

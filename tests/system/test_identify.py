@@ -1,8 +1,10 @@
 """`tvist identify --model modal` and `--payload`: in process, over a network, and where it cannot be done."""
 
 import json
+from pathlib import Path
 
 import pytest
+from tests.conformance.served import Served
 from tests.system.test_command_line import tvist
 
 from tvist_plant.description import load
@@ -71,3 +73,51 @@ def test_the_payload_of_a_served_robot_is_found_and_declared(lockstep):
     again = tvist("identify", *options[:1], lockstep.endpoint, *options[1:]).assert_done().json
     assert again["declared_kg"] == pytest.approx(said["mass_kg"])
     assert again["set_payload"]["mass"] == again["mass_kg"]
+
+
+@pytest.fixture(scope="module")
+def day(tmp_path_factory):
+    """A recording of seven unshaped moves."""
+    folder = tmp_path_factory.mktemp("day")
+    wave = Path(__file__).parents[2] / "clients" / "examples" / "wave.script"
+    how = ("--lockstep", "--shaper", "none", "--payload", "2", "--record", "day.mcap")
+    tvist("run", wave, *how, cwd=folder).assert_done()
+    return folder / "day.mcap"
+
+
+def test_a_recording_alone_makes_a_calibration_and_proposes_moves(day, tmp_path):
+    path = tmp_path / "mine.json"
+    said = tvist("identify", "--from", day, "--output", path, "--json").assert_done().json
+    assert said["stops"] == 7
+    assert said["used"] + sum(said["unused"].values()) == 7
+    assert said["payloads_kg"] == [2.0]
+    assert len(said["proposals"]) == 3
+    assert all(one["commands"][-1].startswith("tvist move ") for one in said["proposals"])
+    calibration = calibration_from_json(path.read_bytes())
+    assert calibration.modal is not None
+    assert {one.status for one in calibration.modal.parameters} == {"identified", "not identifiable"}
+
+
+def test_a_twin_of_a_recording_can_be_served(day, tmp_path):
+    path = tmp_path / "robot.toml"
+    said = tvist("log", "fit", day, "--output", path, "--json").assert_done().json
+    assert said["motions"] >= 4
+    assert said["residual_error_percent"] < 25.0
+    assert said["payloads"][0]["carried_kg"] == pytest.approx(2.0, abs=0.1)
+    assert load(path).payload.mass == pytest.approx(said["payloads"][0]["carried_kg"])
+    with Served("--robot", path, "--clock", "lockstep") as robot:
+        assert robot.endpoint
+    tvist("log", "fit", day, "--output", path).assert_failed(1, "--force")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("identify", "tcp/127.0.0.1:7447", "--from", "x.mcap"), "leave out endpoint"),
+        (("identify", "--columns", "time=t"), "columns is for logs"),
+        (("log", "fit"), "at least one recording"),
+        (("log", "fit", "x.mcap", "--payload", "-1"), "payload is -1"),
+    ],
+)
+def test_logs_and_robots_are_not_mixed(arguments, named, tmp_path):
+    tvist(*arguments, cwd=tmp_path).assert_failed(2, named)

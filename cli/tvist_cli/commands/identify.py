@@ -11,9 +11,10 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.identified import report_modal, report_payload, report_polynomial
-from tvist_cli.output import progress
+from tvist_cli.identified import report_from_logs, report_modal, report_payload, report_polynomial
+from tvist_cli.output import progress, typed, waiting
 from tvist_cli.poses import pose
+from tvist_cli.robot_logs import robot_logs
 
 if TYPE_CHECKING:
     from tvist_client.arm import Arm
@@ -34,7 +35,9 @@ def identify(
     *,
     output: Path = Path("calibration.json"),
     name: str | None = None,
-    robot: str = ROBOT,
+    from_: Annotated[list[Path] | None, Parameter(name="--from")] = None,
+    columns: str | None = None,
+    robot: str | None = None,
     description: str | None = None,
     security: Path | None = None,
     namespace: str = "",
@@ -52,12 +55,16 @@ def identify(
     look: FigureOptions = AS_USUAL,
     json: bool = False,
 ) -> None:
-    """Excite the arm, fit its vibration and write a calibration; or identify the payload.
+    """Excite the arm, fit its vibration and write a calibration; or identify the payload; or do with logs alone.
 
     The polynomial model describes the lowest mode with one payload, from many configurations: about a minute in this
     process, half an hour over a network. The modal model describes every mode with any payload, from a dozen
     ring-downs: seconds in this process, a minute over a network. --payload without a mass makes no calibration, but
     identifies mass and centre of mass of the payload from the joint torques.
+
+    --from moves nothing: the stops of everyday motions in recordings and logs tell the modal model, and the polynomial
+    one where they cover the workspace. It says how much of the workspace they tell, and which three moves would tell
+    most.
 
     Without an endpoint, a robot is simulated in this process as fast as possible.
 
@@ -65,13 +72,16 @@ def identify(
         endpoint: Zenoh endpoint of a served robot.
         output: Calibration file to write.
         name: Name of the calibration; default: the name of the file.
-        robot: Name of the served robot; in this process, the robot file.
+        from_: Recording or log of the robot to identify it from without moving it, repeatable.
+        columns: Names of a CSV's columns with --from if they are not RTDE's; see tvist log analyze.
+        robot: Name of the served robot [ur5e]; in this process, the robot file [ur5e]; with --from, the robot file [the
+            one whose model the logs name].
         description: Robot file with the link masses of a served robot; default: the UR5e's.
         namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         model: Model to fit.
-        payload: Mass of the disc that the robot simulated in this process carries in kg. Without a mass: identify the
-            payload.
+        payload: Mass of the disc that the robot simulated in this process carries in kg, or with --from that the arm
+            carried [what the logs say]. Without a mass: identify the payload.
         configurations: Number of configurations, spread over the workspace (polynomial).
         repeats: Number of jogs averaged in each configuration (polynomial).
         ring_downs: Total number of ring-downs (modal).
@@ -99,6 +109,17 @@ def identify(
     if not output.absolute().parent.is_dir():  # said before half an hour of jogs
         raise Failure(f"output is {output}: its folder does not exist", code=2)
     endpoint, mass = _endpoint_and_mass(endpoint, payload)
+    if from_:
+        if endpoint is not None or description is not None or (payload is not None and mass is None):
+            raise Failure(
+                "--from identifies from logs alone: leave out endpoint and description, and name a mass",
+                code=2,
+            )
+        _from_logs(from_, robot, mass, columns, output, name or output.stem, json=json)
+        return
+    if columns is not None:
+        raise Failure("columns is for logs: give --from too, or leave it out", code=2)
+    robot = robot or ROBOT
     from tvist_plant.description import DescriptionError, load
 
     with told(DescriptionError, code=2):
@@ -260,6 +281,28 @@ def _modal(
         command += f" --payload {place.mass:g}"
     doing = partial(identify_modal, description=arm, plan=plan, name=name, command=command)
     report_modal(place.calibrate(ring_downs, doing, output), output, place.options, json=json)
+
+
+def _from_logs(
+    files: list[Path],
+    robot: str | None,
+    mass: float | None,
+    columns: str | None,
+    output: Path,
+    name: str,
+    *,
+    json: bool,
+) -> None:
+    arm, logs = robot_logs(files, robot, mass, columns)
+    from tvist_lab.identification.from_logs import identify_from_logs
+    from tvist_lab.recordings import RecordingError
+    from tvist_protocol.calibration import calibration_to_json
+
+    with told(RecordingError, OSError), waiting("identifying") as step:
+        done = identify_from_logs(arm, logs, name=name, command=typed()[:500], progress=step)
+        output.write_bytes(calibration_to_json(done.calibration))
+    named = arm.robot.name
+    report_from_logs(done, output, "" if named == ROBOT else f" --robot {robot or named}", json=json)
 
 
 def _payload(place: _Place, arm: "RobotDescription", poses: int, *, declare: bool, json: bool) -> None:

@@ -23,7 +23,11 @@ NOISE = 0.03
 
 
 def choose(
-    arm: ArmModes, candidates: Sequence[Floats], jog: Jog, counts: Sequence[int]
+    arm: ArmModes,
+    candidates: Sequence[Floats],
+    jog: Jog,
+    counts: Sequence[int],
+    known: tuple[Floats, Floats] | None = None,
 ) -> list[tuple[int, int]]:
     """Choose ring-downs.
 
@@ -32,15 +36,18 @@ def choose(
         candidates: Configurations, each of shape (n,) [rad].
         jog: The move that excites the arm.
         counts: Number of ring-downs with each payload; together at most the number of candidates.
+        known: Logarithms of the parameters and their covariance, shapes (P,) and (P, P); None for the guess.
 
     Returns:
         Indices of candidates and payloads, the most informative first, without repetition.
     """
-    knowledge = np.diag(arm.deviation**-2)
+    at, covariance = (arm.guess, np.diag(arm.deviation**2)) if known is None else known
+    knowledge = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
     says = {
-        (number, payload): information(arm, predicted(arm, q, payload, jog), arm.guess)
+        (number, payload): information(arm, predicted(arm, q, payload, jog, at), at)
         for number, q in enumerate(candidates)
         for payload in range(len(arm.payloads))
+        if counts[payload] > 0
     }
     left, chosen = list(counts), []
     while any(left) and says:
@@ -54,10 +61,10 @@ def choose(
     return chosen
 
 
-def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog) -> Ringing:
-    """Predict the ring-down after a jog of the guessed arm, linearized at its end, with perfect feed-forward."""
+def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog, logarithms: Floats | None = None) -> Ringing:
+    """Predict the ring-down after a jog of an arm, linearized at its end, with perfect feed-forward."""
     flexible, mass = arm.flexible(payload), arm.mass(q, payload)
-    drivetrain = arm.drivetrain(arm.guess)
+    drivetrain = arm.drivetrain(arm.guess if logarithms is None else logarithms)
     inertia, damping, stiffness = drivetrain.system(mass)
     N, L = len(inertia), len(mass)
     motors, joints = L + np.arange(N - L), flexible.joints

@@ -15,7 +15,7 @@ from tvist_lab.identification.design import choose
 from tvist_lab.identification.fit import spread
 from tvist_lab.identification.friction import identify_friction
 from tvist_lab.identification.identify import IdentificationError
-from tvist_lab.identification.modal_calibration import TOLD, ModeErrors, calibrate
+from tvist_lab.identification.modal_calibration import TOLD, ModeErrors, Origin, calibrate
 from tvist_lab.identification.modal_plan import ModalPlan, check, free_configurations
 from tvist_lab.identification.ring_downs import Jog, Ringing, listen, or_none
 from tvist_lab.identification.unknowns import ArmModes
@@ -95,9 +95,8 @@ async def identify_modal(
         except IdentificationError as error:  # springs can be measured all the same
             no_friction = str(error)
         ringings, rejected = await _measure(robot, control, arm, candidates, plan, progress)
-        calibration = calibrate(
-            arm, ringings, info, plan, rejected, name=name, command=command, friction=friction
-        )
+        origin = Origin(name, command, info.model, plan.seed, info.arm)
+        calibration = calibrate(arm, ringings, origin, rejected, friction=friction)
         errors = await _against_truth(robot, control, calibration, description, plan, info)
     finally:
         if plan.payloads:

@@ -8,6 +8,7 @@ import numpy as np
 
 from tvist_controller.api.line import paper_payload
 from tvist_lab.identification.fit import spread
+from tvist_lab.identification.forecast import Forecast, LeftOut
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.modal_fit import (
     MODES,
@@ -19,7 +20,7 @@ from tvist_lab.identification.modal_fit import (
     of_masses,
     own_poles,
 )
-from tvist_lab.identification.modal_plan import LEAST, ModalPlan
+from tvist_lab.identification.modal_plan import LEAST
 from tvist_lab.identification.ring_downs import Ringing
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats
@@ -33,7 +34,6 @@ from tvist_protocol.calibration import (
     RingDownFit,
     Spread,
 )
-from tvist_protocol.info import Info
 from tvist_shaping.estimators.drivetrain import Drivetrain
 
 CONTRADICTION = 0.2
@@ -46,12 +46,30 @@ GUILTY = 3
 """If more than one ring-down in this number is wrong, the wrong ones cannot be determined."""
 TOLD = 3
 """Number of modes whose errors are reported."""
-CERTAIN = (0.05, 0.2)
-"""Largest standard errors of a ring-down's own f_d and ζ for which a model is judged by them [-]."""
+SINGLY = 14
+"""Largest number of configurations that are left out one by one."""
+FOLDS = 10
+"""Number of parts of more of them."""
 WORKSPACE = 200
 """Number of configurations in which the range of the modes is determined."""
 MARGIN = 0.85
 """Margin on the lowest frequency found over the workspace, and on the distance to the highest damping ratio [-]."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a calibration says of its making."""
+
+    name: str
+    """Name of the calibration."""
+    command: str
+    """Command line that the user typed."""
+    model: str
+    """Model of the arm."""
+    seed: int | None
+    """Seed of the choice of configurations; None if they were not chosen."""
+    arm: str | None
+    """Fingerprint of the arm; None if unknown."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +83,9 @@ class ModeErrors:
 def calibrate(
     arm: ArmModes,
     ringings: Sequence[Ringing],
-    info: Info,
-    plan: ModalPlan,
+    origin: Origin,
     rejected: int,
     *,
-    name: str,
-    command: str,
     friction: tuple[ModalParameter, ...] = (),
 ) -> Calibration:
     """Fit, check and create a calibration of springs and drives, to which the identified friction is added.
@@ -78,15 +93,42 @@ def calibrate(
     Raises:
         IdentificationError: The ring-downs contradict each other.
     """
-    _check_contradictions(arm, ringings, fit_modal(arm, ringings))
+    guilty = contradicting(arm, ringings)
+    if guilty:
+        names = "; ".join(
+            f"number {number + 1} with {arm.payloads[ringings[number].payload].mass:g} kg at q = "
+            f"{ringings[number].q.round(2).tolist()}"
+            for number in guilty
+        )
+        raise IdentificationError(
+            f"ring-downs that contradict the other {len(ringings) - len(guilty)}: {names}. Was the payload the "
+            "declared one, and was the arm free? Check this and measure again, or use another seed for other "
+            "configurations"
+        )
+    return calibrated(arm, ringings, origin, rejected, friction=friction)[0]
+
+
+def calibrated(
+    arm: ArmModes,
+    ringings: Sequence[Ringing],
+    origin: Origin,
+    rejected: int,
+    *,
+    friction: tuple[ModalParameter, ...] = (),
+) -> tuple[Calibration, Forecast]:
+    """Fit ring-downs that agree, and create a calibration; also return what it knows of any configuration."""
     fit = fit_from_many(arm, ringings)
-    unseen, moved = _cross_validate(arm, ringings, fit)
-    deviations = np.hypot(np.maximum(fit.deviations, moved), of_masses(arm, ringings, fit))
+    left, jackknife = _cross_validate(arm, ringings, fit)
+    forecast = Forecast(arm, fit, fit.covariance + jackknife, of_masses(arm, ringings, fit)).widened(left)
+    deviations = np.sqrt(
+        np.maximum(np.diag(fit.covariance), np.diag(jackknife)) + np.sum(forecast.moved**2, axis=1)
+    )
     first = np.array(
         [np.ravel(describe(fit.drivetrain.poles(arm.mass(r.q, r.payload))[0][:1])) for r in ringings]
     )
     noise = float(np.sqrt(np.mean([r.noise**2 for r in ringings])))
     f_d_min, zeta_max = mode_range(arm.description, fit.drivetrain)
+    unseen = _errors(left)
     model = ModalModel(
         parameters=(*arm.parameters(fit.logarithms, deviations), *friction),
         f_d_min=f_d_min,
@@ -102,38 +144,46 @@ def calibrate(
         cross_validated_zeta_percent=tuple(None if mode is None else mode.zeta for mode in unseen),
     )
     (low_f, low_z), (high_f, high_z) = first.min(axis=0).tolist(), first.max(axis=0).tolist()
-    return Calibration(
-        name=name,
-        robot=info.model,
+    calibration = Calibration(
+        name=origin.name,
+        robot=origin.model,
         payload=max(arm.payloads, key=lambda payload: payload.mass),
         modal=model,
         provenance=Provenance(
-            command=command,
+            command=origin.command,
             version=version("tvist"),
-            seed=plan.seed,
+            seed=origin.seed,
             configurations=len({r.q.tobytes() for r in ringings}),
             ring_downs=len(ringings),
             rejected=rejected,
             measured_f_d_range=(low_f, high_f),
             measured_zeta_range=(low_z, high_z),
-            arm=info.arm,
+            arm=origin.arm,
         ),
     )
+    return calibration, forecast
 
 
-def _check_contradictions(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> None:
-    """Find ring-downs that no springs and drives can explain together.
+def contradicting(arm: ArmModes, ringings: Sequence[Ringing]) -> list[int]:
+    """Find ring-downs that no springs and drives can explain together with the others.
 
     A wrong ring-down also spoils the fit of the others. So among the worst explained ones, the one whose omission
     gives the best fit is left out, until the remaining ones agree.
+
+    Returns:
+        Their numbers, from 0, in order.
+
+    Raises:
+        IdentificationError: So many contradict each other that the wrong ones cannot be determined.
     """
+    fit = fit_modal(arm, ringings)
     rest = list(range(len(ringings)))
     guilty: list[int] = []
     while len(guilty) <= len(ringings) // GUILTY:
         explained = {number: _own(arm, ringings[number], fit) for number in rest}
         worst = sorted(rest, key=lambda number: -explained[number].share)[:SUSPECTS]
         if all(own.share < CONTRADICTION or own.significance < SIGNIFICANT for own in explained.values()):
-            break
+            return sorted(guilty)
         without = {
             number: fit_modal(arm, [ringings[other] for other in rest if other != number], fit.logarithms)
             for number in worst
@@ -142,23 +192,12 @@ def _check_contradictions(arm: ArmModes, ringings: Sequence[Ringing], fit: Modal
         guilty.append(removed)
         rest.remove(removed)
         fit = without[removed]
-    else:
-        raise IdentificationError(
-            f"the {len(ringings)} ring-downs contradict each other: no springs and drives explain them together. Was "
-            "the payload the declared one each time, is the robot the one of the file, and did nothing shake it? The "
-            "search begins at springs and drives of robot arms of 5 kg payload: for another kind of arm, use --model "
-            "polynomial"
-        )
-    if guilty:
-        names = "; ".join(
-            f"number {number + 1} with {arm.payloads[ringings[number].payload].mass:g} kg at q = "
-            f"{ringings[number].q.round(2).tolist()}"
-            for number in sorted(guilty)
-        )
-        raise IdentificationError(
-            f"ring-downs that contradict the other {len(rest)}: {names}. Was the payload the declared one, and was "
-            "the arm free? Check this and measure again, or use another seed for other configurations"
-        )
+    raise IdentificationError(
+        f"the {len(ringings)} ring-downs contradict each other: no springs and drives explain them together. Was "
+        "the payload the declared one each time, is the robot the one of the file, and did nothing shake it? The "
+        "search begins at springs and drives of robot arms of 5 kg payload: for another kind of arm, use --model "
+        "polynomial"
+    )
 
 
 def _own(arm: ArmModes, ringing: Ringing, fit: ModalFit) -> OwnPoles:
@@ -168,33 +207,43 @@ def _own(arm: ArmModes, ringing: Ringing, fit: ModalFit) -> OwnPoles:
 
 def _cross_validate(
     arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit
-) -> tuple[list[ModeErrors | None], Floats]:
-    """Fit without each configuration in turn.
+) -> tuple[list[LeftOut], Floats]:
+    """Fit without each configuration in turn, or without each of `FOLDS` parts of many configurations.
 
     Returns:
-        Errors of each mode, from configurations whose own ring-down is accurate enough; and the standard deviations of
-        the parameters' logarithms by the jackknife, shape (P,), which sees what the model leaves out as well as noise.
+        The modes of each ring-down, and the covariance of the parameters' logarithms by the jackknife, shape (P, P),
+        which sees what the model leaves out as well as noise.
     """
-    logarithms = []
-    pairs: list[list[tuple[float, float, float, float]]] = [[] for _ in range(TOLD)]
-    for place in {r.q.tobytes() for r in ringings}:
-        others = [r for r in ringings if r.q.tobytes() != place]
+    places = {place: number for number, place in enumerate(dict.fromkeys(r.q.tobytes() for r in ringings))}
+    folds = len(places) if len(places) <= SINGLY else FOLDS
+    logarithms, left = [], []
+    for fold in range(folds):
+        out = [r for r in ringings if places[r.q.tobytes()] % folds == fold]
+        others = [r for r in ringings if places[r.q.tobytes()] % folds != fold]
         unseen = fit_modal(arm, others, fit.logarithms)
         logarithms.append(unseen.logarithms)
-        for ringing in (r for r in ringings if r.q.tobytes() == place):
-            f_d, zeta = describe(unseen.drivetrain.poles(arm.mass(ringing.q, ringing.payload))[0][:MODES])
-            own = _own(arm, ringing, unseen)
-            for mode in range(TOLD):
-                if own.f_d_error[mode] < CERTAIN[0] and own.zeta_error[mode] < CERTAIN[1]:
-                    pairs[mode].append((f_d[mode], own.f_d[mode], zeta[mode], own.zeta[mode]))
+        for ringing in out:
+            poles = unseen.drivetrain.poles(arm.mass(ringing.q, ringing.payload))[0][:MODES]
+            left.append(LeftOut(ringing, *describe(poles), _own(arm, ringing, unseen)))
+    apart = np.array(logarithms) - np.mean(logarithms, axis=0)
+    return left, (folds - 1) / folds * apart.T @ apart
+
+
+def _errors(left: Sequence[LeftOut]) -> list[ModeErrors | None]:
+    """Errors of each mode, from configurations whose own ring-down is accurate enough."""
     errors: list[ModeErrors | None] = []
-    for pair in pairs:
-        if len(pair) < LEAST - 1:
+    for mode in range(TOLD):
+        pairs = [
+            (one.f_d[mode], one.own.f_d[mode], one.zeta[mode], one.own.zeta[mode])
+            for one in left
+            if mode in one.certain
+        ]
+        if len(pairs) < LEAST - 1:
             errors.append(None)
             continue
-        f_d, own_f_d, zeta, own_zeta = np.array(pair).T
+        f_d, own_f_d, zeta, own_zeta = np.array(pairs).T
         errors.append(ModeErrors(spread(f_d, own_f_d), spread(zeta, own_zeta)))
-    return errors, np.sqrt((len(logarithms) - 1) * np.var(logarithms, axis=0))
+    return errors
 
 
 def mode_range(description: RobotDescription, drivetrain: Drivetrain) -> tuple[float, float]:

@@ -30,6 +30,8 @@ MODES = 4
 """Number of modes in a ring-down; a robot arm's higher ones decay within a few ticks."""
 STEP = 1e-4
 """Step of a logarithm for finite differences [-]."""
+INSIDE = 1e-3
+"""Distance of a starting point from the bounds of the search [-]."""
 EVALUATIONS = 60
 STARTS = 4
 """Number of starting points of the search; the first one is the guess."""
@@ -43,22 +45,28 @@ class ModalFit:
 
     logarithms: Floats
     """Logarithms of the parameters, shape (P,)."""
-    deviations: Floats
-    """Standard deviations of the logarithms, shape (P,)."""
+    covariance: Floats
+    """Covariance of the logarithms, shape (P, P)."""
     residual_to_noise: Floats
     """rms of the residual of each ring-down, divided by its noise, shape (N,) [-]."""
     cost: float
     """Half the sum of squares, including that of the guess [-]."""
     drivetrain: Drivetrain
 
+    @property
+    def deviations(self) -> Floats:
+        """Standard deviations of the logarithms, shape (P,)."""
+        return np.sqrt(np.diag(self.covariance))
+
 
 class _Signal:
     """One ring-down, its mass matrix, and the projection that eliminates the amplitudes."""
 
-    def __init__(self, mass: Floats, force: Floats, noise: float) -> None:
-        self.mass, self.force, self.noise = mass, force, noise
-        self.time = PERIOD * np.arange(len(force))
-        self._always = np.column_stack([np.exp(-SLOW_POLE * self.time), np.ones(len(force))])
+    def __init__(self, arm: ArmModes, ringing: Ringing) -> None:
+        self.mass, self.force = arm.mass(ringing.q, ringing.payload), ringing.force
+        self.noise = float(np.hypot(ringing.noise, ringing.inexact))
+        self.time = PERIOD * np.arange(len(self.force)) if ringing.time is None else ringing.time
+        self._always = np.column_stack([np.exp(-SLOW_POLE * self.time), np.ones(len(self.force))])
 
     def left(self, poles: Complex) -> Floats:
         """Residual of the signal for some poles, divided by its noise, flattened."""
@@ -92,7 +100,7 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
         ringings: At least one ring-down.
         start: Logarithms at which the search starts; None for the guess.
     """
-    signals = [_Signal(arm.mass(r.q, r.payload), r.force, r.noise) for r in ringings]
+    signals = [_Signal(arm, r) for r in ringings]
 
     def residual(logarithms: Floats) -> Floats:
         drivetrain = arm.drivetrain(logarithms)
@@ -103,10 +111,12 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
         changes = [sensitivity(arm, signal, logarithms) for signal in signals]
         return np.vstack([*changes, np.diag(1.0 / arm.deviation)])
 
+    low, high = arm.guess - arm.furthest, arm.guess + arm.furthest
     found = least_squares(
         residual,
-        arm.guess if start is None else start,
+        arm.guess if start is None else np.clip(start, low + INSIDE, high - INSIDE),
         jac=jacobian,
+        bounds=(low, high),
         x_scale=0.1,
         xtol=1e-5,
         ftol=1e-6,
@@ -120,7 +130,7 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
     drivetrain = arm.drivetrain(found.x)
     return ModalFit(
         logarithms=found.x,
-        deviations=np.sqrt(np.diag(np.linalg.inv(knowledge))),
+        covariance=np.linalg.inv(knowledge),
         residual_to_noise=np.array(
             [
                 float(np.sqrt(np.mean(signal.left(drivetrain.poles(signal.mass)[0][:MODES]) ** 2)))
@@ -145,16 +155,15 @@ def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
     likely = np.array([np.exp(best.cost - fit.cost) for fit in fits])
     apart = np.array([fit.logarithms - best.logarithms for fit in fits])
     between = np.max(likely[:, None] * apart**2, axis=0)
-    return replace(best, deviations=np.sqrt(best.deviations**2 + between))
+    return replace(best, covariance=best.covariance + np.diag(between))
 
 
 def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floats:
-    """Standard deviations of the parameters' logarithms that wrong masses cause, shape (P,).
+    """How far each mass that is wrong by its deviation moves the parameters' logarithms, shape (P, masses).
 
-    Masses are not fitted: they would be found no better than they are known. How far each one, wrong by its deviation,
-    moves the parameters is found to first order.
+    Masses are not fitted: they would be found no better than they are known. The motion is found to first order.
     """
-    signals = [_Signal(arm.mass(r.q, r.payload), r.force, r.noise) for r in ringings]
+    signals = [_Signal(arm, r) for r in ringings]
     changes = np.vstack([sensitivity(arm, signal, fit.logarithms) for signal in signals])
     heavier = np.vstack(
         [
@@ -162,8 +171,7 @@ def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floa
             for signal, r in zip(signals, ringings, strict=True)
         ]
     )
-    moved = np.linalg.solve(changes.T @ changes + np.diag(arm.deviation**-2), changes.T @ heavier)
-    return np.asarray(np.sqrt(np.sum(moved**2, axis=1)))
+    return np.asarray(-np.linalg.solve(changes.T @ changes + np.diag(arm.deviation**-2), changes.T @ heavier))
 
 
 def sensitivity(arm: ArmModes, signal: _Signal, logarithms: Floats) -> Floats:
@@ -175,7 +183,7 @@ def sensitivity(arm: ArmModes, signal: _Signal, logarithms: Floats) -> Floats:
 
 def information(arm: ArmModes, ringing: Ringing, logarithms: Floats) -> Floats:
     """Information of a ring-down about the parameters: the inverse of their covariance, shape (P, P)."""
-    signal = _Signal(arm.mass(ringing.q, ringing.payload), ringing.force, ringing.noise)
+    signal = _Signal(arm, ringing)
     change = sensitivity(arm, signal, logarithms)
     return np.asarray(change.T @ change)
 
@@ -206,7 +214,7 @@ LOOSE = 0.5
 
 def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
     """Fit poles to one ring-down, starting near others, independent of springs and drives."""
-    signal = _Signal(arm.mass(ringing.q, ringing.payload), ringing.force, ringing.noise)
+    signal = _Signal(arm, ringing)
     start = _logarithms(poles)
 
     def residual(logarithms: Floats) -> Floats:

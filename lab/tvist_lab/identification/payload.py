@@ -144,7 +144,7 @@ async def identify_payload(
     com = found[1:] / mass if mass >= LIGHT else np.zeros(3)
     spread = np.hypot(deviations[1:], com * deviations[0]) / mass if mass >= LIGHT else np.full(3, np.inf)
     return PayloadFound(
-        payload=Payload(mass=mass, com=_three(com), inertia=_ball(mass)),
+        payload=Payload(mass=mass, com=_three(com), inertia=ball(mass)),
         mass_deviation=float(deviations[0]),
         com_deviation=_three(spread),
         mass_in_motion=in_motion,
@@ -324,8 +324,8 @@ async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Record
     raise IdentificationError("there is no room for a short motion: give the arm more")
 
 
-def _ball(mass: float) -> tuple[float, float, float, float, float, float]:
-    """Inertia of a steel ball, since torques do not distinguish the payload's inertia from that of the rotors."""
+def ball(mass: float) -> tuple[float, float, float, float, float, float]:
+    """Inertia of a steel ball [kg m^2], since torques do not tell the payload's inertia from that of the rotors."""
     radius = (3.0 * mass / (4.0 * math.pi * STEEL)) ** (1.0 / 3.0)
     moment = 0.4 * mass * radius**2
     return (moment, 0.0, 0.0, moment, 0.0, moment)

@@ -71,6 +71,10 @@ class Ringing:
     """Specific force, beginning shortly after the stop, shape (T, 3) [m/s^2]."""
     noise: float
     """Noise of the force at rest, rms per axis [m/s^2]."""
+    time: Floats | None = None
+    """Times of the samples from the first on, shape (T,) [s]; None for one in each control period."""
+    inexact: float = 0.0
+    """What a linear model may leave of it beside the noise, rms per axis [m/s^2]."""
 
     @property
     def rms(self) -> float:

@@ -1,5 +1,6 @@
 """Unknown parameters of an arm's springs and drives before a measurement, with typical values."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,6 +22,8 @@ LARGE = 3
 """Number of joints with large drives, counted from the base, of an arm of up to six; each has its own parameters."""
 UNSURE = 0.7
 """Standard deviation of a guess's logarithm: within a factor of four with 95 % probability [-]."""
+SET = 0.2
+"""The same of a position gain in a robot file, which its maker has set and no joint scatters from [-]."""
 ROTOR = 0.2
 """The same of the rotors' inertia, which is nearly proportional to the torque of a kind of drive [-]."""
 LINK_MASS = 0.03
@@ -31,6 +34,10 @@ SCATTER = 0.12
 """Standard deviation by which each joint of a group that shares a parameter may differ from it, relative [-]."""
 NARROWER = 0.5
 """A parameter is identified if measurements reduce its deviation below this share of the guess's [-]."""
+FURTHEST = 3.0
+"""Number of deviations by which a parameter may differ from what a robot file says; beyond, it would stand for what the
+model lacks.
+"""
 SURE = 1.959963984540054
 """Number of standard deviations that contain a normal variable with 95 % probability [-]."""
 
@@ -89,18 +96,55 @@ def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
     return tuple(found)
 
 
+def unknowns_near(description: RobotDescription) -> tuple[Unknown, ...]:
+    """Return the same parameters with the robot file's values as guesses, for measurements that were not planned.
+
+    What such measurements do not tell then stays as the file has it. The deviations remain, for springs and drives of a
+    file are often assumed. A shared parameter has the geometric mean of its joints.
+    """
+    drives, flexibility = description.drives, description.link_flexibility
+    K_g, D_g = np.array(drives.gear_stiffness), np.array(drives.gear_damping)
+    per_joint = {
+        "gear_stiffness": K_g,
+        "velocity_gain": np.array(drives.velocity_gain),
+        "rotor_inertia": np.array(drives.rotor_inertia),
+        "position_gain": np.array(drives.position_gain) + np.array(drives.integral_gain),
+        "damping_time": D_g / K_g,
+    }
+    bending = dict(zip(flexibility.links, flexibility.stiffness, strict=True))
+    found = []
+    for unknown in unknowns(description):
+        values = per_joint.get(unknown.quantity)
+        own = (
+            np.array([bending[link] for link in unknown.joints])
+            if values is None
+            else values[[*unknown.joints]]
+        )
+        positive = own[own > 0.0]
+        guess = float(np.exp(np.mean(np.log(positive)))) if len(positive) else unknown.guess
+        deviation = SET if unknown.quantity == "position_gain" else unknown.deviation
+        found.append(dataclasses.replace(unknown, guess=guess, deviation=deviation))
+    return tuple(found)
+
+
 class ArmModes:
     """Modes of an arm as functions of its unknown parameters, with each of several payloads.
 
     Args:
         description: The robot; only kinematics, masses, rotors and the set of bending links are used.
         payloads: Carried payloads.
+        sought: The unknown parameters; None for those of `unknowns`.
     """
 
-    def __init__(self, description: RobotDescription, payloads: Sequence[Payload]) -> None:
+    def __init__(
+        self,
+        description: RobotDescription,
+        payloads: Sequence[Payload],
+        sought: tuple[Unknown, ...] | None = None,
+    ) -> None:
         self.description = description
         self.payloads = tuple(payloads)
-        self.unknowns = unknowns(description)
+        self.unknowns = unknowns(description) if sought is None else sought
         self._flexible: list[FlexibleModel] = [flexible_model(description, body(p)) for p in payloads]
         self._masses = [mass_matrix(flexible) for flexible in self._flexible]
         self.sought = [number for number, unknown in enumerate(self.unknowns) if unknown.deviation > 0.0]
@@ -109,6 +153,8 @@ class ArmModes:
         """Logarithms of the guesses, shape (P,)."""
         self.deviation: Floats = np.array([self.unknowns[number].deviation for number in self.sought])
         """Standard deviations of these logarithms, shape (P,)."""
+        self.furthest: Floats = (np.inf if sought is None else FURTHEST) * self.deviation
+        """Largest differences of these logarithms from the guesses, shape (P,)."""
 
     def flexible(self, payload: int) -> FlexibleModel:
         """Return the model with one of the payloads."""

@@ -14,6 +14,7 @@ from tvist_lab.metrics.common_clock import (
 )
 from tvist_lab.metrics.comparison import ComparedMotion, Comparison, compare
 from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.pairing import Pair, pairs
 from tvist_lab.metrics.predicted import Predicted, predicted
@@ -71,6 +72,7 @@ __all__ = [
     "rigid_acceleration",
     "settling",
     "still_after",
+    "still_driven",
     "table_2",
     "table_notes",
     "tool_acceleration",

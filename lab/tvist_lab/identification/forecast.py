@@ -1,0 +1,115 @@
+"""What springs and drives that were fitted say of the modes at any configuration, and how sure that is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tvist_lab.identification.modal_fit import MODES, ModalFit, OwnPoles, describe
+from tvist_lab.identification.ring_downs import Ringing
+from tvist_lab.identification.unknowns import SURE, ArmModes
+from tvist_lab.recordings import Floats
+
+STEP = 1e-3
+"""Step of a logarithm for finite differences [-]."""
+CERTAIN = (0.05, 0.2)
+"""Largest standard errors of a ring-down's own f_d and ζ for which a model is judged by them [-]."""
+LEAST = (0.015, 0.06)
+"""Smallest assumed errors of f_d and ζ: joints that share a parameter differ, and neither friction nor gears are linear
+[-].
+"""
+FEWEST = 6
+"""Number of modes of left-out ring-downs that are needed to judge the intervals."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A ring-down, and the modes at its configuration by a fit that did not see it."""
+
+    ringing: Ringing
+    f_d: Floats
+    """Shape (k,) [Hz]."""
+    zeta: Floats
+    """Shape (k,) [-]."""
+    own: OwnPoles
+    """The ring-down's own modes, the same ones."""
+
+    @property
+    def certain(self) -> list[int]:
+        """Indices of the modes that the ring-down itself tells accurately."""
+        errors = zip(self.own.f_d_error, self.own.zeta_error, strict=True)
+        return [k for k, (f_d, zeta) in enumerate(errors) if f_d < CERTAIN[0] and zeta < CERTAIN[1]]
+
+
+@dataclass(frozen=True)
+class Known:
+    """Modes at a configuration, each an array with one entry per mode, the lowest first."""
+
+    f_d: Floats
+    """Damped frequencies [Hz]."""
+    zeta: Floats
+    """Damping ratios [-]."""
+    f_d_error: Floats
+    """Standard deviation of the logarithm of f_d [-]."""
+    zeta_error: Floats
+    """Standard deviation of the logarithm of ζ [-]."""
+
+    @property
+    def f_d_percent(self) -> Floats:
+        """Half-width of the 95 % interval of f_d [%]."""
+        return 100.0 * SURE * self.f_d_error
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Fitted springs and drives with all that is uncertain of them."""
+
+    arm: ArmModes
+    fit: ModalFit
+    covariance: Floats
+    """Covariance of the parameters' logarithms that noise and what the model leaves out cause, shape (P, P)."""
+    moved: Floats
+    """How far each mass that is wrong by its deviation moves these logarithms, shape (P, masses)."""
+    wider: tuple[float, float] = (1.0, 1.0)
+    """Factors of the errors of f_d and ζ, at least 1, from ring-downs that fits did not see [-]."""
+
+    def at(self, q: Floats, payload: int, modes: int = 1) -> Known:
+        """Return the lowest modes at a configuration with one of the payloads.
+
+        An error of the masses moves the modes there and has moved the parameters, which mostly makes up for it.
+        """
+        arm, here = self.arm, self.fit.logarithms
+        mass = arm.mass(q, payload)
+        modes = min(modes, MODES)
+
+        def logarithms(parameters: Floats, mass: Floats) -> Floats:
+            return np.log(describe(arm.drivetrain(parameters).poles(mass)[0][:modes]))
+
+        found = logarithms(here, mass)
+        slopes = np.array(
+            [(logarithms(here + step, mass) - found) / STEP for step in STEP * np.eye(len(here))]
+        )
+        heavier = np.array([logarithms(here, other) - found for other in arm.heavier(q, payload)])
+        by_mass = heavier + np.einsum("pm,pvk->mvk", self.moved, slopes)
+        variance = np.einsum("pvk,pr,rvk->vk", slopes, self.covariance, slopes) + np.sum(by_mass**2, axis=0)
+        errors = np.sqrt(variance + np.square(LEAST)[:, None]) * np.array(self.wider)[:, None]
+        return Known(*np.exp(found), *errors)
+
+    def widened(self, left: Sequence[LeftOut]) -> "Forecast":
+        """Return the same with errors as large as those of fits at ring-downs that they did not see."""
+        squares: list[tuple[float, float]] = []
+        for one in left:
+            known = self.at(one.ringing.q, one.ringing.payload, MODES)
+            for k in (k for k in one.certain if k < len(known.f_d)):
+                f_d = np.log(one.f_d[k] / one.own.f_d[k]) ** 2
+                zeta = np.log(one.zeta[k] / one.own.zeta[k]) ** 2
+                squares.append(
+                    (
+                        f_d / (known.f_d_error[k] ** 2 + one.own.f_d_error[k] ** 2),
+                        zeta / (known.zeta_error[k] ** 2 + one.own.zeta_error[k] ** 2),
+                    )
+                )
+        if len(squares) < FEWEST:
+            return self
+        f_d, zeta = np.sqrt(np.mean(squares, axis=0)).tolist()
+        return replace(self, wider=(max(f_d, 1.0), max(zeta, 1.0)))

@@ -1,0 +1,202 @@
+"""What logs say of each motion that a twin repeats, and what the twin does in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from msgspec.structs import replace
+
+from tvist_controller.api.line import DrivenLine, body, respond
+from tvist_lab.identification.everyday_stops import INEXACT, Log, Stop, noise_of, objection
+from tvist_lab.metrics import MotionRows, motions
+from tvist_lab.metrics.vibration import SENSOR
+from tvist_lab.recordings import Floats, RecordingError
+from tvist_lab.study.line import Unchanged
+from tvist_plant.description import RobotDescription
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.plant import PERIOD, Response
+from tvist_protocol.values import Payload
+
+AFTER = 0.5
+"""Time after a stop that is compared, if the arm rests so long [s]."""
+BEFORE = 0.1
+"""Time before a stop from which the acceleration is compared [s]."""
+LATE = 0.01
+"""Time after a stop from which the vibration counts as residual [s]."""
+LEAST_AFTER = 0.15
+"""Shortest rest after a stop that is compared [s]."""
+ANGLE = 3e-4
+"""Accuracy of a simulated joint angle [rad]."""
+TORQUE = 0.01
+"""Accuracy of a simulated torque, over the joint's largest one [-]."""
+BLOCK = 10
+"""Number of ticks over which angles and torques are averaged."""
+
+
+@dataclass(frozen=True)
+class Observed:
+    """A motion of a log in ticks of the twin, the first one being the first in which the reference may move."""
+
+    log: str
+    motion: int
+    payload: int
+    """Index of the payload."""
+    start: Floats
+    """Joint angles at rest before it, shape (n,) [rad]."""
+    reference: Floats
+    """Reference, shape (T, n) [rad]."""
+    late: int
+    """Ticks by which the arm follows later than a twin, of another controller."""
+    felt: tuple[Floats, Floats, float]
+    """Ticks, specific force near the stop, shapes (k,) and (k, 3), and its inaccuracy [m/s^2]."""
+    residual: slice
+    """Rows of these in which the vibration counts as residual."""
+    noise: float
+    """Noise of the accelerometer, rms per axis [m/s^2]."""
+    angles: tuple[Floats, Floats]
+    """Ticks and measured angles, means of blocks, shapes (m,) and (m, n) [rad]; empty if they were not recorded."""
+    torques: tuple[Floats, Floats]
+    """Ticks and measured torques likewise, up to the stop: at rest, friction holds what came before [N m]."""
+    foreign: bool
+    """Whether another controller moved the arm."""
+
+    @property
+    def ticks(self) -> int:
+        """Number of ticks that have to be simulated."""
+        return int(self.felt[0][-1]) + 1
+
+    def residual_of(self, force: Floats) -> float:
+        """Rms of what vibrates after the stop [m/s^2], of a specific force of shape (k, 3)."""
+        rest = force[self.residual]
+        return float(np.sqrt(np.mean(np.sum((rest - rest.mean(axis=0)) ** 2, axis=1))))
+
+    @property
+    def measured_residual(self) -> float:
+        """The measured one, without the share of the noise [m/s^2]."""
+        return float(np.sqrt(max(self.residual_of(self.felt[1]) ** 2 - 3.0 * self.noise**2, 0.0)))
+
+
+def observe(logs: Sequence[Log], payloads: Sequence[Payload]) -> tuple[list[Observed], list[Stop]]:
+    """Return the motions that a twin can repeat, and those that it cannot with the reason.
+
+    Raises:
+        RecordingError: A log has no target, so that nobody knows what the arm was to do.
+    """
+    found, others = [], []
+    for log in logs:
+        if "target_q" not in log.recording:
+            raise RecordingError(
+                f"{log.name} has no target_q: a twin makes the motions of a log again, from their targets"
+            )
+        for number, motion in enumerate(motions(log.recording), 1):
+            reason = objection(log.recording, motion)
+            one = None if reason else _observed(log, number, motion, payloads)
+            if one is None:
+                others.append(
+                    Stop(log.name, number, None, reason or f"the arm rested for less than {LEAST_AFTER:g} s")
+                )
+            else:
+                found.append(one)
+    return found, others
+
+
+def _observed(log: Log, number: int, motion: MotionRows, payloads: Sequence[Payload]) -> Observed | None:
+    recording = log.recording
+    time, name = recording.time, "reference_q" if "reference_q" in recording else "target_q"
+    begin = time[motion.start]
+    stop = motion.arm_stop(recording)
+    past = min(int(np.searchsorted(time, time[stop] + AFTER)), motion.end)
+    if past - stop < LEAST_AFTER / recording.period:
+        return None
+    grid = begin + PERIOD * np.arange(1, round((time[motion.reference_stop] - begin) / PERIOD) + 1)
+    reference = np.column_stack(
+        [np.interp(grid, time[motion.start : past], axis) for axis in recording[name][motion.start : past].T]
+    )
+    rows = np.arange(motion.start + 1, past)
+    ticks = np.round((time[rows] - begin) / PERIOD) - 1.0
+    near = (time[rows] >= time[stop] - BEFORE) & np.isfinite(recording[SENSOR][rows]).all(axis=1)
+    after = int(np.searchsorted(time[rows[near]], time[stop] + LATE))
+    force, noise = recording[SENSOR][rows[near]], noise_of(recording, motion)
+    if len(force) - after < 0.5 * LEAST_AFTER / recording.period:
+        return None
+    rms = float(np.sqrt(np.mean((force[after:] - force[after:].mean(axis=0)) ** 2)))
+
+    def blocks(column: str, past: int) -> tuple[Floats, Floats]:
+        own = rows[rows < past]
+        if column not in recording or not np.isfinite(recording[column][own]).all():
+            return np.empty(0), np.empty((0, recording.joints))
+        parts = list(np.array_split(np.arange(len(own)), max(len(own) // BLOCK, 1)))
+        return (
+            np.array([ticks[part].mean() for part in parts]),
+            np.array([recording[column][own[part]].mean(axis=0) for part in parts]),
+        )
+
+    return Observed(
+        log=log.name,
+        motion=number,
+        payload=payloads.index(log.carried(motion.shaped_stop)),
+        start=recording[name][motion.start],
+        reference=reference,
+        late=max(round((motion.lag or 0.0) / PERIOD) - 1, 0),
+        felt=(ticks[near], force, float(np.hypot(noise, INEXACT * rms))),
+        residual=slice(after, None),
+        noise=noise,
+        angles=blocks("actual_q", past),
+        torques=blocks("actual_moment", stop),
+        foreign=recording.foreign,
+    )
+
+
+def repeated(robot: RobotDescription, payload: Payload, motion: Observed) -> Response:
+    """Return what a served robot does in a motion, without ripple of its gears, whose phases nobody knows."""
+    carried = body(payload)
+    line = DrivenLine(robot, Unchanged(robot.joints), motion.start, carried)
+    driven = line.drive(motion.start, motion.reference, motion.ticks)
+    smooth = replace(robot, drives=replace(robot.drives, gear_error_amplitude=0.0))
+    return respond(FlexibleArm(smooth, carried), driven, 0)
+
+
+def felt_by(response: Response, motion: Observed, mounting: Floats) -> Floats:
+    """Specific force that the twin's accelerometer would show in the rows of `felt`, shape (k, 3) [m/s^2]."""
+    ticks = np.maximum(motion.felt[0] - motion.late, 0.0)
+    whole = np.arange(len(response.specific_force))
+    force = np.column_stack([np.interp(ticks, whole, axis) for axis in response.specific_force.T])
+    return np.asarray(force @ mounting.T)
+
+
+def mounting_of(pairs: Sequence[tuple[Floats, Floats]]) -> Floats:
+    """Rotation from flange to accelerometer, from simulated and measured forces (Kabsch, 1976), shape (3, 3)."""
+    u, _, v = np.linalg.svd(sum((measured.T @ simulated for simulated, measured in pairs), np.zeros((3, 3))))
+    return np.asarray(u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v)
+
+
+def apart(response: Response, motion: Observed, mounting: Floats, torque: Floats) -> Floats:
+    """Difference of a twin's motion from the measured one, each part over its inaccuracy, flattened.
+
+    Args:
+        response: What the twin does.
+        motion: What was measured.
+        mounting: Rotation from the flange to the accelerometer.
+        torque: Largest torque of each joint, shape (n,) [N m].
+    """
+    _, force, inaccuracy = motion.felt
+    parts = [((felt_by(response, motion, mounting) - force) / inaccuracy).ravel()]
+    own = (response.measured.q, np.full(len(torque), ANGLE)), (response.measured.moment, TORQUE * torque)
+    for (ticks, values), (simulated, scale) in zip((motion.angles, motion.torques), own, strict=True):
+        if len(ticks):
+            whole = np.arange(len(simulated))
+            there = np.maximum(ticks - motion.late, 0.0)
+            middle = np.column_stack([np.interp(there, whole, axis) for axis in _smooth(simulated).T])
+            difference = middle - values
+            if (
+                values is motion.angles[1]
+            ):  # where friction holds the arm before is history, and angles may not sag
+                difference = difference - difference[0]
+            parts.append((difference / scale).ravel())
+    return np.concatenate(parts)
+
+
+def _smooth(values: Floats) -> Floats:
+    """Moving means over a block, shape as given."""
+    padded = np.pad(values, ((BLOCK // 2, BLOCK - BLOCK // 2), (0, 0)), mode="edge").cumsum(axis=0)
+    return np.asarray((padded[BLOCK:] - padded[:-BLOCK]) / BLOCK)

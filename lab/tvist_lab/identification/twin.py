@@ -1,0 +1,271 @@
+"""A twin: the robot file with which a simulated arm does what an arm did in logs.
+
+Its springs and drives begin at those that the ring-downs tell. Then all parameters are fitted by simulating each motion
+of the logs again, as a served robot makes it, to the tool's acceleration around the stop, the joint angles and the
+torques (output error; Ljung, System Identification, 1999, ch. 7). Gauss and Newton's steps, with a prior that keeps
+what the logs do not tell at the robot file's values.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_lab.identification.everyday_stops import CONTRADICTS, Log, Stop
+from tvist_lab.identification.from_logs import check_logs, usable
+from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.modal_fit import fit_from_many
+from tvist_lab.identification.observed import Observed, apart, felt_by, mounting_of, observe, repeated
+from tvist_lab.identification.twin_parameters import TOLD, TwinParameters
+from tvist_lab.identification.unknowns import FURTHEST
+from tvist_lab.metrics import motions
+from tvist_lab.recordings import Floats
+from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD, Response
+from tvist_protocol.calibration import ModalParameter
+from tvist_protocol.values import Payload
+
+STEP = 1e-3
+"""Step of a number for finite differences, over its deviation before the fit [-]."""
+ROUNDS = 5
+"""Largest number of times that derivatives are computed; the last ones are those at the end."""
+DAMPERS = (0.0, 0.3, 3.0)
+"""Weights of the step's length; each is used until it helps no more [-]."""
+ENOUGH = 0.01
+"""Relative decrease of the cost below which a step does not help [-]."""
+FEWEST = 4
+"""Number of motions below which the twin consists of little more than the robot file."""
+AUDIBLE = 1.5
+"""Smallest measured residual that a prediction is judged by, over the noise of three axes [-]."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Residual vibration of a motion that the twin has not seen."""
+
+    log: str
+    motion: int
+    measured: float
+    """rms of the tool's acceleration from 10 ms to half a second after the stop [m/s^2]."""
+    twin: float
+    """The twin's [m/s^2]."""
+
+    @property
+    def error_percent(self) -> float:
+        """Error of the prediction [%]."""
+        return 100.0 * abs(self.twin / self.measured - 1.0)
+
+
+@dataclass(frozen=True)
+class Twin:
+    """A fitted robot file, and how well it predicts."""
+
+    parameters: TwinParameters
+    values: Floats
+    """The fitted numbers, shape (P,)."""
+    deviations: Floats
+    """Their standard deviations, shape (P,)."""
+    payload: int
+    """Index of the payload that the arm was said to carry at last."""
+    motions: int
+    """Number of motions that were repeated."""
+    others: tuple[Stop, ...]
+    """Motions that were not, with reasons."""
+    predictions: tuple[Prediction, ...]
+    """Of motions that the fit has not seen."""
+    quiet: int
+    """Number of further ones that vibrate too little to be compared."""
+    checked: bool
+    """Whether these are from logs of their own; if not, each is left out of the fit in turn."""
+    late_ms: tuple[float, ...]
+    """Time by which the arm of each motion follows its target later than the twin, of another controller [ms]."""
+
+    @property
+    def robot(self) -> RobotDescription:
+        """The robot file."""
+        return self.parameters.robot(self.values, self.payload)
+
+    @property
+    def told(self) -> list[bool]:
+        """Of each number, whether the logs tell it."""
+        return [bool(told) for told in self.deviations < TOLD * self.parameters.deviation]
+
+    def error_percent(self, share: float) -> float | None:
+        """Quantile of the errors of the predicted residual [%]; None if there is no prediction."""
+        errors = [one.error_percent for one in self.predictions]
+        return float(np.quantile(errors, share)) if errors else None
+
+
+class _Fit:
+    """Motions, and how far twins are from them."""
+
+    def __init__(self, parameters: TwinParameters, seen: Sequence[Observed]) -> None:
+        self.parameters, self.seen = parameters, tuple(seen)
+        self._torque = np.array(parameters.description.limits.torque)
+        self.mountings: dict[str, Floats] = {}
+
+    def mount(self, values: Floats, motions: Sequence[Observed]) -> None:
+        """Find how the accelerometer of each log is mounted; that of this controller is in the flange's frame."""
+        for log in {motion.log for motion in motions}:
+            own = [motion for motion in motions if motion.log == log]
+            self.mountings[log] = np.eye(3)
+            if own[0].foreign:
+                pairs = [(felt_by(self.repeat(values, one), one, np.eye(3)), one.felt[1]) for one in own]
+                self.mountings[log] = mounting_of(pairs)
+
+    def repeat(self, values: Floats, motion: Observed) -> Response:
+        payload = self.parameters.payload(values, motion.payload)
+        return repeated(self.parameters.robot(values, motion.payload), payload, motion)
+
+    def apart(self, values: Floats, motion: Observed) -> Floats:
+        return apart(self.repeat(values, motion), motion, self.mountings[motion.log], self._torque)
+
+    def left(self, values: Floats) -> list[Floats]:
+        return [self.apart(values, motion) for motion in self.seen]
+
+    def slopes(self, values: Floats, left: Sequence[Floats]) -> list[Floats]:
+        """Derivatives of the differences of each motion, shape (samples, P)."""
+        found = [np.zeros((len(one), len(values))) for one in left]
+        for number, entry in enumerate(self.parameters.entries):
+            step = STEP * entry.deviation
+            moved = values.copy()
+            moved[number] += step
+            for place, motion in enumerate(self.seen):
+                if entry.table != "payload" or entry.places[0] == motion.payload:
+                    found[place][:, number] = (self.apart(moved, motion) - left[place]) / step
+        return found
+
+    def predict(self, values: Floats, motion: Observed) -> float:
+        return motion.residual_of(felt_by(self.repeat(values, motion), motion, self.mountings[motion.log]))
+
+
+def fit_twin(
+    description: RobotDescription, logs: Sequence[Log], checks: Sequence[Log], progress: Progress
+) -> Twin:
+    """Fit a robot file to logs.
+
+    Args:
+        description: The robot file to start from.
+        logs: At least one log of the robot, with targets.
+        checks: Logs that the fit does not see and whose motions it predicts; if there is none, it predicts each motion
+            of the others by a fit without it.
+        progress: Called before each step with what it does.
+
+    Raises:
+        IdentificationError: Too few motions can be used; the message says why.
+        RecordingError: A log cannot be used.
+    """
+    check_logs(description, [*logs, *checks])
+    stops, arm, _, agreeing = usable(description, logs, progress)
+    progress("fitting springs and drives to the stops")
+    modal = arm.parameters(fit_from_many(arm, agreeing).logarithms)
+    payloads = tuple(dict.fromkeys((*arm.payloads, *_carried(checks))))
+    wrong = {(stop.log, stop.motion) for stop in stops if stop.reason == CONTRADICTS}
+    seen, others = observe(logs, payloads)
+    seen = [one for one in seen if (one.log, one.motion) not in wrong]
+    if len(seen) < FEWEST:
+        raise IdentificationError(
+            f"{len(seen)} motions can be repeated, at least {FEWEST} are needed: record more"
+        )
+    parameters = TwinParameters(description, payloads)
+    fit = _Fit(parameters, seen)
+    values = _begin(parameters, modal)
+    fit.mount(values, seen)
+    values, left, slopes = _descend(fit, values, progress)
+    samples = sum(map(len, left))
+    excess = max(sum(float(one @ one) for one in left) / samples, 1.0)
+    prior = np.diag(parameters.deviation**-2.0)
+    whole = sum((slope.T @ slope for slope in slopes), np.zeros_like(prior)) / excess + prior
+    progress("predicting motions that the fit has not seen")
+    # Without a motion, its pull on the parameters is gone: one step of Gauss and Newton.
+    moved = [
+        np.linalg.solve(whole - slope.T @ slope / excess, slope.T @ one / excess)
+        for slope, one in zip(slopes, left, strict=True)
+    ]
+    unseen = [(one, values + step) for one, step in zip(seen, moved, strict=True)]
+    if checks:
+        more, _ = observe(checks, payloads)
+        fit.mount(values, more)
+        unseen = [(one, values) for one in more]
+    jackknife = (len(seen) - 1) / len(seen) * np.sum(np.square(moved), axis=0)
+    loud = [(one, own) for one, own in unseen if one.measured_residual > AUDIBLE * np.sqrt(3.0) * one.noise]
+    return Twin(
+        parameters=parameters,
+        values=values,
+        deviations=np.sqrt(np.maximum(np.diag(np.linalg.inv(whole)), jackknife)),
+        payload=seen[-1].payload,
+        motions=len(seen),
+        others=(*others, *(stop for stop in stops if (stop.log, stop.motion) in wrong)),
+        predictions=tuple(
+            Prediction(one.log, one.motion, one.measured_residual, fit.predict(own, one)) for one, own in loud
+        ),
+        quiet=len(unseen) - len(loud),
+        checked=bool(checks),
+        late_ms=tuple(1e3 * PERIOD * one.late for one in seen),
+    )
+
+
+def _carried(logs: Sequence[Log]) -> list[Payload]:
+    """Payloads of all motions of logs."""
+    return [log.carried(motion.shaped_stop) for log in logs for motion in motions(log.recording)]
+
+
+def _begin(parameters: TwinParameters, modal: Sequence[ModalParameter]) -> Floats:
+    """Return the numbers that give the springs and drives that ring-downs tell, shape (P,)."""
+    values = np.zeros(len(parameters.entries))
+    drives, links = parameters.description.drives, parameters.description.link_flexibility
+    for one in modal:
+        if one.status == "assumed":
+            continue
+        for joint in one.joints:
+            table, key, place, guess = "drives", str(one.quantity), joint, 0.0
+            match one.quantity:
+                case "gear_stiffness" | "velocity_gain" | "rotor_inertia":
+                    guess = getattr(drives, key)[place]
+                case "bending_stiffness":
+                    table, key, place = "link_flexibility", "stiffness", links.links.index(joint)
+                    guess = links.stiffness[place]
+                case "position_gain":
+                    guess = drives.position_gain[place] + drives.integral_gain[place]
+            number = parameters.index(table, key, place)
+            if number is not None and guess > 0.0:
+                limit = FURTHEST * parameters.deviation[number]
+                values[number] = np.clip(np.log(one.value / guess), -limit, limit)
+    return values
+
+
+def _descend(fit: _Fit, values: Floats, progress: Progress) -> tuple[Floats, list[Floats], list[Floats]]:
+    """Fit the numbers; also return the differences of each motion, and their derivatives, shape (samples, P).
+
+    Derivatives take far longer than differences, so each set of them serves for several steps.
+    """
+    deviation = fit.parameters.deviation
+    limit = FURTHEST * deviation
+
+    def cost(values: Floats, left: Sequence[Floats]) -> float:
+        return sum(float(one @ one) for one in left) + float(np.sum((values / deviation) ** 2))
+
+    left = fit.left(values)
+    slopes: list[Floats] = []
+    for number in range(1, ROUNDS + 1):
+        progress(f"repeating {len(fit.seen)} motions, round {number} of at most {ROUNDS}")
+        before = cost(values, left)
+        slopes = fit.slopes(values, left)
+        whole = sum((slope.T @ slope for slope in slopes), np.diag(deviation**-2.0))
+        dampers = list(DAMPERS)
+        while dampers and number < ROUNDS:
+            pull = sum(
+                (slope.T @ one for slope, one in zip(slopes, left, strict=True)), values / deviation**2
+            )
+            step = np.linalg.solve(whole + dampers[0] * np.diag(np.diag(whole)), -pull)
+            tried = np.clip(values + np.clip(step, -deviation, deviation), -limit, limit)
+            then, now = fit.left(tried), cost(values, left)
+            if cost(tried, then) > (1.0 - ENOUGH) * now:
+                dampers.pop(0)
+                continue
+            values, left = tried, then
+        if cost(values, left) > (1.0 - ENOUGH) * before:
+            break
+    return values, left, slopes

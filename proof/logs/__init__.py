@@ -1,0 +1,1 @@
+"""What logs of everyday motions tell of hidden robots."""
