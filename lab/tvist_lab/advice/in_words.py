@@ -97,10 +97,8 @@ def _reasons(advice: Advice, best: Option) -> list[str]:
         others.append(f"motions slowed by the same time {advice.slowed_percent:.0f} %, by the modes")
     said = [f"Instead of a shaper, {' and '.join(others)}."] if others else []
     if best.aim.optimistic:
-        said.append(
-            f"{counted(len(best.aim.optimistic), 'motion')} have no repetition: predicted from their own modes, which is "
-            "optimistic."
-        )
+        many = counted(len(best.aim.optimistic), "motion")
+        said.append(f"Without repetitions, {many} are predicted from their own modes, which is optimistic.")
     return said
 
 

@@ -176,17 +176,8 @@ def _held_out(stops: Sequence[Stop], count: int) -> tuple[dict[Stop, Modes], fro
     """Modes of each stop, found in the other half of the stops; and the stop itself if it is the only one."""
     if len(stops) == 1:
         return {stops[0]: best_modes(stops, count)}, frozenset(stops)
-    places: dict[int, int] = {}
-    halves: dict[Stop, int] = {}
-    alone = 0
-    for stop in stops:
-        places[stop.group] = places.get(stop.group, -1) + 1
-        halves[stop] = places[stop.group] % 2
-    for stop in stops:  # motions without repetitions are divided among the halves
-        if places[stop.group] == 0:
-            halves[stop], alone = alone % 2, alone + 1
-    if len(set(halves.values())) == 1:  # a single motion that is alone beside none
-        halves[stops[-1]] = 1 - halves[stops[-1]]
+    ordered = sorted(stops, key=lambda one: one.group)  # so that each half has its share of the repetitions
+    halves = {stop: place % 2 for place, stop in enumerate(ordered)}
     found = [best_modes([one for one in stops if halves[one] != half], count) for half in (0, 1)]
     return {stop: found[halves[stop]] for stop in stops}, frozenset()
 

@@ -1,8 +1,8 @@
 """Vibration that an arm's gears excite, which no shaper of the reference takes away.
 
-A strain wave gear has a kinematic error with two waves for each turn of its motor. While the arm brakes, their frequency
-falls through that of each mode. What they excite depends on the way of the joints in time, so it is fitted to a recorded
-stop and computed anew along the shaped motion; only the rest of the vibration is shaped.
+A strain wave gear has a kinematic error with two waves for each turn of its motor. While the arm brakes, their
+frequency falls through that of each mode. What they excite depends on the way of the joints in time: it is fitted to a
+recorded stop and computed anew along the shaped motion, and only the rest of the vibration is shaped.
 """
 
 from collections.abc import Iterator, Sequence

@@ -32,9 +32,7 @@ SAME_DURATION = 0.05
 LOUD = 3.0
 """Least rms of a vibration over that of the sensor's noise [-]."""
 NONLINEAR = 0.05
-"""Share that is left even where a sum leaves nothing [-]: f_d rises by 3 % as a real UR5 rings down, for which zv leaves
-5 %.
-"""
+"""Share that is left in any case: f_d of a real UR5 rises by 3 % as it rings down, for which zv leaves 5 % [-]."""
 FELT = 0.05
 """Least rms of a vibration that is worth a shaper [m/s²]."""
 
@@ -111,9 +109,8 @@ class Stop:
 
     def repeats(self, other: "Stop") -> bool:
         """Whether both are the same motion at the same speed."""
-        return self.way.corresponds(other.way) and bool(
-            abs(self.duration / other.duration - 1.0) < SAME_DURATION
-        )
+        longer = bool(abs(self.duration / other.duration - 1.0) >= SAME_DURATION)
+        return not longer and self.way.corresponds(other.way)
 
     @cached_property
     def unshaped(self) -> Left:

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from tvist_lab.advice import ROBOT, Advice, Option
+from tvist_lab.advice import Advice, Option
 from tvist_lab.advice.options import impulses_of
 from tvist_lab.advice.slower import smoothed
 from tvist_lab.figures.style import (
@@ -74,7 +74,6 @@ def cost_figure(advice: Advice) -> Figure:
     means = [[smoothed(stop, float(time)) for stop in advice.ringing] for time in times]
     line = [np.median([value for value in each if value is not None] or [np.nan]) for each in means]
     panel.plot(1e3 * times, line, color=MUTED, linewidth=1.4, linestyle=(0, (5, 2)), label="smoothing alone")
-    robots = [one for one in fair if one.aim.scope == ROBOT]
     for count, color, marker in ((1, OF_SHAPED.color, "o"), (2, THIRD, "s")):
         of_count = [one for one in fair if one.count == count]
         if of_count:
@@ -82,9 +81,6 @@ def cost_figure(advice: Advice) -> Figure:
             panel.plot(
                 x, y, marker, color=color, markersize=6, label=f"{count} mode{'s' if count > 1 else ''}"
             )
-    if robots:
-        x, y = [1e3 * one.added_s for one in robots], [one.left_percent for one in robots]
-        panel.plot(x, y, "o", color="white", markersize=2.5, zorder=3)
     for option in _front(fair, advice.best):
         note(
             panel,
