@@ -82,6 +82,9 @@ def _parser() -> argparse.ArgumentParser:
     bound.add_argument(
         "--shapers", nargs="+", help="Shapers to compare [zv auto auto-target planned elastic elastic-16]."
     )
+    advice = part(_advice, "advice", "Compare what tvist log advise predicts with what hidden robots then do.")
+    advice.add_argument("--robots", type=_up_to(1000), default=5, help="Hidden robots of each of two arms [5].")
+    advice.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one.")
     return parser
 
 
@@ -165,6 +168,14 @@ def _bound(given: argparse.Namespace) -> int:
     if unknown := set(given.shapers or ()) - set(BUILT_IN.names()):
         given.refuse(f"there is no shaper {min(unknown)}")
     result = report(compare(given.random, given.seed, given.shapers or SHAPERS))
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _advice(given: argparse.Namespace) -> int:
+    from proof.advice.hidden import report, tables
+
+    result = report(given.robots, given.seed, _tell)
     _print(result, given.json, tables(result))
     return 0
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from tvist_lab.metrics.ring_down import decay_rate
@@ -16,12 +17,16 @@ from tvist_lab.recordings import Floats
 
 WAVES = 202.0
 """Waves of the error for a turn of a joint: of gears with a ratio of 101, as most of UR's [-]."""
-WINDOW = (-0.4, 0.5)
+WINDOW = (-0.6, 0.5)
 """Time around the stop in which it is fitted [s]."""
 BRAKING = 0.5
 """Weight of the time before the stop, in which the arm's own acceleration is less well described [-]."""
-RIDGE = 0.2
-"""Smallest ripple that is believed, as its share of the noise of a fit of all samples [-]."""
+ERROR = 2e-5
+"""Way of the tool by which the gears' errors may move it: 2e-5 rad at a metre [m]."""
+ALIKE = 15.0
+"""Factor by which neighbouring samples of what a fit leaves are worth less than independent ones [-]."""
+PHASES = (np.sin, np.cos)
+"""Waves in both phases."""
 TURNS = 0.05
 """Smallest way of a joint that counts [rad]."""
 
@@ -62,29 +67,48 @@ def fitted(time: Floats, alpha: Floats, q: Floats, poles: Poles) -> Ripple | Non
         poles: Modes that ring.
 
     Returns:
-        The share; None if no mode or no turning joint is known.
+        The share, in the direction in which the tool swings in each mode; None if no mode or no turning joint is known.
     """
     period, ends = float(time[1] - time[0]), np.array([q.min(axis=0), q.max(axis=0)])
     gears = list(_excited(q, ends, poles, period))
     if not gears:
         return None
-    slow = np.where((time <= 0.0)[:, None], np.vander(time, 4), 0.0)
     counts = (time > WINDOW[0]) & (time < WINDOW[1])
-    columns = np.column_stack([*gears, *_driven(q, poles, period), slow])[counts]
-    scale = np.sqrt(np.mean(columns**2, axis=0)) + 1e-12
     weight = np.where(time[counts] < 0.0, BRAKING, 1.0)[:, None]
-    ridge = np.diag(np.where(np.arange(len(scale)) < len(gears), RIDGE * np.sqrt(len(columns)), 0.0))
-    wanted = np.vstack([weight * alpha[counts], np.zeros((len(scale), 3))])
-    weights = np.linalg.lstsq(np.vstack([weight * columns / scale, ridge]), wanted)[0] / scale[:, None]
-    return Ripple(poles, weights[: len(gears)])
+    slow = np.where((time <= 0.0)[:, None], np.vander(time, 4), 0.0)
+    others = weight * np.column_stack([*_driven(q, poles, period), slow])[counts]
+    others, _ = np.linalg.qr(others / (np.sqrt(np.mean(others**2, axis=0)) + 1e-12))
+    left, waves = weight * alpha[counts], weight * np.column_stack(gears)[counts]
+    left, waves = (one - others @ (others.T @ one) for one in (left, waves))
+    mode = np.resize(np.repeat(np.arange(len(poles)), len(PHASES) * 2), len(gears))
+    ways = _directions(time, alpha, poles)[mode]
+    # A prior for the waves keeps what is merely not described well from being taken for them.
+    prior = np.diag(ALIKE * np.sqrt(np.mean(left**2)) / (ERROR * np.abs(np.array(poles)[mode]) ** 2))
+    columns = np.vstack([*(waves * axis for axis in ways.T), prior])
+    weights = np.linalg.lstsq(columns, np.append(left.T.ravel(), np.zeros(len(gears))))[0]
+    return Ripple(poles, weights[:, None] * ways)
+
+
+def _directions(time: Floats, alpha: Floats, poles: Poles) -> Floats:
+    """Direction in which the tool swings in each mode, shape (modes, 3)."""
+    late = (time > 0.0) & (time < WINDOW[1])
+    waves = [
+        part for pole in poles for wave in [np.exp(pole * time[late])] for part in (wave.real, wave.imag)
+    ]
+    found = np.linalg.lstsq(np.column_stack(waves), alpha[late])[0].reshape(-1, 2, 3)
+    return np.asarray(np.linalg.svd(found)[2][:, 0])
+
+
+def _turning(ends: Floats) -> NDArray[np.intp]:
+    return np.flatnonzero(ends[1] - ends[0] > TURNS)
 
 
 def _excited(q: Floats, ends: Floats, poles: Poles, period: float) -> Iterator[Floats]:
     """Response of each mode to the waves of each joint that turns, in both phases."""
-    for joint in np.flatnonzero(ends[1] - ends[0] > TURNS):
+    for joint in _turning(ends):
         for pole in poles:
-            for wave in (np.sin, np.cos):
-                yield from _response(wave(WAVES * (q[:, joint] - q[-1, joint])), pole, period)
+            for wave in PHASES:
+                yield from _response(wave(WAVES * q[:, joint]), pole, period)
 
 
 def _driven(q: Floats, poles: Poles, period: float) -> Iterator[Floats]:

@@ -5,6 +5,7 @@ the last copy has stopped, only acceleration takes part that was recorded after 
 What the gears excite is no such sum, see `ripple`.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -120,7 +121,7 @@ class Stop:
     @property
     def rings(self) -> bool:
         """Whether vibration stands out of the noise, and would be worth a shaper."""
-        return self.unshaped.rms > max(FELT, LOUD * self.noise**0.5)
+        return self.unshaped.rms > max(FELT, LOUD * math.sqrt(self.noise))
 
     @cached_property
     def _ripple(self) -> Ripple | None:
