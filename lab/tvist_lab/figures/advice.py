@@ -96,7 +96,16 @@ def cost_figure(advice: Advice) -> Figure:
         panel.plot(
             *at, "o", color="none", markeredgecolor=OF_UNSHAPED.color, markersize=15, markeredgewidth=2.4
         )
-        note(panel, _short(best), at, (11, 8), color=OF_UNSHAPED.color, fontweight="bold", bbox=None)
+        note(
+            panel,
+            _short(best),
+            at,
+            (0, -24),
+            color=OF_UNSHAPED.color,
+            fontweight="bold",
+            ha="center",
+            bbox=None,
+        )
     panel.set_yscale("log")
     lowest = 0.7 * max(min(one.left_percent for one in fair), LEAST)
     panel.set(xlim=(0.0, 1.05e3 * longest), ylim=(lowest, 110.0))
