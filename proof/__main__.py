@@ -82,8 +82,12 @@ def _parser() -> argparse.ArgumentParser:
     bound.add_argument(
         "--shapers", nargs="+", help="Shapers to compare [zv auto auto-target planned elastic elastic-16]."
     )
-    advice = part(_advice, "advice", "Compare what tvist log advise predicts with what hidden robots then do.")
-    advice.add_argument("--robots", type=_up_to(1000), default=5, help="Hidden robots of each of two arms [5].")
+    advice = part(
+        _advice, "advice", "Compare what tvist log advise predicts with what hidden robots then do."
+    )
+    advice.add_argument(
+        "--robots", type=_up_to(1000), default=5, help="Hidden robots of each of two arms [5]."
+    )
     advice.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one.")
     return parser
 

@@ -147,6 +147,14 @@ def test_without_an_accelerometer_no_shaper_is_recommended():
     assert "the log has no actual_tool_accelerometer" in verdict(advice, [log])[0]
 
 
+def test_an_accelerometer_that_is_frozen_is_not_taken_for_a_quiet_arm():
+    made = SyntheticLog(modes=(MODE,), motions=2)
+    columns = {"tick": np.arange(len(made.columns["timestamp"]), dtype=float), **made.columns}
+    columns["actual_tool_accelerometer"] = np.tile([0.0, 0.0, 9.8], (len(columns["tick"]), 1))
+    log = Measured.of(Recording(columns, foreign=True))
+    assert "the same value" in verdict(advise([log]), [log])[0]
+
+
 def test_joints_that_swing_together_give_a_frequency_that_is_called_weak():
     made = SyntheticLog(modes=(MODE,), motions=4, encoder=1e-6)
     time = made.columns["timestamp"]

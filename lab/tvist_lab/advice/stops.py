@@ -86,6 +86,8 @@ class Stop:
             raise NotMeasurableError(
                 f"only {rest:.2f} s of rest were recorded, {LATE + COUNTED[0] + TAIL:g} s are needed"
             )
+        if not np.ptp(alpha[time > 0.0], axis=0).any():
+            raise NotMeasurableError("the accelerometer shows the same value throughout the rest")
         even = np.arange(time[0], time[-1], recording.period)
         alpha = _at(even, time, low_pass_at(time, alpha, recording.period))
         name = next(one for one in ("reference_q", "target_q", "actual_q") if one in recording)
