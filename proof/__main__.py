@@ -117,6 +117,13 @@ def _parser() -> argparse.ArgumentParser:
     logs.add_argument(
         "--no-twins", action="store_true", help="Fit no twins, which takes minutes for each robot."
     )
+    advice = part(
+        _advice, "advice", "Compare what tvist log advise predicts with what hidden robots then do."
+    )
+    advice.add_argument(
+        "--robots", type=_up_to(1000), default=5, help="Hidden robots of each of two arms [5]."
+    )
+    advice.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one.")
     return parser
 
 
@@ -232,6 +239,14 @@ def _logs(given: argparse.Namespace) -> int:
     from proof.logs.report import report, tables
 
     result = report(given.robot, given.hidden, given.seed, _tell, twins=not given.no_twins)
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _advice(given: argparse.Namespace) -> int:
+    from proof.advice.hidden import report, tables
+
+    result = report(given.robots, given.seed, _tell)
     _print(result, given.json, tables(result))
     return 0
 

@@ -25,6 +25,7 @@ LOG = {
     "record": "Record a served robot as MCAP.",
     "info": "Print what a recording holds.",
     "analyze": "Measure the motions of a recording, or of another robot's log.",
+    "advise": "Say from logs what rings, and which shaper to take.",
     "compare": "Compare two recordings of the same motions, motion by motion.",
     "report": "Write a web page about recordings: a verdict, tables and figures in one file.",
     "export": "Write a recording as CSV, Parquet, npz or mat, or for Foxglove.",

@@ -16,7 +16,7 @@ from tvist_lab.metrics.comparison import ComparedMotion, Comparison, compare
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.motion import MotionRows, motions
-from tvist_lab.metrics.pairing import Pair, pairs
+from tvist_lab.metrics.pairing import Pair, pairs, shaper_of
 from tvist_lab.metrics.predicted import Predicted, predicted
 from tvist_lab.metrics.residual import Residual, residual
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
@@ -71,6 +71,7 @@ __all__ = [
     "residual",
     "rigid_acceleration",
     "settling",
+    "shaper_of",
     "still_after",
     "still_driven",
     "table_2",

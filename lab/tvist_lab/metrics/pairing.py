@@ -44,7 +44,7 @@ def pairs(measured: Measured) -> list[Pair]:
     recording, found = measured.recording, measured.motions
     if REFERENCE not in recording:
         return []
-    shapers = [_shaper(recording, motion, measured.results[place].delay_ms)
+    shapers = [shaper_of(recording, motion, measured.results[place].delay_ms)
                for place, motion in enumerate(found)]  # fmt: skip
     taken: set[tuple[int, str]] = set()
     made = []
@@ -74,8 +74,14 @@ def _peak(measured: Measured, place: int) -> float | None:
         return None
 
 
-def _shaper(recording: Recording, motion: MotionRows, delay: float | None) -> str | None:
-    """Name of the shaper of a motion, empty if it is not known; None if there was none."""
+def shaper_of(recording: Recording, motion: MotionRows, delay: float | None) -> str | None:
+    """Return the name of the shaper of a motion, empty if it is not known; None if there was none.
+
+    Args:
+        recording: The recording.
+        motion: One of its motions.
+        delay: Time by which its target ends after its reference [ms]; None if the log has no such reference.
+    """
     tick = recording["tick"][motion.start] if "tick" in recording else np.inf
     told = [one.why for one in recording.events if one.kind == "shaper_changed" and one.tick <= tick + 1]
     if told:

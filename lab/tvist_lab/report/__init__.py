@@ -1,5 +1,6 @@
 """Reports: one self-contained web page each, with a verdict in a sentence, tables, figures and provenance."""
 
+from tvist_lab.report.of_advice import advice_page
 from tvist_lab.report.of_programs import programs_page
 from tvist_lab.report.of_recordings import recordings_page, recordings_verdict
 from tvist_lab.report.of_studies import evaluation_page, shaperbench_page, study_page
@@ -10,6 +11,7 @@ __all__ = [
     "PageTable",
     "Picture",
     "Section",
+    "advice_page",
     "evaluation_page",
     "programs_page",
     "recordings_page",

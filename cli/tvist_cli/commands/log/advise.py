@@ -1,0 +1,65 @@
+"""`tvist log advise`: say from logs what rings, and which shaper to take."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from tvist_cli.failure import Failure
+from tvist_cli.log_options import AS_IT_IS, LogOptions
+from tvist_cli.output import out, print_json, progress, say, table, typed, write_report
+
+
+def advise(
+    *files: Path,
+    output: Path | None = None,
+    force: bool = False,
+    logs: LogOptions = AS_IT_IS,
+    json: bool = False,
+) -> None:
+    """Say from a robot's logs what rings after its motions, what each shaper would leave, and which one to take.
+
+    The recorded acceleration is convolved with each shaper. Motions made with a shaper are told apart where the log
+    shows it. Record each motion two or three times, with a second of rest after it.
+
+    Args:
+        files: Recordings or logs of one robot in any format that tvist log analyze reads.
+        output: Web page to write, in one file, with the two figures that show why.
+        force: Replace an existing page.
+        logs: How to read logs.
+        json: Print one JSON object with all figures of each shaper and motion.
+    """
+    if not files:
+        raise Failure("advise needs at least one recording or log: tvist log advise run.mcap", code=2)
+    if output is not None and output.exists() and not force:
+        raise Failure(f"{output} exists already: give --force to replace it, or another --output")
+    from tvist_lab.advice import advise as advised
+    from tvist_lab.advice import as_dict, command, verdict
+    from tvist_lab.metrics import Measured
+    from tvist_lab.report.of_advice import MODES, OPTIONS, advice_page, modes_rows, option_rows
+
+    measured = []
+    with progress(len(files), "logs") as bar:
+        for recording in logs.read(*files):
+            measured.append(Measured.of(recording))
+            bar(1, None)
+    notes = [
+        f"{file}: {note}" for file, log in zip(files, measured, strict=True) for note in log.recording.notes
+    ]
+    advice = advised(measured)
+    notes += [f"{files[place]}, motion {number}: {why}" for place, number, why in advice.refused]
+    for note in notes:
+        say(note)
+    if output is not None:
+        write_report(output, advice_page(advice, measured, files, typed()))
+    if json:
+        print_json({"files": [str(file) for file in files], **as_dict(advice, measured)})
+        return
+    _print("what rings", MODES, modes_rows(advice))
+    _print("what shapers would leave", OPTIONS, option_rows(advice))
+    for sentence in (*verdict(advice, measured), *command(advice, measured)):
+        out.print(sentence)
+
+
+def _print(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    if rows:
+        cells = [[cell.replace("\n", " ") for cell in row] for row in rows]
+        table(title, [head.replace("\n", " ") for head in heads], cells)

@@ -1,0 +1,21 @@
+"""Advice on shapers from logs: what rings, what each shaper would leave, and which one to take."""
+
+from tvist_lab.advice.advise import Advice, RingingMode, advise
+from tvist_lab.advice.in_words import as_dict, command, verdict
+from tvist_lab.advice.options import EACH, ONE, ROBOT, Option
+from tvist_lab.advice.stops import Left, Stop
+
+__all__ = [
+    "EACH",
+    "ONE",
+    "ROBOT",
+    "Advice",
+    "Left",
+    "Option",
+    "RingingMode",
+    "Stop",
+    "advise",
+    "as_dict",
+    "command",
+    "verdict",
+]

@@ -1,0 +1,164 @@
+"""Advice for a robot that shakes, from logs of its motions: what rings, and which shaper to take."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import NamedTuple
+
+from tvist_lab.advice.options import EACH, ONE, ROBOT, Option, options
+from tvist_lab.advice.slower import slowed, smoothed
+from tvist_lab.advice.stops import Stop, grouped
+from tvist_lab.advice.weak import frequency_of_joints
+from tvist_lab.metrics import Measured, NotMeasurableError, shaper_of
+from tvist_lab.metrics.agreed_modes import NEAR
+from tvist_lab.recordings.recording import MissingColumnError
+
+EARLY = 0.15
+"""Time by which a shaper may be still later than the earliest one, over the time until still without any [-]."""
+CLOSE = 5.0
+"""Vibration that it may leave beyond the least of these [%]."""
+SIMPLE = (ROBOT, ONE, EACH)
+"""Where modes can come from, the simplest first."""
+
+
+class RingingMode(NamedTuple):
+    """A mode that motions have in common."""
+
+    f_d: float
+    """Median of the damped frequencies [Hz]."""
+    f_d_interval: tuple[float, float]
+    """From the lowest to the highest end of the motions' 95 % intervals [Hz]."""
+    zeta: float
+    """Median of the damping ratios [-]."""
+    zeta_interval: tuple[float, float]
+    """The same of the damping ratios [-]."""
+    motions: int
+    """Number of motions that ring in it."""
+    amplitude: float
+    """Largest |α| of it at a stop [m/s²]."""
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What logs say about vibration, and what to do."""
+
+    ringing: Sequence[Stop]
+    """Unshaped stops whose vibration stands out."""
+    quiet: Sequence[Stop]
+    """Unshaped stops after which nothing noticeable is felt."""
+    shaped: Sequence[tuple[int, int, str]]
+    """Motions that had a shaper already: place of the file, number in it, and the shaper's name, as far as known."""
+    refused: Sequence[tuple[int, int, str]]
+    """Motions that could not be measured, and why."""
+    modes: Sequence[RingingMode]
+    """Modes that ring, the one of most motions first."""
+    options: Sequence[Option]
+    """All shapers, the one that is still first before the others."""
+    best: Option | None
+    """The one to take; None if none brings anything."""
+    smoothed_percent: float | None = None
+    """What a running mean as long as the best shaper would leave, median [%]."""
+    slowed_percent: float | None = None
+    """What slower limits that cost the same time would leave, by the modes, median [%]."""
+    weak: tuple[float, int] | None = None
+    """Frequency by the joints alone [Hz], and the number of motions that show it, where nothing felt the tool."""
+
+    @property
+    def still_s(self) -> float:
+        """Median of the time from a stop until still, without a shaper [s]; infinite if not within the rest."""
+        return median(one.unshaped.still for one in self.ringing)
+
+
+def advise(logs: Sequence[Measured]) -> Advice:
+    """Judge by logs which shaper a robot needs.
+
+    Args:
+        logs: Measured logs of one robot, at least one.
+    """
+    stops, shaped, refused = _sorted_out(logs)
+    loud = [one for one in stops if one.rings]
+    quiet = [one for one in stops if not one.rings]
+    weak = frequency_of_joints(logs) if not stops and not shaped else None
+    if not loud:
+        return Advice((), quiet, shaped, refused, (), (), None, weak=weak)
+    found = sorted(options(loud), key=lambda one: (one.still_s, one.left_percent))
+    best = recommended(found, median(one.unshaped.still for one in loud))
+    smooth = slow = None
+    if best is not None:
+        smooth = _median(smoothed(one, best.added[one]) for one in loud)
+        slow = _median(slowed(one, best.added[one]) for one in loud)
+    return Advice(loud, quiet, shaped, refused, ringing_modes(loud), found, best, smooth, slow)
+
+
+def _sorted_out(
+    logs: Sequence[Measured],
+) -> tuple[list[Stop], list[tuple[int, int, str]], list[tuple[int, int, str]]]:
+    """Unshaped stops, motions that had a shaper, and motions that cannot be measured."""
+    stops, shaped, refused = [], [], []
+    for file, log in enumerate(logs):
+        for place, motion in enumerate(log.motions):
+            shaper = shaper_of(log.recording, motion, log.results[place].delay_ms)
+            if shaper is not None:
+                shaped.append((file, place + 1, shaper))
+                continue
+            if motion.stopped:
+                refused.append((file, place + 1, "it was stopped before its target"))
+                continue
+            try:
+                stops.append(Stop.of(log, place, file))
+            except NotMeasurableError as error:
+                refused.append((file, place + 1, str(error)))
+            except MissingColumnError as error:
+                refused.append((file, place + 1, f"the log has no {error.column}"))
+    return grouped(stops), shaped, refused
+
+
+def recommended(found: Sequence[Option], still: float) -> Option | None:
+    """Choose among shapers that keep the limits.
+
+    Of those that are still about as early as the earliest, and leave about as little as the least, it takes the one
+    that needs to know least about the modes, and of these the shortest.
+
+    Args:
+        found: The options.
+        still: Time until still without a shaper [s].
+    """
+    fair = [one for one in found if one.keeps_limits and one.left_percent < 100.0 - CLOSE]
+    if not fair:
+        return None
+    earliest = min(one.still_s for one in fair)
+    fair = [one for one in fair if one.still_s <= earliest + (EARLY * still if still < float("inf") else 0.0)]
+    least = min(one.left_percent for one in fair)
+    fair = [one for one in fair if one.left_percent <= least + CLOSE]
+    return min(fair, key=lambda one: (SIMPLE.index(one.aim.scope), one.added_s, one.left_percent))
+
+
+def ringing_modes(stops: Sequence[Stop]) -> list[RingingMode]:
+    """Gather the modes of stops that differ by at most 7 % in frequency, the one of most motions first."""
+    pool = [(place, mode) for place, one in enumerate(stops) for mode in one.result.modes]
+    found = []
+    while pool:
+        near = [
+            [one for one in pool if abs(one[1]["f_d_hz"] / middle["f_d_hz"] - 1.0) <= NEAR]
+            for _, middle in pool
+        ]
+        group = max(
+            near, key=lambda one: (len({place for place, _ in one}), max(m["amplitude"] for _, m in one))
+        )
+        pool = [one for one in pool if one not in group]
+        modes = [mode for _, mode in group]
+        ends = [
+            (min(mode[name][0] for mode in modes), max(mode[name][1] for mode in modes))
+            for name in ("interval", "zeta_interval")
+        ]
+        f_d, zeta = (median(mode[name] for mode in modes) for name in ("f_d_hz", "zeta"))
+        count = len({place for place, _ in group})
+        found.append(
+            RingingMode(f_d, ends[0], zeta, ends[1], count, max(mode["amplitude"] for mode in modes))
+        )
+    return found
+
+
+def _median(values: Iterable[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return median(known) if known else None

@@ -1,0 +1,183 @@
+"""An advice in sentences, with the command that follows it, and as plain values."""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+from tvist_lab.advice.advise import Advice
+from tvist_lab.advice.options import EACH, ROBOT, Modes, Option
+from tvist_lab.metrics import Measured
+from tvist_lab.words import counted, spread
+
+NEVER = "beyond the recorded rest"
+NAMED = 3
+"""Largest number of modes that a sentence names."""
+
+
+def verdict(advice: Advice, logs: Sequence[Measured]) -> list[str]:
+    """Return what to do in a sentence, and what that rests on in some more.
+
+    Args:
+        advice: The advice.
+        logs: The logs that it was made from.
+    """
+    said = [_first(advice)]
+    if advice.ringing:
+        said.append(_ringing(advice))
+    if advice.best is not None:
+        said += _reasons(advice, advice.best)
+    if advice.shaped:
+        names = ", ".join(sorted({name for *_, name in advice.shaped if name})) or "a shaper"
+        said.append(
+            f"{counted(len(advice.shaped), 'motion')} made with {names} already: not counted as unshaped."
+        )
+    if any(_untold(log) for log in logs):
+        said.append(
+            "A log without the reference before shaping cannot show whether a shaper was on: it must have been off."
+        )
+    return said
+
+
+def _untold(log: Measured) -> bool:
+    return log.recording.foreign and "reference_q" not in log.recording
+
+
+def _first(advice: Advice) -> str:
+    best, measured = advice.best, len(advice.ringing) + len(advice.quiet)
+    if best is not None:
+        aim = (
+            _against(best.aim.modes[_worst_group(advice)])
+            if best.aim.scope != ROBOT
+            else "with its calibration"
+        )
+        each = ", and the like before other motions" if best.aim.scope == EACH else ""
+        lead = f"Use {best.shaper} {aim}{each}: it leaves {best.left_percent:.0f} % of the vibration after a stop"
+        gain = advice.still_s - best.still_s
+        sooner = ""
+        if math.isfinite(gain) and abs(gain) >= 0.01:
+            sooner = (
+                f", and the tool is still {abs(1e3 * gain):.0f} ms {'earlier' if gain > 0.0 else 'later'}"
+            )
+        return f"{lead}{sooner}, for motions that end {1e3 * best.added_s:.0f} ms later."
+    if advice.ringing:
+        return "No shaper that keeps the arm's limits would help: change the motions or the mount."
+    if advice.quiet:
+        return f"Nothing to do: nothing rings noticeably after {counted(measured, 'unshaped stop')}."
+    if advice.shaped:
+        return "No advice: every motion had a shaper already. Record the same motions without one."
+    if advice.weak is not None:
+        f_d, count = advice.weak
+        return (
+            f"No advice: nothing felt the tool. After {counted(count, 'stop')} the joints swing at about {f_d:.1f} Hz, "
+            "which is weak evidence: record the tool's acceleration."
+        )
+    why = Counter(reason for *_, reason in advice.refused).most_common(1)
+    reason = f" ({why[0][0]})" if why else ""
+    return f"No advice: no stop could be measured{reason}. Record the tool's acceleration, and rests of a second."
+
+
+def _ringing(advice: Advice) -> str:
+    stills = [one.unshaped.still for one in advice.ringing]
+    known = [1e3 * still for still in stills if math.isfinite(still)]
+    many = counted(len(advice.ringing) + len(advice.quiet), "unshaped stop")
+    modes = " and ".join(
+        f"{one.f_d:.1f} Hz (ζ {one.zeta:.2f}, {one.motions} of them)" for one in advice.modes[:NAMED]
+    )
+    until = f", still {spread(known, 'ms')} after the stop" if known else ""
+    later = f", {len(stills) - len(known)} only {NEVER}" if len(known) < len(stills) else ""
+    return f"{len(advice.ringing)} of {many} ring{f' at {modes}' if modes else ''}{until}{later}."
+
+
+def _reasons(advice: Advice, best: Option) -> list[str]:
+    others = []
+    if advice.smoothed_percent is not None:
+        others.append(f"a reference smoothed over the same time would leave {advice.smoothed_percent:.0f} %")
+    if advice.slowed_percent is not None:
+        others.append(f"motions slowed by the same time {advice.slowed_percent:.0f} %, by the modes")
+    said = [f"Instead of a shaper, {' and '.join(others)}."] if others else []
+    if best.aim.optimistic:
+        many = counted(len(best.aim.optimistic), "motion")
+        said.append(f"Without repetitions, {many} are predicted from their own modes, which is optimistic.")
+    return said
+
+
+def _worst_group(advice: Advice) -> int:
+    return max(advice.ringing, key=lambda one: one.unshaped.rms).group
+
+
+def _against(modes: Modes) -> str:
+    return f"against {' and '.join(f'{f_d:.1f} Hz (ζ {zeta:.2f})' for f_d, zeta in modes)}"
+
+
+def command(advice: Advice, logs: Sequence[Measured]) -> list[str]:
+    """Return the lines that apply an advice; none if there is nothing to apply.
+
+    A robot of this controller is told over the network, another one's reference goes through the library.
+    """
+    best = advice.best
+    if best is None:
+        return []
+    if best.aim.scope == ROBOT:
+        if best.count == 1:
+            return [f"tvist serve --shaper {best.shaper}"]
+        return [f'await arm.set_shaper("{best.shaper}", modes={best.count})']
+    ours = not any(log.recording.foreign for log in logs)
+    lines = []
+    for group, modes in best.aim.modes.items():
+        f_d, zeta = ([round(value, 3) for value in values] for values in zip(*modes, strict=True))
+        if ours:
+            lines.append(f'await arm.set_estimator("fixed", f_d={f_d}, zeta={zeta})')
+        else:
+            lines.append(
+                f'shaped = make_filter("{best.shaper}", Fixed(f_d={f_d}, zeta={zeta}), joints={_joints(logs)})'
+            )
+        if best.aim.scope != EACH:
+            break
+        numbers = sorted({one.number for one in advice.ringing if one.group == group})
+        lines[-1] += f"  # before motion {', '.join(map(str, numbers))}"
+    return [*lines, f'await arm.set_shaper("{best.shaper}", modes={best.count})'] if ours else lines
+
+
+def _joints(logs: Sequence[Measured]) -> int:
+    recording = logs[0].recording
+    return int(recording["target_q" if "target_q" in recording else "actual_q"].shape[1])
+
+
+def as_dict(advice: Advice, logs: Sequence[Measured]) -> dict[str, Any]:
+    """Convert an advice to plain values, as `tvist log advise --json` prints it."""
+    return {
+        "verdict": verdict(advice, logs),
+        "command": command(advice, logs),
+        "recommended": None if advice.best is None else _option(advice.best),
+        "smoothed_percent": advice.smoothed_percent,
+        "slowed_percent": advice.slowed_percent,
+        "modes": [one._asdict() for one in advice.modes],
+        "stops": [
+            {"file": one.file, "motion": one.number, "same_motion": one.group, "rings": one in advice.ringing,
+             "rms_m_s2": one.unshaped.rms, "still_s": _finite(one.unshaped.still)}
+            for one in (*advice.ringing, *advice.quiet)
+        ],
+        "shaped": [dict(zip(("file", "motion", "shaper"), one, strict=True)) for one in advice.shaped],
+        "refused": [dict(zip(("file", "motion", "reason"), one, strict=True)) for one in advice.refused],
+        "weak_f_d_hz": None if advice.weak is None else advice.weak[0],
+        "options": [_option(one) for one in advice.options],
+    }  # fmt: skip
+
+
+def _option(one: Option) -> dict[str, Any]:
+    by_modes = one.modes_percent
+    return {
+        "shaper": one.shaper, "modes": one.count, "aim": one.aim.scope, "keeps_limits": one.keeps_limits,
+        "added_s": one.added_s, "left_percent": one.left_percent, "left_by_modes_percent": by_modes,
+        "still_s": _finite(one.still_s), "optimistic": len(one.aim.optimistic),
+        "aimed_at": {str(group): [list(mode) for mode in modes] for group, modes in one.aim.modes.items()},
+        "motions": [
+            {"file": stop.file, "motion": stop.number, "left_percent": percent}
+            for stop, percent in one.percent.items()
+        ],
+    }  # fmt: skip
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,230 @@
+"""Shapers that could be used, each aimed at modes that were found in other motions than those it is judged by."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from statistics import median
+
+import numpy as np
+from scipy.optimize import minimize
+
+from tvist_lab.advice.stops import Left, Stop, shaped_by
+from tvist_lab.metrics import NotMeasurableError
+from tvist_lab.metrics.ring_down import decay_rate
+from tvist_lab.recordings import Floats
+from tvist_shaping import SHAPERS, Impulses, ShapingError, product, residual
+
+Modes = tuple[tuple[float, float], ...]
+"""(f_d, ζ) of each mode, the lowest first [Hz, -]."""
+BEGIN = (0.05, 0.2)
+"""Damping ratios at which a search may begin [-]."""
+DAMPED = (0.005, 0.4)
+"""Range of damping ratios that are searched [-]."""
+BESIDE = (0.7, 1.4)
+"""Range of frequencies that are searched, over the lowest and the highest of the modes of a fit [-]."""
+ANY = (5.0, 25.0)
+"""The same where no modes are known [Hz]."""
+TRIALS = 60
+"""Largest number of steps of a search for each mode."""
+ENOUGH = 12
+"""Largest number of stops from which modes are found: of more, the loudest."""
+ONE, EACH, ROBOT = "one for all", "each its own", "the robot's calibration"
+"""Where the modes come from: the same for all motions, others for each motion, what the robot estimated itself."""
+
+
+@dataclass(frozen=True)
+class Aim:
+    """Modes against which a shaper is made, motion by motion."""
+
+    scope: str
+    """`ONE`, `EACH` or `ROBOT`."""
+    modes: Mapping[int, Modes]
+    """Number of the motion to the modes to use from now on."""
+    judged: Mapping[Stop, Modes]
+    """Stop to modes that were found without it, where there are repetitions."""
+    optimistic: frozenset[Stop] = frozenset()
+    """Stops whose modes were found in themselves, since nothing else was recorded."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """A shaper, aimed."""
+
+    shaper: str
+    aim: Aim
+    left: Mapping[Stop, Left]
+    """What it would leave after each stop, by convolution."""
+    by_modes: Mapping[Stop, float]
+    """The same by the modes of each stop, as a share of the energy's root [-]; only where modes are known."""
+    added: Mapping[Stop, float]
+    """Time by which each motion ends later [s]."""
+
+    @property
+    def count(self) -> int:
+        """Number of modes."""
+        return len(next(iter(self.aim.modes.values())))
+
+    @property
+    def name(self) -> str:
+        """The shaper with the number of modes."""
+        return f"{self.shaper}, {self.count} mode{'' if self.count == 1 else 's'}"
+
+    @cached_property
+    def percent(self) -> Mapping[Stop, float]:
+        """Return the rms that it would leave after each stop, over that unshaped [%]."""
+        return {stop: 100.0 * left.rms / stop.unshaped.rms for stop, left in self.left.items()}
+
+    @property
+    def left_percent(self) -> float:
+        """Median of these [%]."""
+        return median(self.percent.values())
+
+    @property
+    def modes_percent(self) -> float | None:
+        """Median of what is left by the modes [%]; None where none are known."""
+        return 100.0 * median(self.by_modes.values()) if self.by_modes else None
+
+    @property
+    def added_s(self) -> float:
+        """Median of the time that it adds [s]."""
+        return median(self.added.values())
+
+    @property
+    def still_s(self) -> float:
+        """Median of the time from the unshaped stop until still [s]; infinite if that was not within the rest."""
+        return median(left.still for left in self.left.values())
+
+    @property
+    def keeps_limits(self) -> bool:
+        """Whether the shaped motion keeps the limits of velocity and acceleration that the unshaped one kept."""
+        return SHAPERS[self.shaper].peak <= 1.0
+
+
+def impulses_of(shaper: str, modes: Modes) -> Impulses:
+    """Impulses of a shaper of the catalogue for modes.
+
+    Raises:
+        ShaperRangeError: A mode has more damping than the shaper is defined for.
+    """
+    return product([SHAPERS[shaper].function(f_d, zeta) for f_d, zeta in modes])
+
+
+def options(stops: Sequence[Stop]) -> list[Option]:
+    """Judge every shaper of the catalogue by stops that ring, at least one; those that fit none are left out."""
+    return [
+        option
+        for aim in _aims(stops)
+        for name in SHAPERS
+        if name != "none" and (option := _judged(name, aim)) is not None
+    ]
+
+
+def _judged(name: str, aim: Aim) -> Option | None:
+    left, by_modes, added = {}, {}, {}
+    for stop, modes in aim.judged.items():
+        try:
+            impulses = impulses_of(name, modes)
+            left[stop] = shaped_by(stop, impulses)
+        except (NotMeasurableError, ShapingError):
+            return None  # one that some motion cannot be judged by is no choice for all
+        added[stop] = float(impulses.tau[-1])
+        if (share := by_the_modes(stop, impulses)) is not None:
+            by_modes[stop] = share
+    return Option(name, aim, left, by_modes, added)
+
+
+def by_the_modes(stop: Stop, impulses: Impulses) -> float | None:
+    """Root of the share of a stop's modes' energy that impulses leave [-]; None if no modes are known."""
+    before = after = 0.0
+    for mode in stop.result.modes:
+        f_d, zeta = mode["f_d_hz"], mode["zeta"]
+        energy = mode["amplitude"] ** 2 / decay_rate(f_d, zeta)
+        before += energy
+        after += energy * float(residual(f_d, zeta, impulses)) ** 2
+    return math.sqrt(after / before) if before > 0.0 else None
+
+
+def _aims(stops: Sequence[Stop]) -> list[Aim]:
+    groups = {group: [one for one in stops if one.group == group] for group in {one.group for one in stops}}
+    aims = []
+    for count in (1, 2):
+        of_all = best_modes(stops, count)
+        aims.append(Aim(ONE, dict.fromkeys(groups, of_all), *_held_out(stops, count)))
+        if len(groups) > 1:
+            parts = [_held_out(of_one, count) for of_one in groups.values()]
+            judged = {stop: modes for part, _ in parts for stop, modes in part.items()}
+            own = {group: best_modes(of_one, count) for group, of_one in groups.items()}
+            aims.append(Aim(EACH, own, judged, frozenset().union(*(few for _, few in parts))))
+    if all("estimated_f_d" in one.measured.recording for one in stops):
+        told = {stop: _estimated(stop) for stop in stops}
+        if all(told.values()):
+            aims.append(Aim(ROBOT, {one.group: modes for one, modes in told.items()}, told))
+    return aims
+
+
+def _estimated(stop: Stop) -> Modes:
+    """Modes that the robot itself estimated where a motion ended; none if it had no calibration."""
+    recording, row = stop.measured.recording, stop.motion.shaped_stop
+    f_d, zeta = (recording[name][row] for name in ("estimated_f_d", "estimated_zeta"))
+    info = recording.info
+    known = np.isfinite(f_d).all() and (info is None or getattr(info, "calibration", "") is not None)
+    return tuple(zip(f_d.tolist(), zeta.tolist(), strict=True)) if known else ()
+
+
+def _held_out(stops: Sequence[Stop], count: int) -> tuple[dict[Stop, Modes], frozenset[Stop]]:
+    """Modes of each stop, found in the other half of the stops; and the stop itself if it is the only one."""
+    if len(stops) == 1:
+        return {stops[0]: best_modes(stops, count)}, frozenset(stops)
+    ordered = sorted(stops, key=lambda one: one.group)  # so that each half has its share of the repetitions
+    halves = {stop: place % 2 for place, stop in enumerate(ordered)}
+    found = [best_modes([one for one in stops if halves[one] != half], count) for half in (0, 1)]
+    return {stop: found[halves[stop]] for stop in stops}, frozenset()
+
+
+def best_modes(stops: Sequence[Stop], count: int) -> Modes:
+    """Find the modes for which zero-vibration shapers would leave least of some stops.
+
+    They are better for shaping than the modes of a fit: where an arm has more modes than a shaper, the best aim lies
+    between them.
+
+    Args:
+        stops: At least one stop.
+        count: Number of modes.
+
+    Returns:
+        The modes, the lowest first.
+    """
+    loudest = sorted(stops, key=lambda one: -one.unshaped.rms)[:ENOUGH]
+    before = sum(one.unshaped.rms**2 for one in loudest)
+
+    def cost(modes: Modes) -> float:
+        try:
+            return (
+                sum(shaped_by(one, impulses_of("zv", modes), gears=False).rms ** 2 for one in loudest)
+                / before
+            )
+        except NotMeasurableError:
+            return 1.0
+
+    seen = [mode["f_d_hz"] for one in loudest for mode in one.result.modes]
+    low, high = (
+        (share * end for share, end in zip(BESIDE, (min(seen), max(seen)), strict=True)) if seen else ANY
+    )
+    grid = [(float(f_d), zeta) for f_d in np.geomspace(low, high, 20) for zeta in BEGIN]
+    found: Modes = ()
+    for _ in range(count):
+        first = min(grid, key=lambda mode: cost((*found, mode)))
+        found = _refined((*found, first), cost, (low, high))
+    return tuple(sorted(found))
+
+
+def _refined(start: Modes, cost: Callable[[Modes], float], between: tuple[float, float]) -> Modes:
+    def modes(x: Floats) -> Modes:
+        f_d = np.clip(np.exp(x[::2]), *between)
+        return tuple(zip(f_d.tolist(), np.clip(x[1::2], *DAMPED).tolist(), strict=True))
+
+    first = np.array([value for f_d, zeta in start for value in (math.log(f_d), zeta)])
+    simplex = np.vstack([first, first + np.diag(np.tile([0.05, 0.03], len(start)))])
+    search = {"maxfev": TRIALS * len(start), "initial_simplex": simplex}
+    return modes(minimize(lambda x: cost(modes(x)), first, method="Nelder-Mead", options=search).x)

@@ -1,0 +1,127 @@
+"""Vibration that an arm's gears excite, which no shaper of the reference takes away.
+
+A strain wave gear has a kinematic error with two waves for each turn of its motor. While the arm brakes, their
+frequency falls through that of each mode. What they excite depends on the way of the joints in time: it is fitted to a
+recorded stop and computed anew along the shaped motion, and only the rest of the vibration is shaped.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from tvist_lab.metrics.ring_down import decay_rate
+from tvist_lab.recordings import Floats
+
+WAVES = 202.0
+"""Waves of the error for a turn of a joint: of gears with a ratio of 101, as most of UR's [-]."""
+WINDOW = (-0.6, 0.5)
+"""Time around the stop in which it is fitted [s]."""
+BRAKING = 0.5
+"""Weight of the time before the stop, in which the arm's own acceleration is less well described [-]."""
+ERROR = 2e-5
+"""Way of the tool by which the gears' errors may move it: 2e-5 rad at a metre [m]."""
+ALIKE = 15.0
+"""Factor by which neighbouring samples of what a fit leaves are worth less than independent ones [-]."""
+PHASES = (np.sin, np.cos)
+"""Waves in both phases."""
+TURNS = 0.05
+"""Smallest way of a joint that counts [rad]."""
+
+Poles = tuple[complex, ...]
+"""Pole of each mode [1/s]."""
+
+
+class Ripple(NamedTuple):
+    """The gears' share of the vibration around a stop."""
+
+    poles: Poles
+    weights: Floats
+    """Shape (columns of `_excited`, 3)."""
+
+    def along(self, q: Floats, ends: Floats, period: float) -> Floats:
+        """Return the acceleration that the gears excite along a way of the joints [m/s²].
+
+        Args:
+            q: Joint angles, shape (T, n) [rad].
+            ends: Smallest and largest angle of each joint on the recorded way, shape (2, n) [rad].
+            period: Time between samples [s].
+        """
+        return np.asarray(np.column_stack(list(_excited(q, ends, self.poles, period))) @ self.weights)
+
+
+def poles_of(modes: Sequence[tuple[float, float]]) -> Poles:
+    """Return the poles of modes, each with f_d [Hz] and ζ [-]."""
+    return tuple(complex(-decay_rate(f_d, zeta), 2.0 * np.pi * f_d) for f_d, zeta in modes)
+
+
+def fitted(time: Floats, alpha: Floats, q: Floats, poles: Poles) -> Ripple | None:
+    """Fit the gears' share of a recorded stop, beside what the reference excites.
+
+    Args:
+        time: Times after the stop, evenly spaced, shape (T,) [s].
+        alpha: Acceleration of the tool, shape (T, 3) [m/s²].
+        q: Joint angles of the reference, shape (T, n) [rad].
+        poles: Modes that ring.
+
+    Returns:
+        The share, in the direction in which the tool swings in each mode; None if no mode or no turning joint is known.
+    """
+    period, ends = float(time[1] - time[0]), np.array([q.min(axis=0), q.max(axis=0)])
+    gears = list(_excited(q, ends, poles, period))
+    if not gears:
+        return None
+    counts = (time > WINDOW[0]) & (time < WINDOW[1])
+    weight = np.where(time[counts] < 0.0, BRAKING, 1.0)[:, None]
+    slow = np.where((time <= 0.0)[:, None], np.vander(time, 4), 0.0)
+    others = weight * np.column_stack([*_driven(q, poles, period), slow])[counts]
+    others, _ = np.linalg.qr(others / (np.sqrt(np.mean(others**2, axis=0)) + 1e-12))
+    left, waves = weight * alpha[counts], weight * np.column_stack(gears)[counts]
+    left, waves = (one - others @ (others.T @ one) for one in (left, waves))
+    mode = np.resize(np.repeat(np.arange(len(poles)), len(PHASES) * 2), len(gears))
+    ways = _directions(time, alpha, poles)[mode]
+    # A prior for the waves keeps what is merely not described well from being taken for them.
+    prior = np.diag(ALIKE * np.sqrt(np.mean(left**2)) / (ERROR * np.abs(np.array(poles)[mode]) ** 2))
+    columns = np.vstack([*(waves * axis for axis in ways.T), prior])
+    weights = np.linalg.lstsq(columns, np.append(left.T.ravel(), np.zeros(len(gears))))[0]
+    return Ripple(poles, weights[:, None] * ways)
+
+
+def _directions(time: Floats, alpha: Floats, poles: Poles) -> Floats:
+    """Direction in which the tool swings in each mode, shape (modes, 3)."""
+    late = (time > 0.0) & (time < WINDOW[1])
+    waves = [
+        part for pole in poles for wave in [np.exp(pole * time[late])] for part in (wave.real, wave.imag)
+    ]
+    found = np.linalg.lstsq(np.column_stack(waves), alpha[late])[0].reshape(-1, 2, 3)
+    return np.asarray(np.linalg.svd(found)[2][:, 0])
+
+
+def _turning(ends: Floats) -> NDArray[np.intp]:
+    return np.flatnonzero(ends[1] - ends[0] > TURNS)
+
+
+def _excited(q: Floats, ends: Floats, poles: Poles, period: float) -> Iterator[Floats]:
+    """Response of each mode to the waves of each joint that turns, in both phases."""
+    for joint in _turning(ends):
+        for pole in poles:
+            for wave in PHASES:
+                yield from _response(wave(WAVES * q[:, joint]), pole, period)
+
+
+def _driven(q: Floats, poles: Poles, period: float) -> Iterator[Floats]:
+    """Acceleration that a rigid arm would feel, and the response of each mode to it."""
+    joint = int(np.argmax(np.ptp(q, axis=0)))
+    speed = np.gradient(q[:, joint], period)
+    acceleration = np.gradient(speed, period)
+    yield from (acceleration, speed**2, speed * acceleration)
+    for pole in poles:
+        yield from _response(acceleration, pole, period)
+        yield from _response(speed**2, pole, period)
+
+
+def _response(drive: Floats, pole: complex, period: float) -> tuple[Floats, Floats]:
+    response = lfilter([period], [1.0, -np.exp(pole * period)], np.gradient(drive, period).astype(complex))
+    return response.real, response.imag

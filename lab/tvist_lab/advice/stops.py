@@ -1,0 +1,203 @@
+"""Recorded stops, and what would be felt after them if the reference had been a weighted sum of delayed copies.
+
+A shaper makes such a sum of the reference, and an arm that is nearly linear does the same with its acceleration. Once
+the last copy has stopped, only acceleration takes part that was recorded after the stop, when the arm is not driven.
+What the gears excite is no such sum, see `ripple`.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from tvist_lab.advice.ripple import Ripple, fitted, poles_of
+from tvist_lab.metrics import Measured, MotionResult, MotionRows, NotMeasurableError
+from tvist_lab.metrics.common_clock import NOISE_PEAK, STILL
+from tvist_lab.metrics.comparison import Way
+from tvist_lab.metrics.felt import felt
+from tvist_lab.metrics.vibration import low_pass_at
+from tvist_lab.recordings import Floats
+from tvist_shaping import Impulses
+
+LATE = 0.02
+"""Time after a stop from which vibration counts: until then a filtered sensor still shows the braking [s]."""
+COUNTED = (0.2, 0.5)
+"""Shortest and longest time for which it counts [s]."""
+TAIL = 0.2
+"""Time at the end of a rest that shows the sensor's noise [s]."""
+SAME_DURATION = 0.05
+"""Largest difference of the duration of repetitions, as a share of it [-]."""
+LOUD = 3.0
+"""Least rms of a vibration over that of the sensor's noise [-]."""
+NONLINEAR = 0.05
+"""Share that is left in any case: f_d of a real UR5 rises by 3 % as it rings down, for which zv leaves 5 % [-]."""
+FELT = 0.05
+"""Least rms of a vibration that is worth a shaper [m/s²]."""
+
+
+class Left(NamedTuple):
+    """What is felt after a stop."""
+
+    rms: float
+    """rms of |α| later than 20 ms after the stop, for up to 0.5 s, without the sensor's noise [m/s²]."""
+    still: float
+    """Time from the unshaped stop until |α| stays below 0.1 m/s², or what noise reaches [s]; infinite if it does not
+    within the rest.
+    """
+
+
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """A motion's end with the rest after it."""
+
+    file: int
+    """Place of its file among those given, from 0."""
+    number: int
+    """Number of the motion in its file, from 1."""
+    measured: Measured
+    motion: MotionRows
+    result: MotionResult
+    time: Floats
+    """Times after the arm's stop, from the start of the motion on, evenly spaced, shape (T,) [s]."""
+    alpha: Floats
+    """Acceleration of the tool below 60 Hz, shape (T, 3) [m/s²]."""
+    q: Floats
+    """Joint angles of the reference, or the measured ones, shape (T, n) [rad]."""
+    noise: float
+    """Mean square of the sensor's noise over all axes [m²/s⁴]."""
+    group: int = field(default=0)
+    """Number of the motion of which this is a repetition, from 0."""
+
+    @classmethod
+    def of(cls, measured: Measured, place: int, file: int = 0) -> "Stop":
+        """Cut a motion out of a measured log.
+
+        Raises:
+            NotMeasurableError: The log has no accelerometer, or too little rest.
+        """
+        recording, motion = measured.recording, measured.motions[place]
+        time, alpha = felt(recording, motion, slice(motion.start, motion.end))
+        time = time - recording.time[motion.arm_stop(recording)]
+        if not len(time) or time[-1] < LATE + COUNTED[0] + TAIL:
+            rest = max(time[-1], 0.0) if len(time) else 0.0
+            raise NotMeasurableError(
+                f"only {rest:.2f} s of rest were recorded, {LATE + COUNTED[0] + TAIL:g} s are needed"
+            )
+        if not np.ptp(alpha[time > 0.0], axis=0).any():
+            raise NotMeasurableError("the accelerometer shows the same value throughout the rest")
+        even = np.arange(time[0], time[-1], recording.period)
+        alpha = _at(even, time, low_pass_at(time, alpha, recording.period))
+        name = next(one for one in ("reference_q", "target_q", "actual_q") if one in recording)
+        rows = slice(motion.start, motion.end)
+        q = _at(
+            even, recording.time[rows] - recording.time[motion.arm_stop(recording)], recording[name][rows]
+        )
+        time = even
+        tail = alpha[time >= time[-1] - TAIL]
+        noise = float(np.sum(np.var(tail, axis=0)))
+        return cls(file, place + 1, measured, motion, measured.results[place], time, alpha, q, noise)
+
+    @cached_property
+    def way(self) -> Way:
+        """Where the motion begins and ends."""
+        return Way.of(self.measured.recording, self.motion)
+
+    @property
+    def duration(self) -> float:
+        """Duration of the reference [s]."""
+        return self.motion.duration(self.measured.recording)
+
+    def repeats(self, other: "Stop") -> bool:
+        """Whether both are the same motion at the same speed."""
+        longer = bool(abs(self.duration / other.duration - 1.0) >= SAME_DURATION)
+        return not longer and self.way.corresponds(other.way)
+
+    @cached_property
+    def unshaped(self) -> Left:
+        """What was felt."""
+        return self.left(np.ones(1), np.zeros(1))
+
+    @property
+    def rings(self) -> bool:
+        """Whether vibration stands out of the noise, and would be worth a shaper."""
+        return self.unshaped.rms > max(FELT, LOUD * math.sqrt(self.noise))
+
+    @cached_property
+    def _ripple(self) -> Ripple | None:
+        modes = [(mode["f_d_hz"], mode["zeta"]) for mode in self.result.modes]
+        return fitted(self.time, self.alpha, self.q, poles_of(modes)) if np.isfinite(self.q).all() else None
+
+    @cached_property
+    def _of_gears(self) -> Floats:
+        """What the gears excited in the recorded motion, shape (T, 3) [m/s²]."""
+        return np.zeros_like(self.alpha) if self._ripple is None else self._waves(self._ripple, self.q)
+
+    def _waves(self, ripple: Ripple, q: Floats) -> Floats:
+        ends = np.array([self.q.min(axis=0), self.q.max(axis=0)])
+        return ripple.along(q, ends, float(self.time[1] - self.time[0]))
+
+    def after(self, sizes: Floats, delays: Floats, *, gears: bool = True) -> Floats:
+        """Acceleration if the reference were a sum of delayed copies, shape (T, 3) [m/s²].
+
+        Args:
+            sizes: Size of each copy, with the sum 1, shape (N,) [-].
+            delays: Its delay, the largest last, shape (N,) [s].
+            gears: Whether to count what the gears excite along the new way.
+        """
+        shaped = self._sum(self.alpha - self._of_gears, sizes, delays)
+        if gears and self._ripple is not None:
+            shaped += self._waves(self._ripple, self._sum(self.q, sizes, delays))
+        return shaped
+
+    def _sum(self, signal: Floats, sizes: Floats, delays: Floats) -> Floats:
+        moved = [[np.interp(self.time - delay, self.time, axis) for axis in signal.T] for delay in delays]
+        return np.asarray(np.tensordot(sizes, moved, axes=1).T)
+
+    def left(self, sizes: Floats, delays: Floats, *, gears: bool = True) -> Left:
+        """What would be felt; see `after`.
+
+        Raises:
+            NotMeasurableError: Too little rest is left after the last copy.
+        """
+        shaped, late = self.after(sizes, delays, gears=gears), self.time - float(delays[-1]) - LATE
+        counts = (late > 0.0) & (late <= COUNTED[1])
+        if late[-1] < COUNTED[0]:
+            raise NotMeasurableError("too little rest is left after the shaped stop")
+        power = np.sum(shaped**2, axis=1)
+        noise = self.noise * float(np.sum(np.square(sizes)))
+        limit = max(STILL, NOISE_PEAK * (noise / 3.0) ** 0.5)
+        loud = np.flatnonzero(power[late > 0.0] > limit**2)
+        times = self.time[late > 0.0]
+        still = float(times[loud[-1]]) if loud.size else float(delays[-1])
+        if loud.size and loud[-1] == len(times) - 1:
+            still = np.inf
+        least = (NONLINEAR * self.unshaped.rms) ** 2 if len(sizes) > 1 else 0.0
+        return Left((max(float(np.mean(power[counts])) - noise, 0.0) + least) ** 0.5, still)
+
+
+def _at(times: Floats, time: Floats, values: Floats) -> Floats:
+    return np.column_stack([np.interp(times, time, axis) for axis in values.T])
+
+
+def shaped_by(stop: Stop, impulses: Impulses, *, gears: bool = True) -> Left:
+    """What would be felt after a stop with a shaper; see `Stop.left`."""
+    return stop.left(np.asarray(impulses.A), np.asarray(impulses.tau), gears=gears)
+
+
+def grouped(stops: Sequence[Stop]) -> list[Stop]:
+    """Return the stops with the numbers of their motions, and with the least noise that each file's sensor shows."""
+    from dataclasses import replace
+
+    noise = {
+        file: min(one.noise for one in stops if one.file == file) for file in {one.file for one in stops}
+    }
+    firsts: list[Stop] = []
+    found = []
+    for stop in stops:
+        group = next((place for place, first in enumerate(firsts) if first.repeats(stop)), len(firsts))
+        firsts += [stop] if group == len(firsts) else []
+        found.append(replace(stop, group=group, noise=noise[stop.file]))
+    return found

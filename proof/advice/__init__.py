@@ -1,0 +1,1 @@
+"""Whether what is advised from a log comes true."""

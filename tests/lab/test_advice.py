@@ -1,0 +1,238 @@
+"""Advice from logs: what shapers are said to leave, what they are said about, and when nothing is said."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+from tests.lab.synthetic_logs import SyntheticLog
+
+from tvist_cli.commands.log.advise import advise as command_line
+from tvist_cli.failure import Failure
+from tvist_lab.advice import EACH, ONE, advise, as_dict, command, verdict
+from tvist_lab.advice.options import options
+from tvist_lab.advice.ripple import WAVES, fitted, poles_of
+from tvist_lab.advice.slower import slowed, smoothed
+from tvist_lab.advice.stops import Stop
+from tvist_lab.metrics import Measured
+from tvist_lab.recordings import Recording
+from tvist_lab.report import advice_page, render
+from tvist_shaping import SHAPERS, residual
+
+MODE = (9.0, 0.05, 1.5)
+
+
+def log_of(*modes, **how):
+    made = SyntheticLog(modes=modes, noise=how.pop("noise", 0.005), **how)
+    columns = {"tick": np.arange(len(made.columns["timestamp"]), dtype=float), **made.columns}
+    return Measured.of(Recording(columns, foreign=True))
+
+
+@pytest.fixture(scope="module")
+def rings():
+    return log_of(MODE, motions=4)
+
+
+@pytest.fixture(scope="module")
+def advice(rings):
+    return advise([rings])
+
+
+@given(st.floats(0.7, 1.4), st.sampled_from(["zv", "zvd", "ei", "mzv"]))
+def test_convolution_leaves_of_one_mode_what_the_formula_says(ratio, name):
+    stop = clean()
+    impulses = SHAPERS[name].function(ratio * MODE[0], MODE[1])
+    left = stop.left(np.asarray(impulses.A), np.asarray(impulses.tau)).rms / stop.unshaped.rms
+    whole = math.hypot(float(residual(MODE[0], MODE[1], impulses)), 0.05)
+    assert left == pytest.approx(whole, abs=0.02)
+
+
+def clean():
+    """One stop with a single mode and no noise."""
+    time = np.arange(-0.5, 1.5, 0.002)
+    f_d, zeta, size = MODE
+    wave = size * np.exp(-2 * np.pi * f_d * zeta * time) * np.sin(2 * np.pi * f_d * time) * (time > 0)
+    alpha, q = np.outer(wave, [0.6, 0.8, 0.0]), np.zeros((len(time), 6))
+    measured = log_of(MODE, motions=1)
+    result = replace(measured.results[0], modes=())
+    return Stop(0, 1, measured, measured.motions[0], result, time, alpha, q, 0.0)
+
+
+def test_the_best_shaper_of_one_mode_is_aimed_at_it_and_leaves_nearly_nothing(rings, advice):
+    (mode,) = advice.modes
+    assert mode.f_d_interval[0] < MODE[0] < mode.f_d_interval[1]
+    assert mode.motions == len(advice.ringing) == 4
+    assert advice.best.aim.scope == ONE
+    assert advice.best.aim.modes[0][0][0] == pytest.approx(MODE[0], rel=0.03)
+    assert advice.best.left_percent < 10.0
+    assert advice.best.still_s < advice.still_s
+    (line,) = command(advice, [rings])
+    assert line.startswith(f'shaped = make_filter("{advice.best.shaper}", Fixed(f_d=[')
+
+
+def test_no_shaper_is_recommended_that_exceeds_the_limits(advice):
+    assert advice.best.keeps_limits
+    assert not all(one.keeps_limits for one in advice.options)
+
+
+def test_motions_of_different_frequencies_need_modes_of_their_own():
+    logs = [log_of((f_d, 0.03, 2.0), motions=4, seed=seed) for seed, f_d in ((1, 7.0), (2, 12.0))]
+    shifted = replace(logs[1].recording, columns=logs[1].recording.columns | {
+        name: logs[1].recording[name] + 0.5 for name in ("target_q", "actual_q")})  # fmt: skip
+    advice = advise([logs[0], Measured.of(shifted)])
+    of_zv = {one.aim.scope: one.left_percent for one in advice.options if one.name == "zv, 1 mode"}
+    assert of_zv[EACH] < 10.0 < of_zv[ONE]
+
+
+def test_a_stop_is_judged_by_modes_of_its_repetitions_not_by_its_own(rings, monkeypatch):
+    trained = []
+
+    def best_modes(stops, count):
+        trained.append(set(stops))
+        return ((MODE[0] + len(trained), 0.05),) * count
+
+    monkeypatch.setattr("tvist_lab.advice.options.best_modes", best_modes)
+    stops = advise([rings]).ringing
+    trained.clear()
+    for option in options(stops):
+        assert not option.aim.optimistic
+        for stop, modes in option.aim.judged.items():
+            assert stop not in trained[round(modes[0][0] - MODE[0]) - 1]
+
+
+def test_a_motion_without_repetition_is_said_to_be_judged_optimistically():
+    log = log_of(MODE, motions=1)
+    advice = advise([log])
+    assert len(advice.best.aim.optimistic) == 1
+    assert any("optimistic" in one for one in verdict(advice, [log]))
+
+
+def test_there_is_nothing_to_do_where_nothing_rings():
+    log = log_of((9.0, 0.1, 0.02), noise=0.03)
+    advice = advise([log])
+    assert advice.best is None
+    assert verdict(advice, [log])[0].startswith("Nothing to do")
+    assert command(advice, [log]) == []
+
+
+def test_motions_that_were_shaped_are_told_apart(recorded):
+    unshaped, shaped = (Measured.of(recording) for recording, _ in recorded)
+    both = advise([unshaped, shaped])
+    assert [one.file for one in both.ringing] == [0]
+    assert [place for place, *_ in both.shaped] == [1]
+    alone = advise([shaped])
+    assert alone.best is None
+    assert "had a shaper already" in verdict(alone, [shaped])[0]
+
+
+def test_a_recording_of_this_controller_is_told_the_robots_own_commands(recorded):
+    log = Measured.of(recorded[0][0])
+    advice = advise([log])
+    lines = command(advice, [log])
+    assert lines[-1].startswith(("tvist serve --shaper", "await arm.set_shaper"))
+
+
+def test_without_an_accelerometer_no_shaper_is_recommended():
+    made = SyntheticLog(modes=(MODE,), motions=4)
+    columns = {"tick": np.arange(len(made.columns["timestamp"]), dtype=float), **made.columns}
+    del columns["actual_tool_accelerometer"]
+    log = Measured.of(Recording(columns, foreign=True))
+    advice = advise([log])
+    assert advice.best is None
+    assert advice.weak is None
+    assert "the log has no actual_tool_accelerometer" in verdict(advice, [log])[0]
+
+
+def test_an_accelerometer_that_is_frozen_is_not_taken_for_a_quiet_arm():
+    made = SyntheticLog(modes=(MODE,), motions=2)
+    columns = {"tick": np.arange(len(made.columns["timestamp"]), dtype=float), **made.columns}
+    columns["actual_tool_accelerometer"] = np.tile([0.0, 0.0, 9.8], (len(columns["tick"]), 1))
+    log = Measured.of(Recording(columns, foreign=True))
+    assert "the same value" in verdict(advise([log]), [log])[0]
+
+
+def test_joints_that_swing_together_give_a_frequency_that_is_called_weak():
+    made = SyntheticLog(modes=(MODE,), motions=4, encoder=1e-6)
+    time = made.columns["timestamp"]
+    for stop in made.stops:
+        late = time - stop
+        swing = 1e-3 * np.exp(-2 * np.pi * 9.0 * 0.05 * late) * np.sin(2 * np.pi * 9.0 * late)
+        made.columns["actual_q"][:, 0] += np.where((late > 0) & (late < 1.6), swing, 0.0)
+    columns = {"tick": np.arange(len(time), dtype=float), **made.columns}
+    del columns["actual_tool_accelerometer"]
+    log = Measured.of(Recording(columns, foreign=True))
+    advice = advise([log])
+    assert advice.weak[0] == pytest.approx(9.0, rel=0.05)
+    assert "weak" in verdict(advice, [log])[0]
+
+
+def test_a_slower_motion_leaves_of_an_oscillator_what_its_simulation_says(advice):
+    stop = advice.ringing[0]
+    f_d, zeta = (stop.result.modes[0][name] for name in ("f_d_hz", "zeta"))
+    recording, motion = stop.measured.recording, stop.motion
+    rows = slice(motion.start, motion.reference_stop + 2)
+    joint = int(np.argmax(np.ptp(recording["target_q"][rows], axis=0)))
+    q, time = recording["target_q"][rows, joint], recording.time[rows] - recording.time[motion.start]
+
+    def rung(slower):
+        t = np.arange(0.0, slower * time[-1], 1e-4)
+        drive = np.gradient(np.gradient(np.interp(t / slower, time, q), 1e-4), 1e-4)
+        pole = complex(-2 * np.pi * f_d * zeta / math.sqrt(1 - zeta**2), 2 * np.pi * f_d)
+        return abs(np.sum(drive * np.exp(pole * (t[-1] - t)))) * 1e-4
+
+    slower = 1.0 + 0.06 / float(time[-1])
+    assert slowed(stop, 0.06) == pytest.approx(100.0 * rung(slower) / rung(1.0), rel=0.15)
+
+
+def test_smoothing_over_a_period_of_the_mode_stills_it(advice):
+    stop = advice.ringing[0]
+    assert smoothed(stop, 1.0 / MODE[0]) < 12.0 < smoothed(stop, 0.5 / MODE[0])
+
+
+def test_what_the_gears_excite_along_another_way_is_told_better_than_by_a_sum_of_copies():
+    time = np.arange(-0.8, 1.0, 0.002)
+    way = np.where(time < 0.0, -(time**2), 0.0)[:, None] * [1.0, 0.6]
+    poles = poles_of([(8.0, 0.04)])
+
+    def copies(signal):
+        return 0.5 * (signal + np.column_stack([np.interp(time - 0.0625, time, axis) for axis in signal.T]))
+
+    def felt(q):
+        force = np.gradient(np.sin(WAVES * q[:, 0] + 0.3), 0.002)
+        response = lfilter([0.002], [1.0, -np.exp(poles[0] * 0.002)], force.astype(complex)).real
+        return 0.05 * np.outer(response, [1.0, 0.0, -0.5])
+
+    alpha, late = felt(way), time > 0.08
+    ripple, ends = fitted(time, alpha, way, poles), np.array([way.min(axis=0), way.max(axis=0)])
+    others = copies(alpha - ripple.along(way, ends, 0.002))
+    truth = felt(copies(way))[late]
+    told = (others + ripple.along(copies(way), ends, 0.002))[late]
+    assert np.linalg.norm(told - truth) < 0.5 * np.linalg.norm(copies(alpha)[late] - truth)
+
+
+def test_the_page_loads_nothing_and_says_the_recommendation_first(rings, advice, tmp_path):
+    text = render(advice_page(advice, [rings], [tmp_path / "run.csv"], "tvist log advise run.csv"))
+    assert text.count("data:image/png") == 2
+    assert "http" not in text
+    assert f"Use {advice.best.shaper} against" in text
+
+
+def test_every_option_is_plain_values(rings, advice):
+    plain = json.loads(json.dumps(as_dict(advice, [rings])))
+    assert plain["recommended"]["left_percent"] == min(
+        one["left_percent"] for one in plain["options"] if one["shaper"] == plain["recommended"]["shaper"]
+        and one["modes"] == plain["recommended"]["modes"] and one["aim"] == plain["recommended"]["aim"]
+    )  # fmt: skip
+
+
+def test_the_command_needs_a_file_and_keeps_existing_pages(tmp_path):
+    with pytest.raises(Failure, match="at least one recording"):
+        command_line()
+    page = tmp_path / "page.html"
+    page.write_text("mine")
+    with pytest.raises(Failure, match="exists already"):
+        command_line(tmp_path / "run.csv", output=page)
