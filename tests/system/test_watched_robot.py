@@ -118,6 +118,8 @@ def test_what_concerns_the_arm_is_refused_with_one_sentence(arm, link):
         with pytest.raises(RefusedError, match="nothing is sent to it"):
             robot.request(c.Stop())
         assert robot.state().actual_q == pytest.approx(before, abs=1e-3)
+        tvist("unlock", served.endpoint, "--name", "watched").assert_failed(1, "only watched")
+        tvist("stop", "watched", "--endpoint", served.endpoint).assert_failed(1, "only watched")
     assert set(link.sent) == READS
 
 

@@ -1,13 +1,11 @@
 """What is read of a robot, and what it means here."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from tvist_plant.description import Payload, is_real_body
-from tvist_plant.model import Floats
-from tvist_plant.plant import Measurement
+from tvist_plant.plant import Measurement, Sight
 from tvist_server.rtde.client import Row
 from tvist_server.rtde.wire import Wire
 
@@ -45,63 +43,40 @@ JOINTS = 6
 _FINITE = ("actual_q", "actual_qd", "actual_current", "actual_tool_accelerometer", "timestamp", "target_q")
 
 
-class Values(NamedTuple):
-    """A row in our units and orders."""
-
-    measured: Measurement
-    """Measurements."""
-    target: Floats
-    """Position, velocity, acceleration and torque, shape (4, 6)."""
-    modes: tuple[int, int, int]
-    """Robot mode, safety mode and runtime state."""
-    speed: float
-    """Share of the programmed speed [-]."""
-    payload: Payload | None
-    """Payload that the robot was told."""
-    tool: tuple[float, ...] | None
-    """Tool centre point in the flange frame."""
-    force: tuple[float, ...]
-    """Force and torque at the tool centre point."""
-    slider: float | None
-    """Position of the speed slider [-]."""
-    inputs: int
-    """Digital inputs."""
-    outputs: int
-    """Digital outputs."""
-
-
 def is_finite(row: Row) -> bool:
     """Return whether a row has numbers where a state needs some."""
     return all(np.isfinite(row[name]).all() for name in _FINITE)
 
 
-def values_of(row: Row, constants: Sequence[float]) -> Values:
-    """Convert a row.
+def sight_of(row: Row, constants: Sequence[float], tick: int, missed: int, told: Sequence[str] = ()) -> Sight:
+    """Return a row in our units and orders.
 
     Args:
         row: The row.
         constants: Torque over current of each joint, for robots that do not tell torques [N m/A].
+        tick: See `Sight`, as for the next two.
+        missed: Number of rows that did not arrive.
+        told: What people should know.
     """
-    torque = row.get("actual_current_as_torque")
+    torque, slider = row.get("actual_current_as_torque"), row.get("target_speed_fraction")
     moment = np.array(row["actual_current"]) * np.array(constants) if torque is None else np.array(torque)
-    slider = row.get("target_speed_fraction")
-    return Values(
-        Measurement(
-            np.array(row["actual_q"]),
-            np.array(row["actual_qd"]),
-            moment,
-            np.array(row["actual_tool_accelerometer"]),
-            timestamp=row["timestamp"][0],
-        ),
+    angles, rates, felt = (
+        np.array(row[name]) for name in ("actual_q", "actual_qd", "actual_tool_accelerometer")
+    )
+    return Sight(
+        tick,
+        Measurement(angles, rates, moment, felt, timestamp=row["timestamp"][0]),
         np.array([row[f"target_{name}"] for name in ("q", "qd", "qdd", "moment")]),
         (int(row["robot_mode"][0]), int(row["safety_mode"][0]), int(row["runtime_state"][0])),
         row["speed_scaling"][0],
-        _payload(row),
-        row.get("tcp_offset"),
-        row["actual_TCP_force"],
-        None if slider is None else slider[0],
-        int(row.get("actual_digital_input_bits", (0,))[0]),
-        int(row.get("actual_digital_output_bits", (0,))[0]),
+        missed,
+        payload=_payload(row),
+        tool=row.get("tcp_offset"),
+        force=row["actual_TCP_force"],
+        slider=None if slider is None else slider[0],
+        inputs=int(row.get("actual_digital_input_bits", (0,))[0]),
+        outputs=int(row.get("actual_digital_output_bits", (0,))[0]),
+        told=tuple(told),
     )
 
 

@@ -19,7 +19,7 @@ from tvist_server.rtde.client import Row, RtdeClient
 from tvist_server.watching.connection import Connection, LostError, resolved
 from tvist_server.watching.place import Place
 from tvist_server.watching.row_count import RowCount
-from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, is_finite, values_of
+from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, is_finite, sight_of
 
 LOOKED_AT = 25
 """Number of rows from which the time between two is found."""
@@ -211,15 +211,10 @@ class WatchedRobot:
         self._sights.append(self._sight(row, counted.tick))
 
     def _sight(self, row: Row, tick: int) -> Sight:
-        values = values_of(row, self._constants)
-        told, self._notes = tuple(self._notes), []
-        if values.payload is not None:
-            self.payload = values.payload
-        return Sight(
-            tick, values.measured, values.target, values.modes, values.speed, self._count.missing,
-            payload=values.payload, tool=values.tool, force=values.force, slider=values.slider,
-            inputs=values.inputs, outputs=values.outputs, told=told,
-        )  # fmt: skip
+        sight = sight_of(row, self._constants, tick, self._count.missing, self._notes)
+        self._notes = []
+        self.payload = sight.payload or self.payload
+        return sight
 
     def _lose(self, why: str) -> None:
         """Give up the connection, and say so in a tick of its own; once for each reason."""
