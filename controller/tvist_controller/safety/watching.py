@@ -20,7 +20,7 @@ REFUSED = (
     "at its own interfaces or its teach pendant"
 )
 """Why a command is refused that would concern the arm."""
-_MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
+_NO_STOP = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.UNDEFINED})
 
 
 class Watching:
@@ -78,12 +78,8 @@ class Watching:
         _, safety, _ = self._modes.now = sight.modes
         if before is not None and safety != before.modes[1]:
             why = f"the robot reports safety_mode {_name(SafetyMode, safety)}"
-            if safety == SafetyMode.PROTECTIVE_STOP:
-                self._emit("protective_stop", why=why)
-            elif safety in _MAY_MOVE or safety == SafetyMode.UNDEFINED:
-                self._emit("warning", why=why)
-            else:
-                self._emit("safety_stop", why=why)
+            # A `protective_stop` would let clients unlock it, which can be done at the robot only.
+            self._emit("warning" if safety in _NO_STOP else "safety_stop", why=why)
         if sight.tool is not None and (before is None or sight.tool != before.tool):
             self._set_tcp(sight.tool)
         io = sight.payload, sight.tool, sight.slider, sight.inputs, sight.outputs
