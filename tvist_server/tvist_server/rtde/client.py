@@ -85,7 +85,7 @@ class RtdeClient:
             case PackageKind.REQUEST_PROTOCOL_VERSION if payload[:1] == b"\x01":
                 return package(PackageKind.GET_URCONTROL_VERSION)
             case PackageKind.REQUEST_PROTOCOL_VERSION:
-                raise RtdeError("it refuses version 2 of RTDE: its software is older than 3.10 or 5.4")
+                raise RtdeError("it refuses version 2 of RTDE: update its software")
             case PackageKind.GET_URCONTROL_VERSION if len(payload) >= _VERSION.size:
                 self.version = _VERSION.unpack_from(payload)
                 return self._set_up()
