@@ -16,6 +16,7 @@ from tvist_protocol.commands import MoveJ
 from tvist_protocol.errors import RefusedError, TvistError
 from tvist_protocol.info import CalibrationInfo, StopReason
 from tvist_protocol.keys import check_robot_name
+from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State, Telemetry
 from tvist_protocol.values import PROTOCOL_VERSION
 
@@ -185,6 +186,7 @@ class _Check:
                 f"the robot speaks protocol {info.protocol}, this client {PROTOCOL_VERSION}: update the older one"
             )
         said = f"{info.model}, {len(info.joints)} joints, clock {info.clock}, protocol {info.protocol}"
+        said += "" if info.watched is None else f"; {info.watched} is only watched"
         return f"{said}{_doubt(info.calibration)}"
 
     async def state(self, robot: Robot) -> str:
@@ -192,6 +194,9 @@ class _Check:
             if (await robot.info()).tick == 0:
                 return "none yet, since a client must step the time and none has done so"
             return f"tick {(await robot.state()).tick}; no rate, since a client steps the time"
+        info = await robot.info()
+        if info.watched is not None and info.robot_mode == RobotMode.DISCONNECTED:
+            return f"it stands still, since {info.watched} is not connected"
         heard: list[Telemetry] = []
         stop = robot.on_telemetry(heard.append)
         try:

@@ -26,6 +26,8 @@ RELIEVE = (
     "--realtime-priority"
 )
 """What to do about an overloaded robot."""
+_AT_THE_ROBOT = "see to it at the robot, which is only watched: nothing is sent to it from here"
+_LOST = "see that the robot is on and reached by the server's machine, which tries every second by itself to connect"
 _POWER = "run {unlock} --power-on"
 
 
@@ -83,6 +85,9 @@ def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> 
         stands, then = f"robot_mode is {robot_mode}", _POWER
     else:
         return Readiness(True, robot_mode, safety_mode, None, "", "")
+    if info.watched is not None:
+        lost = robot == RobotMode.DISCONNECTED
+        stands, then = (f"{info.watched} is not connected", _LOST) if lost else (stands, _AT_THE_ROBOT)
     since = f" since tick {info.stop.tick}: {info.stop.why}" if info.stop is not None else ""
     return Readiness(
         False, robot_mode, safety_mode, info.stop, f"{stands}{since}", then.format(unlock=unlock)

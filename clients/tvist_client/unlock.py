@@ -5,7 +5,7 @@ import asyncio
 import msgspec
 
 from tvist_client.arm import UNLOCKED_TICKS, Arm
-from tvist_client.errors import ProtectiveStopError
+from tvist_client.errors import ClientError, ProtectiveStopError
 from tvist_client.readiness import look, unlock_command
 from tvist_client.robot import ENDPOINT, NAME, Robot
 from tvist_client.transports.certificates import Folder
@@ -66,6 +66,7 @@ def unlock(
     Raises:
         NotConnectedError: No server listens there, there is no such robot, or there are several and no name was given.
         RefusedError: Another client has control.
+        ClientError: The robot is only watched.
     """
     return asyncio.run(_unlock(endpoint, name, security, namespace, power_on=power_on))
 
@@ -120,6 +121,10 @@ async def _unlock(
     name = name or await only_robot(endpoint, NAME, security, namespace)
     command = unlock_command(endpoint, name, security, namespace)
     async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
+        if (await robot.info()).watched is not None:
+            raise ClientError(
+                f"{name} is only watched: unlock it at the robot, since nothing is sent to it from here"
+            )
         found, done = await look(robot, command), list[str]()
         if not found.ready:
             async with robot.control(CLIENT) as arm:

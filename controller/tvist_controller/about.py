@@ -22,6 +22,7 @@ def info_of(controller: Controller) -> Info:
     setup, limits, lease = controller.setup, controller.setup.description.limits, controller.session.lease
     hold = controller.stepping.hold
     calibration = controller.filters.source.calibration
+    watched = controller.watching is not None
     own = (setup.calibration.name,) if setup.calibration is not None else ()
     tvist = controller.cycle.line.filter.tvist
     return Info(
@@ -62,13 +63,14 @@ def info_of(controller: Controller) -> Info:
         commands=FIELDS,
         tick=controller.tick_number,
         stopping=list(stopping(setup.description)),
-        robot_mode=controller.motion.activity.robot_mode,
-        safety_mode=controller.motion.safety_mode,
+        robot_mode=controller.modes.now[0] if watched else controller.motion.activity.robot_mode,
+        safety_mode=controller.modes.now[1] if watched else controller.motion.safety_mode,
         stop=controller.modes.stop_reason,
         arm=controller.arm,
         programs=controller.programs.kept.names,
         poses=setup.description.poses,
         geometry=geometry_of(setup.description),
+        watched=setup.plant.place if watched and setup.plant is not None else None,
     )
 
 

@@ -23,7 +23,7 @@ from tvist_controller.dispatch.motion_commands import MotionCommands
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.dispatch.program_commands import ProgramCommands
 from tvist_controller.dispatch.setpoints import Setpoints, Unreadable
-from tvist_controller.dispatch.table import COMMANDS, CommandTable, WholeRobot
+from tvist_controller.dispatch.table import COMMANDS, HARMLESS, CommandTable, WholeRobot
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.tool_forces import ToolForces
@@ -44,9 +44,10 @@ from tvist_controller.safety.declared_payload import DeclaredPayload
 from tvist_controller.safety.faults import Faults
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
+from tvist_controller.safety.watching import REFUSED, Watching
 from tvist_controller.setup import Setup, body
 from tvist_plant.fingerprint import fingerprint
-from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError
+from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError, Watched
 from tvist_protocol import commands as c
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Refused, Reply
@@ -70,7 +71,7 @@ class Controller(WholeRobot):
     def __init__(self, setup: Setup, plant: Plant | None = None, order: Order | None = None) -> None:
         plant = setup.made_plant() if plant is None else plant
         setup = setup.standing(plant)
-        setup.check()
+        setup.check(placed=not isinstance(plant, Watched))
         self.setup = setup
         """Initial setup; of an arm that cannot be placed, with the posture in which it stood."""
         self.tick_number = 0
@@ -94,7 +95,9 @@ class Controller(WholeRobot):
         self._seed = setup.seed
         self._reporter = Reporter(setup.description)
         collisions = CollisionModel(setup.description, body(setup.payload))
-        self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
+        # What only watches has no power to move anything, whatever is asked of it.
+        mode = "POWER_OFF" if isinstance(plant, Watched) else setup.mode
+        self.motion = MotionControl(self.cycle, collisions, self._emit, mode)
         self.modes = RobotModes(self.motion)
         """Robot mode, safety mode and runtime state."""
         self.session = Session(timeouts=setup.clock == "realtime", instance=setup.instance)
@@ -106,6 +109,12 @@ class Controller(WholeRobot):
         self._safety = safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
         self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
+        self.watching = (
+            Watching(plant, self.cycle, self.modes, self.peripherals, self._reporter.set_tcp, self._emit)
+            if isinstance(plant, Watched)
+            else None
+        )
+        """The robot that is only watched; None if this controller moves it."""
         self.forces = ToolForces(setup.description, self.peripherals, lambda: self.latest)
         """Forces and torques on the arm."""
         self.cell = (
@@ -136,8 +145,9 @@ class Controller(WholeRobot):
 
     @property
     def declared(self) -> Payload:
-        """Declared payload."""
-        return self._payload.payload
+        """Declared payload; that of a robot that is watched, if it says so."""
+        declared = self._payload.payload
+        return declared if self.watching is None else self.watching.declared(declared)
 
     @property
     def now(self) -> float:
@@ -202,6 +212,8 @@ class Controller(WholeRobot):
         origin: str | None = None,
     ) -> Reply | None:
         """Carry out a command of a client, or of a program; see `CommandTable.carry_out`."""
+        if self.watching is not None and type(command) not in HARMLESS:
+            raise RefusalError("wrong_mode", "", REFUSED)
         self._look_again()
         planned = partial(self.plans.found, command, plan)
         reply = self._commands.carry_out(
@@ -248,7 +260,15 @@ class Controller(WholeRobot):
         return report.state, events
 
     def begin_tick(self) -> None:
-        """Begin a control period: what has timed out ends, and programs have their turn."""
+        """Begin a control period: what has timed out ends, and programs have their turn.
+
+        Its number is the next one, or that which a robot that is watched gives it.
+        """
+        if self.watching is not None:
+            tick = self.watching.look()
+            self.tick_number = max(self.tick_number, 0 if tick is None else tick - 1)
+            self.counters.missed_ticks = self.watching.missed
+            self.watching.tell()
         if self.now >= self._next_timeout:
             try:
                 self._watch_time()
@@ -260,6 +280,8 @@ class Controller(WholeRobot):
 
     def complete_tick(self) -> tuple[Report, list[Event]]:
         """Compute the rest of a control period that has begun."""
+        if self.watching is not None:
+            return self._complete_watched(self.watching)
         failed, self._failed = self._failed, None
         try:
             if failed is not None:
@@ -283,10 +305,19 @@ class Controller(WholeRobot):
         self.programs.steadiness.note(sample.measured.q, at_rest=self.cycle.mode.at_rest)
         return self.report, events
 
+    def _complete_watched(self, watching: Watching) -> tuple[Report, list[Event]]:
+        """Report what a robot that is watched said; nothing here judges it, since nothing here could stop it."""
+        sample = watching.sample()
+        self.tick_number += 1
+        events, self._events = self._events, []
+        self.report = self._report(sample)
+        return self.report, events
+
     def _report(self, sample: Sample) -> Report:
         motion, line = self.motion, self.cycle.line
         return self._reporter.report(
-            self.tick_number, sample, line.filter.tvist, line.drives.delay, self.modes.now, motion.motions.speed,
+            self.tick_number, sample, line.filter.tvist, line.drives.delay, self.modes.now,
+            motion.motions.speed if self.watching is None else self.watching.speed,
             motion.streams.sequence, self.counters.missed_ticks,
         )  # fmt: skip
 
@@ -300,14 +331,16 @@ class Controller(WholeRobot):
         Args:
             wrench: Whether to compute the wrench at the tool, which takes a third of a tick.
         """
-        return self.peripherals.io(
+        estimated, watching = wrench and self.watching is None, self.watching
+        io = self.peripherals.io(
             self.tick_number + 1,
-            self.declared,
+            self._payload.payload,
             self.motion.motions.wanted_speed,
             self.programs,
-            self.forces.wrench() if wrench else None,
-            None if self._payload.assumed == self.declared else self._payload.assumed,
+            self.forces.wrench() if estimated else None,
+            None if self._payload.assumed == self._payload.payload else self._payload.assumed,
         )
+        return io if watching is None else watching.io(io, force=wrench)
 
     def changed_io(self) -> Io | None:
         """Return inputs, outputs and registers before a tick, if they changed since the last call; else None."""

@@ -84,8 +84,11 @@ class Setup:
         """
         return Registry(own.shaper for own in self.own_shapers)
 
-    def check(self) -> None:
+    def check(self, *, placed: bool = True) -> None:
         """Check what the types of the fields cannot express.
+
+        Args:
+            placed: Whether the arm is to be where this setup says; a robot that is watched is where it is.
 
         Raises:
             ValueError: A value is out of range; the message names it.
@@ -94,17 +97,8 @@ class Setup:
         if len(self.q) != joints:
             model = self.description.robot.model
             raise ValueError(f"start has {len(self.q)} angles; {model} has {joints} joints")
-        for number, (angle, limit) in enumerate(zip(self.q, self.description.limits.position, strict=True)):
-            if not abs(angle) <= limit:
-                raise ValueError(f"start q[{number}] is {angle}: must be within ±{limit} rad")
-        if self.carried is not None and not is_real_body(self.carried.inertia):
-            inertia = list(self.carried.inertia)
-            raise ValueError(f"payload.inertia is {inertia}: no body has these moments of inertia")
-        declared = body(self.payload)
-        collisions = CollisionModel(self.description, declared)
-        met = collisions.misplaced(np.array(self.q), declared, body(self.carried or self.payload))
-        if met is not None:
-            raise ValueError(f"start: {met}: choose a posture in which the arm and its payload are clear")
+        if placed:
+            self._check_start()
         if self.hidden is not None and (self.truth or self.plant is not None):
             given = "truth is on" if self.truth else "a plant is given"
             raise ValueError(f"hidden is {self.hidden}, but {given}: leave one of them out")
@@ -116,6 +110,19 @@ class Setup:
             )
         if self.cell is not None:
             self.cell.check()
+
+    def _check_start(self) -> None:
+        for number, (angle, limit) in enumerate(zip(self.q, self.description.limits.position, strict=True)):
+            if not abs(angle) <= limit:
+                raise ValueError(f"start q[{number}] is {angle}: must be within ±{limit} rad")
+        if self.carried is not None and not is_real_body(self.carried.inertia):
+            inertia = list(self.carried.inertia)
+            raise ValueError(f"payload.inertia is {inertia}: no body has these moments of inertia")
+        declared = body(self.payload)
+        collisions = CollisionModel(self.description, declared)
+        met = collisions.misplaced(np.array(self.q), declared, body(self.carried or self.payload))
+        if met is not None:
+            raise ValueError(f"start: {met}: choose a posture in which the arm and its payload are clear")
 
     def source(self) -> ModeSource:
         """Return the initial source of the vibration modes."""

@@ -45,7 +45,10 @@ def summary(path: str | os.PathLike[str], read_as: Recording | None = None) -> d
         "missing_ticks": recording.missing_ticks,
         "complete": content and content.complete,
         "dropped": content.dropped and dict(content.dropped) if content else None,
-        "replayable": content and bool(content.start) and content.from_tick is None,
+        "replayable": content
+        and bool(content.start)
+        and content.from_tick is None
+        and getattr(info, "watched", None) is None,
         "from_tick": content and content.from_tick,
         "messages": content
         and {**content.counts, "event": len(content.events), "journal": len(content.journal)},

@@ -12,9 +12,9 @@ import socket
 import sys
 import time
 
-from tvist_server.gateways.ur.rtde.codec import PackageKind, PackageReader, package
 from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
 from tvist_server.gateways.ur.rtde.recipes import split
+from tvist_server.rtde.codec import PackageKind, PackageReader, package
 
 PERIOD = 0.002
 """Control period [s]."""

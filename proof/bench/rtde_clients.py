@@ -12,7 +12,7 @@ import socket
 import struct
 import sys
 
-from tvist_server.gateways.ur.rtde.codec import PackageKind, PackageReader, package
+from tvist_server.rtde.codec import PackageKind, PackageReader, package
 
 JOINT_VALUES = (
     "target_q", "target_qd", "target_qdd", "target_current", "target_moment", "actual_q", "actual_qd", "actual_current",

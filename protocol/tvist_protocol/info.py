@@ -131,3 +131,6 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     """Named poses, one angle per joint [rad]; empty from older servers."""
     geometry: Geometry | None = None
     """Kinematics and shape of the arm; null from older servers."""
+    watched: str | None = None
+    """Address of the robot if it is only watched: its own controller moves it, and commands that concern the arm are
+    refused; null if this server moves it."""

@@ -200,6 +200,53 @@ class Pacing(Protocol):
         """Wait until the next control period begins; return False if it does not within the timeout [s]."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """What a robot that its own controller moves has said in one of its cycles."""
+
+    tick: int
+    """Number of the control period by the robot's own clock; it increases from one to the next."""
+    measured: Measurement
+    """Its measurements."""
+    target: Floats
+    """Position [rad], velocity [rad/s], acceleration [rad/s²] and torque [N m] that it follows, shape (4, n)."""
+    modes: tuple[int, int, int]
+    """Robot mode, safety mode and runtime state, with RTDE's numbers."""
+    speed: float
+    """Share of the programmed speed [-]."""
+    missed: int
+    """Number of cycles since the first that did not arrive."""
+    payload: Payload | None = None
+    """Payload that it was told; None if it does not say."""
+    tool: tuple[float, ...] | None = None
+    """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]; None if it does not say."""
+    force: tuple[float, ...] | None = None
+    """Force and torque at the tool centre point, base frame [N, N m]; None if it does not say."""
+    slider: float | None = None
+    """Position of the speed slider [-]; None if it does not say."""
+    inputs: int = 0
+    """Digital inputs, as RTDE orders the bits."""
+    outputs: int = 0
+    """Digital outputs, as RTDE orders the bits."""
+    told: tuple[str, ...] = ()
+    """What people should know, in sentences."""
+
+
+@runtime_checkable
+class Watched(Pacing, Standing, Protocol):
+    """A robot that its own controller moves, while we watch: no command reaches it, and `step` only measures."""
+
+    def sight(self) -> Sight:
+        """Return what it said in its next cycle, for which `wait` has waited.
+
+        Raises:
+            PlantError: It has said nothing since the last call.
+        """
+
+    def interval(self) -> float:
+        """Return the time between two of its cycles as they arrive [s]."""
+
+
 @runtime_checkable
 class Loadable(Protocol):
     """A plant whose carried payload can change while it moves, for the parts and tools of a cell."""

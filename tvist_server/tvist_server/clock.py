@@ -43,6 +43,8 @@ class Mailbox:
         patience: Returns how long a step may wait for a socket that a program reads [s].
         pace: Waits until the arm begins its next tick, at most the time that it is given [s], and returns whether it
             has; None if a clock gives the tick.
+        interval: Time between two ticks of a robot that is watched, which counts those that it misses [s]; None if this
+            server moves it.
     """
 
     def __init__(
@@ -50,8 +52,9 @@ class Mailbox:
         host: Host,
         patience: Callable[[], float] = float,
         pace: Callable[[float], bool] | None = None,
+        interval: float | None = None,
     ) -> None:
-        self.host, self.pace = host, pace
+        self.host, self.pace, self.interval = host, pace, interval
         self._patience = patience
         self.jobs = Jobs()
         self.ending = False
@@ -181,7 +184,7 @@ class Realtime(Clock):
         super().__init__(robots)
         self._hand_on = hand_on
         self._period = period / speed
-        self._overloads = [Overload(self._period) for _ in robots]
+        self._overloads = [Overload(robot.interval or self._period) for robot in robots]
         for robot, overload in zip(robots, self._overloads, strict=True):
             robot.overload = overload
         self._priority, self._processor = priority, processor
@@ -208,7 +211,7 @@ class Realtime(Clock):
         schedule: Schedule | Followed = (
             Schedule(len(robots), self._period, handed_on)
             if pace is None
-            else Followed(self._period, handed_on)
+            else Followed(robots[0].interval or self._period, handed_on, counts=robots[0].interval is None)
         )
         while self._running:
             if pace is not None:
@@ -253,7 +256,7 @@ class Realtime(Clock):
     def _do_without_tick(self, robot: Mailbox, silent: bool) -> bool:
         """Answer the clients of an arm that has fallen silent, and tell them once; return True."""
         robot.jobs.do_waiting()
-        if not silent:
+        if not silent and robot.interval is None:  # a robot that is watched says by itself when it is lost
             robot.host.warn(
                 "the arm does not begin its next tick: time stands still, and it obeys no command"
             )

@@ -2,6 +2,7 @@
 
 import dataclasses
 import ipaddress
+from functools import partial
 from pathlib import Path
 from typing import Annotated, TypeVar
 
@@ -10,7 +11,7 @@ from msgspec.structs import replace
 
 from tvist_controller.cell.description import Cell, as_declared
 from tvist_controller.setup import Adapt, Setup, check_rating, paper_payload
-from tvist_controller.sources.own_plants import load_plant
+from tvist_controller.sources.own_plants import OwnPlant, load_plant
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
 from tvist_protocol.info import Clock
@@ -24,6 +25,8 @@ from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.temporary import temporary_folder
 from tvist_server.ur_ports import InterfaceName, UrPorts
+from tvist_server.watching.place import is_place, place_of
+from tvist_server.watching.watched_robot import WatchedRobot
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_NAME = "ur5e"
@@ -89,7 +92,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """The arm to move [the simulated flexible arm of the robot file]: that arm with something that its controller does
     not know, such as stribeck, hysteresis, torsion, base, backlash, combined, springs-30 or springs+30; FILE.py:NAME,
     which runs that file; or an installed plant, such as mujoco. NAME takes a RobotDescription and a Payload, and makes
-    a plant."""
+    a plant. ur://ADDRESS[:PORT] only watches a robot of UR's through its RTDE interface: its state becomes ours, and
+    nothing moves it from here."""
     hidden: Seed | None = None
     """Simulate an arm that is not quite its file: springs, dampers, loops, rotors, friction and payload are drawn from
     this seed and told to nobody. With several robots, each further one uses the next."""
@@ -296,6 +300,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             if self.ur:
                 self.ur_ports.check_joints(description.robot.name, description.joints)
             profile = PLAIN if chosen is None else PROFILES[chosen]
+            watched = self.plant is not None and is_place(self.plant)
+            if watched:
+                self._check_watched()
             calibration = calibration_for(self.calibration, description)
             cell = None if self.cell is None else read_cell(self.cell)
             setup = Setup(
@@ -312,13 +319,13 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
                 shape_servo=self.shape_servo,
                 adapt=self.adapt,
-                plant=None if self.plant is None else load_plant(self.plant),
+                plant=None if self.plant is None else _plant(self.plant),
                 hidden=self.hidden,
             )
-            setup = shaped_by(setup, _either(self.shaper, profile.shaper))
+            setup = shaped_by(setup, "none" if watched else _either(self.shaper, profile.shaper))
             if self.state is not None:
                 setup = read_state(self.state).on(setup)
-            setup.check()
+            setup.check(placed=not watched)
         except user_file.UserFileError:
             raise
         except ValueError as error:
@@ -329,6 +336,23 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             except ValueError as error:
                 raise ConfigError(f"{error}: give --overload to insist") from error
         return setup
+
+    def _check_watched(self) -> None:
+        """Check that nothing is asked of a robot that is only watched.
+
+        Raises:
+            ValueError: It is.
+        """
+        given = {
+            "shaper": self.shaper, "adapt": self.adapt, "learn": self.learn, "cell": self.cell, "state": self.state,
+            "start": self.start, "shape_servo": self.shape_servo or None, "truth": self.truth or None,
+            "robots": self.robots,
+        }  # fmt: skip
+        for name, value in given.items():
+            if value is not None:
+                raise ValueError(
+                    f"{name} is {value}, but the robot at {self.plant} is only watched: leave {name} out"
+                )
 
     @property
     def profile_in_force(self) -> ProfileName | None:
@@ -346,6 +370,19 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         if self.payload is None and cell is not None and cell.tools:
             return as_declared(cell.tools[0])
         return paper_payload(description, _either(self.payload, profile.payload))
+
+
+def _plant(place: str) -> OwnPlant:
+    """Find a plant: the robot at an address, or what `load_plant` finds.
+
+    Raises:
+        ValueError: There is none.
+        UserFileError: See `load_plant`.
+    """
+    if not is_place(place):
+        return load_plant(place)
+    where = place_of(place)
+    return OwnPlant(str(where), "", partial(WatchedRobot, where))
 
 
 def _either(given: T | None, default: T) -> T:

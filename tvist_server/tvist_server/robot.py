@@ -14,7 +14,7 @@ from tvist_controller.host import Host
 from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.reporting.sink import Sink
 from tvist_controller.setup import Setup
-from tvist_plant.plant import Pacing, Truthful
+from tvist_plant.plant import Pacing, Truthful, Watched
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Refused, Reply
@@ -121,7 +121,10 @@ class ServedRobot:
         self.want_truth = self.publisher.want_truth if knows and not setup.truth else None
         """To be told whether a client on this machine wants the truth; None if it is published anyway, or unknown."""
         self.driven = Mailbox(
-            self._host, self.sockets.patience, plant.wait if isinstance(plant, Pacing) else None
+            self._host,
+            self.sockets.patience,
+            plant.wait if isinstance(plant, Pacing) else None,
+            plant.interval() if isinstance(plant, Watched) else None,
         )
         """The robot as seen by the clock."""
         self._plan_ahead = (
@@ -241,6 +244,8 @@ class ServedRobot:
         def tell() -> None:
             # Use the current io, not the last published one: a program may have been played since, before the next
             # tick.
+            if self.driven.pace is not None:  # while it is silent, new clients still get a state
+                self.repeat()
             io = self.controller.io()
             self.publisher.telemetry(self._telemetry(punctuality), io)
             if self.recorder is not None and self._realtime:  # recordings of equal runs in lockstep are equal
@@ -255,6 +260,7 @@ class ServedRobot:
         refused = reception.setpoints_refused + sum(gateway.setpoints_refused for gateway in gateways)
         on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0, 0.0)
         overload = self.driven.overload
+        left_out = 0 if self.driven.interval is None else counters.missed_ticks  # of a robot that is watched
         return Telemetry(
             tick=controller.tick_number,
             ticks_per_second=on_time.ticks / on_time.seconds,
@@ -272,7 +278,7 @@ class ServedRobot:
             commands=counters.commands + reception.commands_refused,
             refused=counters.refused + reception.commands_refused,
             load=None if punctuality is None else punctuality.load,
-            due_ticks=None if overload is None else overload.due,
+            due_ticks=None if overload is None else overload.due + left_out,
             due_per_second=None if overload is None else overload.due_per_second,
             overloaded=overload is not None and overload.overloaded,
         )

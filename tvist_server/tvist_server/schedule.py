@@ -13,18 +13,20 @@ class Followed:
     Args:
         period: Period of its ticks [s].
         start: Present time [s].
+        counts: Whether those left out are to be counted; False if the arm counts them itself, by its own clock.
     """
 
     due = math.inf
     """Time from which the next tick may begin: nobody knows it."""
 
-    def __init__(self, period: float, start: float) -> None:
-        self._period, self._before = period, start
+    def __init__(self, period: float, start: float, *, counts: bool = True) -> None:
+        self._period, self._before, self._counts = period, start, counts
 
     def begin(self, now: float) -> tuple[int, float, int]:
         """Take the next tick, which begins now; see `Schedule.begin`."""
         gap, self._before = now - self._before, now
-        return 0, max(0.0, gap - self._period), max(0, int(gap / self._period) - 1)
+        missed = max(0, int(gap / self._period) - 1) if self._counts else 0
+        return 0, max(0.0, gap - self._period), missed
 
 
 class Schedule:

@@ -183,12 +183,13 @@ class ShownRobot:
         info, doer, running = self._info, self._doer, self.running
         if info is None or doer is None or running is None or running.state is None:
             return None
-        pilot = doer.pilot
+        pilot, only = doer.pilot, info.watched
+        watched = f"{only} is only watched: nothing here moves or stops it."
         return {
             **state_in_words(running.state, info, self._io),
-            "control": _control(pilot, tab, info.control),
+            "control": _control(pilot, tab, info.control) if only is None else watched,
             "mine": pilot.holder == tab,
-            "free": pilot.holder is None and info.control in (None, pilot.client),
+            "free": only is None and pilot.holder is None and info.control in (None, pilot.client),
             "truth": running.has_truth,
             "comparing": doer.comparing,
         }

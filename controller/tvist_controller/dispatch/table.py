@@ -75,6 +75,13 @@ _PARTS: tuple[type[Part], ...] = (
 )  # fmt: skip
 COMMANDS: dict[type[Command], Row] = {row.message: row for part in _PARTS for row in part.rows}
 """The row of each command."""
+HARMLESS: frozenset[type[Command]] = frozenset(
+    row.message
+    for part in (Authority, Filters, WholeRobot)
+    for row in part.rows
+    if part is not WholeRobot or row.asks
+)
+"""Commands that do not concern the arm, so that a robot that is only watched takes them."""
 
 
 class CommandTable:

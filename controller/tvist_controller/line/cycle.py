@@ -2,6 +2,8 @@
 
 from typing import TypeVar
 
+import numpy as np
+
 from tvist_controller.line.boxes import Boxes
 from tvist_controller.line.correction import Corrections
 from tvist_controller.line.differentiator import Floats
@@ -11,6 +13,7 @@ from tvist_controller.line.line_mode import LineMode, check_change
 from tvist_controller.line.sample import Sample
 from tvist_controller.trajectory import Rest, StuckError, Trajectory
 from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, Measurement, Placeable, Plant
 from tvist_plant.plant_checks import check_measurement, measured_standing
@@ -99,6 +102,21 @@ class ControlCycle:
             refused,
         )  # fmt: skip
         self._settle()  # last, so that the tick that comes to rest is still reported as one of the motion
+        return self.sample
+
+    def follow(self, target: Floats, measured: Measurement) -> Sample:
+        """Take what another controller asked of the arm in a tick, and what that measured; the arm gets no command.
+
+        Args:
+            target: Position, velocity, acceleration and torque, shape (4, n).
+            measured: Measurements of the same tick.
+        """
+        q, qd, qdd, torque = target
+        signals = np.array([q, q, qd, qdd, torque, np.zeros_like(q), q, qd, torque])
+        still = (q, q, q)
+        self.sample = Sample(
+            LineMode.REST, q, still, still, signals, DriveCommand(q, qd, torque), measured
+        )  # fmt: skip
         return self.sample
 
     def _references(self) -> tuple[Floats, Floats, Obstacle | None]:

@@ -11,7 +11,7 @@ from msgspec import Struct
 from tvist_controller.sources.own_files import OwnFileError, ends, is_file, run_file
 from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.plant import Plant
+from tvist_plant.plant import Plant, PlantError
 from tvist_plant.user_file import named
 from tvist_plant.variants import VARIANTS, Variant
 
@@ -70,6 +70,8 @@ class OwnPlant:
             made = self.maker(description, carried)
             if isinstance(made, Plant):
                 return called(made, description.joints)
+        except PlantError as error:  # it says in a sentence why it cannot be made
+            raise OwnPlantError(f"plant {self.place}: {error}") from error
         except (Exception, SystemExit) as error:
             if ends(error):
                 raise

@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 
 from tvist_lab.recordings.json_columns import Block, Cells, block_of
 from tvist_lab.recordings.recording import STATE_COLUMNS, TRUTH_PREFIX, Floats, Recording, RecordingError
+from tvist_protocol.modes import RobotMode
 
 REGISTERS = "_register"
 """End of the names of banks of registers."""
+OF_OUR_LINE = ("reference", "unshaped", "estimated", "shaper", "motor_", "setpoint")
+"""Beginnings of the names of columns that say nothing of a robot that was only watched."""
 UNSHAPED = "unshaped_"
 """Prefix of columns that have the target's values where they are null."""
 
@@ -69,7 +72,13 @@ def recording_of_blocks(
                 columns[TRUTH_PREFIX + name] = _known(_at(cells, places), known)
     if io is not None:
         columns |= _held(io, columns["tick"])
-    return Recording(columns, tuple(sorted(events, key=lambda event: int(event.tick))), info)
+    in_order = tuple(sorted(events, key=lambda event: int(event.tick)))
+    if getattr(info, "watched", None) is None:
+        return Recording(columns, in_order, info)
+    # A lost connection repeats the last measurements, and what our line would do is nothing that the robot did.
+    there = columns["robot_mode"] != RobotMode.DISCONNECTED
+    kept = {name: column[there] for name, column in columns.items() if not name.startswith(OF_OUR_LINE)}
+    return Recording(kept, in_order, info, foreign=True)
 
 
 def _held(io: Block, ticks: Floats) -> dict[str, Floats]:

@@ -14,8 +14,8 @@ from tvist_protocol.io import Registers, SetIo, SetRegisters
 from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.input_owners import InputOwners
 from tvist_server.gateways.ur.rtde.board import Board
-from tvist_server.gateways.ur.rtde.codec import PackageReader
 from tvist_server.gateways.ur.rtde.session import RtdeSession, ticks_between
+from tvist_server.rtde.codec import PackageReader
 
 from . import rtde_client as client
 

@@ -4,7 +4,7 @@ from typing import get_args
 
 from tvist_protocol.io import Bank
 from tvist_server.gateways.ur.rtde.registers import NUMBERS, SINGLE_BITS, WORDS
-from tvist_server.gateways.ur.rtde.wire import Wire
+from tvist_server.rtde.wire import Wire
 
 DIGITAL: dict[str, tuple[int, int]] = {"standard": (0, 8), "configurable": (8, 8), "tool": (16, 2)}
 """Groups of digital outputs: number of the first bit, and number of bits."""

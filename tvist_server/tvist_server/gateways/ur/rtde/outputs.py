@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from tvist_controller.instruments.joint_lists import JOINT_LISTS
 from tvist_controller.instruments.snapshot import VARIABLES, Snapshot
 from tvist_server.gateways.ur.rtde.registers import KINDS, SINGLE_BITS, registers
-from tvist_server.gateways.ur.rtde.wire import Wire
+from tvist_server.rtde.wire import Wire
 
 OUTPUTS: dict[str, Wire] = {name: Wire[word] for name, word in VARIABLES.items()} | {
     name: wire for kind in KINDS for name, wire in registers(kind)

@@ -2,10 +2,10 @@
 
 from struct import Struct
 
-from tvist_server.gateways.ur.rtde.codec import HEADER, LARGEST
 from tvist_server.gateways.ur.rtde.inputs import INPUTS
 from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
-from tvist_server.gateways.ur.rtde.wire import Wire
+from tvist_server.rtde.codec import HEADER, LARGEST
+from tvist_server.rtde.wire import Wire
 
 Value = int | float | tuple[float, ...]
 """Value of an input variable."""

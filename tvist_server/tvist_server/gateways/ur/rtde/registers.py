@@ -1,6 +1,6 @@
 """Registers: names and types of their variables."""
 
-from tvist_server.gateways.ur.rtde.wire import Wire
+from tvist_server.rtde.wire import Wire
 
 NUMBERS = range(48)
 """Numbers of the integer registers; the double registers have the same."""

@@ -13,7 +13,10 @@ from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.base import ControllerAccess, PortSession, Send
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.board import Board
-from tvist_server.gateways.ur.rtde.codec import (
+from tvist_server.gateways.ur.rtde.inputs import INPUTS, NEED_CONTROL
+from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
+from tvist_server.gateways.ur.rtde.writing import InputWriter
+from tvist_server.rtde.codec import (
     PackageKind,
     PackageReader,
     TextLevel,
@@ -21,9 +24,6 @@ from tvist_server.gateways.ur.rtde.codec import (
     text_message,
     words,
 )
-from tvist_server.gateways.ur.rtde.inputs import INPUTS, NEED_CONTROL
-from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
-from tvist_server.gateways.ur.rtde.writing import InputWriter
 
 RATE = 500.0
 """Frequency of the control loop, and so the highest frequency of data packages [Hz]."""

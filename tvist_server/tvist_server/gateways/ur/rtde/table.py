@@ -5,7 +5,7 @@ from inspect import getdoc
 
 from tvist_controller.instruments.snapshot import VARIABLES, Snapshot
 from tvist_server.gateways.ur.rtde.inputs import NAMED as NAMED_INPUTS
-from tvist_server.gateways.ur.rtde.wire import Wire
+from tvist_server.rtde.wire import Wire
 
 SOURCES = ("State", "Io", "Computed", "Constant")
 """Words with which the description of an output variable begins."""

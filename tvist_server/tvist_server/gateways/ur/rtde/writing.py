@@ -11,7 +11,7 @@ from tvist_server.gateways.ur.base import ControllerAccess
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.inputs import DIGITAL, REGISTERS
 from tvist_server.gateways.ur.rtde.recipes import Value
-from tvist_server.gateways.ur.rtde.wire import Wire
+from tvist_server.rtde.wire import Wire
 
 Complain = Callable[[str], None]
 """Function that sends the client a warning."""

@@ -1,0 +1,102 @@
+"""The reading end of RTDE, and the count of its rows: without a socket or a clock."""
+
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tvist_server.rtde.client import RtdeClient, RtdeError
+from tvist_server.rtde.codec import PackageKind, package
+from tvist_server.rtde.wire import Wire
+from tvist_server.watching.place import place_of
+from tvist_server.watching.row_count import RowCount
+
+NEEDED, OPTIONAL = {"timestamp": Wire.DOUBLE, "q": Wire.VECTOR3D}, {"payload": Wire.DOUBLE}
+
+
+def answers(types):
+    head = package(PackageKind.REQUEST_PROTOCOL_VERSION, b"\x01")
+    version = package(PackageKind.GET_URCONTROL_VERSION, struct.pack(">4I", 5, 22, 0, 1))
+    return [head, version, package(PackageKind.SETUP_OUTPUTS, b"\x01" + types)]
+
+
+def data(*numbers):
+    return package(PackageKind.DATA, b"\x01" + struct.pack(f">{len(numbers)}d", *numbers))
+
+
+@given(
+    st.lists(st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5), max_size=20),
+    st.integers(1, 200),
+)
+def test_rows_are_the_same_however_the_bytes_are_cut(rows, size):
+    client = RtdeClient(NEEDED, OPTIONAL)
+    stream = b"".join(
+        [
+            *answers(b"DOUBLE,VECTOR3D,DOUBLE"),
+            package(PackageKind.START, b"\x01"),
+            *(data(*row) for row in rows),
+        ]
+    )
+    found = [row for at in range(0, len(stream), size) for row in client.receive(stream[at : at + size]).rows]
+    assert client.started
+    assert [[*row["timestamp"], *row["q"], *row["payload"]] for row in found] == rows
+
+
+def test_what_a_robot_does_not_know_is_left_out_if_it_may_be():
+    client = RtdeClient(NEEDED, OPTIONAL)
+    head, version, recipe = answers(b"DOUBLE,VECTOR3D,NOT_FOUND")
+    client.receive(head + version)
+    again = client.receive(recipe).send
+    assert again.endswith(b"timestamp,q")
+    assert client.receive(answers(b"DOUBLE,VECTOR3D")[2]).send == package(PackageKind.START)
+    assert client.lacking == ["payload"]
+
+
+@pytest.mark.parametrize(
+    ("types", "word"),
+    [
+        (b"DOUBLE,NOT_FOUND,DOUBLE", "does not know q"),
+        (b"DOUBLE,VECTOR6D,DOUBLE", "VECTOR3D"),
+        (b"DOUBLE", "1 types"),
+    ],
+)
+def test_a_recipe_that_cannot_be_read_is_refused(types, word):
+    client = RtdeClient(NEEDED, OPTIONAL)
+    with pytest.raises(RtdeError, match=word):
+        client.receive(b"".join(answers(types)))
+
+
+@given(st.lists(st.integers(0, 9), min_size=1, max_size=200), st.sampled_from([1, 4]), st.floats(0.0, 9.0))
+def test_rows_and_gaps_add_up_to_the_time_of_the_robot(gaps, interval, jitter):
+    """A gap of 0 is a row that comes twice; when rows arrive does not matter."""
+    count, time = RowCount(interval), 1000
+    count.take(0.002 * time, 0.0)
+    ticks = [count.tick]
+    for gap in gaps:
+        time += gap * interval
+        counted = count.take(0.002 * time, jitter)
+        if counted is not None:
+            ticks.append(counted.tick)
+    assert ticks == sorted(set(ticks))
+    assert ticks[-1] == time
+    assert count.rows + count.missing == (time - 1000) // interval + 1
+    assert count.doubled == gaps.count(0)
+
+
+@pytest.mark.parametrize("own", [3.0, 5000.0])
+def test_after_a_restart_of_the_robot_ticks_go_on_by_our_clock(own):
+    count = RowCount(1)
+    count.take(100.0, 50.0)
+    count.silence()
+    counted = count.take(own, 53.0, reconnected=True)
+    assert counted.anew
+    assert counted.missing == pytest.approx(1500, abs=2)
+    assert counted.tick == pytest.approx(50_000 + 1500, abs=2)
+    assert count.take(own + 0.002, 53.002).tick == counted.tick + 1
+
+
+def test_an_address_is_read_as_people_write_it():
+    assert place_of("ur://192.168.0.10") == ("192.168.0.10", 30004)
+    assert place_of("ur://[::1]:40") == ("::1", 40)
+    assert str(place_of("ur://robot:31004")) == "ur://robot:31004"

@@ -1,0 +1,73 @@
+"""A link between a robot's RTDE interface and its reader: it delays, loses and repeats rows, and notes what passes."""
+
+import random
+from struct import Struct
+
+from tests.system.proxy import Proxy
+
+from tvist_server.rtde.codec import PackageKind, PackageReader, package
+
+_DOUBLE = Struct(">d")
+
+
+class RtdeLink(Proxy):
+    """Passes packages on.
+
+    Args:
+        target: The robot's endpoint.
+        seed: Seed of what is lost and repeated.
+    """
+
+    def __init__(self, target, seed=0):
+        self._random = random.Random(seed)
+        self.sent, self.passed = [], []
+        """Kinds of the packages that the reader has sent; timestamps of the rows of each connection that has passed."""
+        self.slow, self.lost, self.repeated = False, 0.0, 0.0
+        """Whether the robot is of 125 Hz, and the shares of the rows that are lost and repeated."""
+        super().__init__(target)
+
+    @property
+    def delay(self):
+        """1 ms ± 0.5 ms; bytes keep their order."""
+        return self._random.uniform(5e-4, 1.5e-3)
+
+    @delay.setter
+    def delay(self, seconds):
+        del seconds
+
+    def _give(self, sink, under_way):
+        to_robot = sink.getpeername() == self._target
+        super()._give(sink, _Edited(under_way, self._asked if to_robot else self._answers()))
+
+    def _asked(self, data):
+        self.sent += [PackageKind(kind) for kind, _ in PackageReader().feed(data)]
+        return data.replace(_DOUBLE.pack(500.0), _DOUBLE.pack(125.0)) if self.slow else data
+
+    def _answers(self):
+        reader, rows = PackageReader(), []
+        self.passed.append(rows)
+
+        def answer(data):
+            out = b""
+            for kind, payload in reader.feed(data):
+                whole = package(PackageKind(kind), payload)
+                if kind == PackageKind.DATA:
+                    if self._random.random() < self.lost:
+                        continue
+                    rows.append(_DOUBLE.unpack_from(payload, 1)[0])
+                    whole *= 2 if self._random.random() < self.repeated else 1
+                out += whole
+            return out
+
+        return answer
+
+
+class _Edited:
+    def __init__(self, under_way, edit):
+        self._under_way, self._edit = under_way, edit
+
+    def get(self):
+        came, data = self._under_way.get()
+        while data and not (edited := self._edit(data)):  # nothing would end the connection
+            came, data = self._under_way.get()
+        return came, edited if data else data

@@ -1,0 +1,117 @@
+"""A connection to a robot's RTDE interface, which never blocks for longer than it is told."""
+
+import contextlib
+import os
+import selectors
+import socket
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from tvist_server.rtde.client import Row, RtdeClient, RtdeError
+from tvist_server.watching.place import PORT, Place
+
+ANSWERS = 3.0
+"""Longest time in which a robot must accept a connection and start to send [s]."""
+SILENT = 1.0
+"""Time without a byte after which a connection is lost [s], as UR's own clients have it."""
+Address = tuple[socket.AddressFamily, tuple[Any, ...]]
+"""Family of an address, and the address as `socket` has it."""
+AT_ONCE = 1 << 16
+"""Most bytes that are read at once: two seconds of rows."""
+
+
+class LostError(Exception):
+    """There is no connection, or no more; the message says why."""
+
+
+class Connection:
+    """One connection.
+
+    Args:
+        place: Where the robot is.
+        address: Its resolved address, as `socket.getaddrinfo` returns it: family and address.
+        client: What is read there.
+    """
+
+    def __init__(self, place: Place, address: Address, client: RtdeClient) -> None:
+        self._place, self.client = place, client
+        self.texts: list[str] = []
+        """Messages of the controller since somebody has emptied the list."""
+        self._begun = self._heard = time.monotonic()
+        self._connected = False
+        self._socket = socket.socket(address[0], socket.SOCK_STREAM)
+        self._selector = selectors.DefaultSelector()
+        self._socket.setblocking(False)
+        with contextlib.suppress(BlockingIOError, OSError):  # which shows when it is ready, or is not
+            self._socket.connect(address[1])
+        self._selector.register(self._socket, selectors.EVENT_WRITE)
+
+    def rows(self, timeout: float) -> Sequence[Row]:
+        """Return the rows that have come, after waiting at most `timeout` [s] for the first.
+
+        Raises:
+            LostError: The robot is not there, has gone, or is none.
+        """
+        try:
+            ready = self._selector.select(max(0.0, timeout))
+            if ready and not self._connected:
+                self._begin()
+                return ()
+            if ready:
+                return self._read()
+        except RtdeError as error:
+            raise LostError(f"{self._place}: {error}") from error
+        except OSError as error:
+            why = error.strerror or str(error)
+            raise LostError(f"no robot answers at {self._place}: {why}") from error
+        self._check_silence()
+        return ()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._selector.close()
+        self._socket.close()
+
+    def _begin(self) -> None:
+        error = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        if error:
+            raise OSError(error, os.strerror(error))
+        self._connected, self._heard = True, time.monotonic()
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._selector.modify(self._socket, selectors.EVENT_READ)
+        self._socket.sendall(self.client.begin())
+
+    def _read(self) -> Sequence[Row]:
+        data = self._socket.recv(AT_ONCE)
+        if not data:
+            raise LostError(f"the robot at {self._place} has closed the connection")
+        self._heard = time.monotonic()
+        received = self.client.receive(data)
+        self.texts += received.texts
+        if received.send:
+            self._socket.sendall(received.send)
+        return received.rows
+
+    def _check_silence(self) -> None:
+        now = time.monotonic()
+        if self.client.started and now - self._heard > SILENT:
+            raise LostError(f"the robot at {self._place} has sent nothing for {SILENT:g} s")
+        if not self.client.started and now - self._begun > ANSWERS:
+            if self._connected:
+                hint = "" if self._place.port == PORT else f", whose port is {PORT} on a robot of UR's"
+                raise LostError(f"{self._place} does not answer as RTDE does within {ANSWERS:g} s{hint}")
+            raise LostError(f"no robot answers at {self._place} within {ANSWERS:g} s")
+
+
+def resolved(place: Place) -> Address:
+    """Look up an address, which may take seconds.
+
+    Raises:
+        LostError: It has none.
+    """
+    try:
+        found = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM)[0]
+    except OSError as error:
+        raise LostError(f"{place} has no address: {error.strerror or error}") from error
+    return found[0], found[4]

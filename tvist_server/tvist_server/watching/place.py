@@ -1,0 +1,45 @@
+"""Where a robot is that is to be watched: ur://ADDRESS[:PORT]."""
+
+from typing import NamedTuple
+from urllib.parse import urlsplit
+
+SCHEME = "ur://"
+PORT = 30004
+"""Port of RTDE."""
+
+
+class Place(NamedTuple):
+    """Address of a robot's RTDE interface."""
+
+    host: str
+    """Name or IP address."""
+    port: int = PORT
+
+    def __str__(self) -> str:
+        """Return it as people write it."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{SCHEME}{host}" + ("" if self.port == PORT else f":{self.port}")
+
+
+def is_place(plant: str) -> bool:
+    """Return whether the name of a plant is meant to be the address of a robot."""
+    return plant.lower().startswith(SCHEME)
+
+
+def place_of(plant: str) -> Place:
+    """Return the address.
+
+    Raises:
+        ValueError: It is none.
+    """
+    try:
+        parts = urlsplit(plant)
+        port = PORT if parts.port is None else parts.port
+    except ValueError:  # the port is no number, or too large
+        parts, port = urlsplit(SCHEME), 0
+    if not parts.hostname or port == 0 or parts.username or parts.path.strip("/") or parts.query:
+        raise ValueError(
+            f"plant is {plant!r}: must be ur://ADDRESS or ur://ADDRESS:PORT, such as ur://192.168.0.10, with a port "
+            f"from 1 to 65535 [{PORT}, that of RTDE]"
+        )
+    return Place(parts.hostname, port)

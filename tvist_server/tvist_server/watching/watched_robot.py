@@ -1,0 +1,238 @@
+"""The robot that is watched, as a plant: it gives the ticks, and gets no command.
+
+A lost connection is looked for again once a second, without delaying the thread that ticks.
+"""
+
+import time
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from tvist_controller.instruments.ratings import joint_ratings
+from tvist_controller.line.kinematics import ForwardKinematics
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.drives import DriveCommand
+from tvist_plant.plant import PERIOD, Measurement, PlantError, Sight
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_server.rtde.client import Row, RtdeClient
+from tvist_server.watching.connection import Connection, LostError, resolved
+from tvist_server.watching.place import Place
+from tvist_server.watching.row_count import RowCount
+from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, is_finite, sight_of
+
+LOOKED_AT = 25
+"""Number of rows from which the time between two is found."""
+INTERVALS = {1: "500", 4: "125"}
+"""Control periods between two rows, and the rate of such a robot [Hz]."""
+RETRY = 1.0
+"""Time between two attempts to connect [s]."""
+TELL_EVERY = 1.0
+"""Shortest time between two sentences about missing rows [s]."""
+OTHER = 0.03
+"""Distance of the tool from where the robot file has it, from which on the robot is another model [m]; calibrated
+kinematics differ by some millimetres."""
+
+
+class WatchedRobot:
+    """Reads one robot.
+
+    Args:
+        place: Where it is.
+        description: The robot file.
+        payload: Payload, in case it does not say what it carries.
+
+    Raises:
+        PlantError: There is none, or it is none that can be watched.
+    """
+
+    def __init__(self, place: Place, description: RobotDescription, payload: Payload) -> None:
+        model = description.robot.model
+        if description.joints != JOINTS:
+            raise PlantError(
+                f"a robot of UR's has {JOINTS} joints, and a {model} {description.joints}: give --robot the model of "
+                f"the robot at {place}"
+            )
+        self._place, self._model, self.payload = place, model, payload
+        self._kinematics = ForwardKinematics(description)
+        self._constants = [rating.torque_constant for rating in joint_ratings(description)]
+        self._sights: deque[Sight] = deque()
+        self._connection: Connection | None = None
+        self._checked = False
+        """Whether the present connection has sent a row of the right robot."""
+        self._lost = 0.0, ""
+        """When the connection was lost [s], and why; nothing while it is there."""
+        self._retry_at = self._told_at = 0.0
+        self._untold = 0
+        self._notes: list[str] = []
+        try:
+            self._address = resolved(place)
+            self._look()
+        except LostError as error:
+            raise PlantError(f"{error}. {_NEXT}") from error
+
+    def measure(self) -> Measurement:
+        """Return the latest measurements."""
+        return self._last.measured
+
+    def step(self, command: DriveCommand) -> Measurement:
+        """Return the latest measurements: the command goes nowhere."""
+        del command
+        return self._last.measured
+
+    def interval(self) -> float:
+        """Return the time between two of its rows [s]."""
+        return self._interval * PERIOD
+
+    def sight(self) -> Sight:
+        """Return the next row."""
+        if not self._sights:
+            raise PlantError(f"the robot at {self._place} has said nothing new")
+        self._last = self._sights.popleft()
+        return self._last
+
+    def wait(self, timeout: float) -> bool:
+        """Wait for the next row, at most for `timeout` [s]; connect if there is no connection."""
+        if self._sights:
+            return True
+        if self._connection is None:
+            left = self._retry_at - time.monotonic()
+            if left > 0.0:
+                time.sleep(min(left, timeout))
+                return False
+            self._connect()
+        try:
+            for row in self._rows(timeout):
+                self._take(row)
+        except LostError as error:
+            self._lose(str(error))
+        return bool(self._sights)
+
+    def close(self) -> None:
+        """Close the connection."""
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
+
+    # ------------------------------------------------------------------ rows
+
+    def _look(self) -> None:
+        """Read some rows before the server ticks: what the robot is, and how fast."""
+        self._connect()
+        rows: list[Row] = []
+        try:
+            while len(rows) < LOOKED_AT:
+                rows += self._rows(1.0)
+            self._check(rows[-1])
+            version = self._client.version
+            lacking = self._client.lacking
+        finally:
+            self.close()
+        steps = np.diff([row["timestamp"][0] for row in rows]) / PERIOD
+        between = steps[steps > 0.5]
+        self._interval = round(float(between.min())) if between.size else 0
+        if self._interval not in INTERVALS:
+            found = 1.0 / (self._interval * PERIOD) if self._interval else 0.0
+            raise LostError(
+                f"the robot at {self._place} sends {found:.0f} rows a second: only robots with 125 or 500 can "
+                "be watched"
+            )
+        self._count = RowCount(self._interval)
+        self._last = self._sight(rows[-1], 0)
+        software = ".".join(map(str, version[:3]))
+        rate = INTERVALS[self._interval]
+        self._notes.append(
+            f"the robot at {self._place} (software {software}, {rate} rows a second) is watched"
+        )
+        if self._interval > 1:
+            self._notes.append(
+                "125 rows a second show vibration up to 62.5 Hz: take what is above that from a sensor of your own"
+            )
+        if lacking:
+            self._notes.append(f"its software does not tell {', '.join(lacking)}")
+
+    def _connect(self) -> None:
+        self._client = RtdeClient(NEEDED, OPTIONAL)
+        self._connection, self._checked = Connection(self._place, self._address, self._client), False
+
+    def _rows(self, timeout: float) -> list[Row]:
+        """Return the rows that have come; those of the wrong robot or without numbers end the connection."""
+        assert self._connection is not None
+        rows = list(self._connection.rows(timeout))
+        self._notes += [f"the robot says: {text}" for text in self._connection.texts]
+        self._connection.texts.clear()
+        if not all(map(is_finite, rows)):
+            raise LostError(f"the robot at {self._place} sends what is no number")
+        return rows
+
+    def _check(self, row: Row) -> None:
+        """Check that the tool is where the robot file has it; without a tool in the row nothing can be said.
+
+        Raises:
+            LostError: It is elsewhere.
+        """
+        if "tcp_offset" not in row:
+            self._notes.append(f"whether it is a {self._model} is unknown, since it does not tell its tool")
+            return
+        tool = self._kinematics.with_tool(row["tcp_offset"])
+        q = np.array(row["actual_q"])
+        here, there = np.array(tool.tool(q, np.zeros_like(q))[0][:3]), np.array(row["actual_TCP_pose"][:3])
+        apart = float(np.linalg.norm(here - there))
+        if not apart <= OTHER:
+            raise LostError(
+                f"the robot at {self._place} is no {self._model}: its tool is {1e3 * apart:.0f} mm from where the "
+                "robot file has it. Give --robot its model"
+            )
+
+    def _take(self, row: Row) -> None:
+        now, (lost_at, why) = time.monotonic(), self._lost
+        if not self._checked:
+            self._check(row)
+        counted = self._count.take(row["timestamp"][0], now, reconnected=not self._checked)
+        self._checked = True
+        if counted is None:
+            return
+        if why:
+            anew = "; its clock began anew, and ours goes on" if counted.anew else ""
+            self._notes.append(
+                f"the robot at {self._place} is back after {now - lost_at:.1f} s: {counted.missing} rows are "
+                f"missing{anew}"
+            )
+            self._lost = 0.0, ""
+        elif counted.missing:
+            self._untold += counted.missing
+        if self._untold and now - self._told_at >= TELL_EVERY:
+            due = self._count.rows + self._count.missing
+            self._notes.append(
+                f"{self._untold} rows of the robot are missing, {self._count.missing} of {due} since the start: look "
+                "at the network and at the load of this machine"
+            )
+            self._told_at, self._untold = now, 0
+        self._sights.append(self._sight(row, counted.tick))
+
+    def _sight(self, row: Row, tick: int) -> Sight:
+        sight = sight_of(row, self._constants, tick, self._count.missing, self._notes)
+        self._notes = []
+        self.payload = sight.payload or self.payload
+        return sight
+
+    def _lose(self, why: str) -> None:
+        """Give up the connection, and say so in a tick of its own; once for each reason."""
+        self.close()
+        now = time.monotonic()
+        self._retry_at = now + RETRY
+        since, before = self._lost
+        if why == before:
+            return
+        self._lost = (since if before else now), why
+        latest = self._sights[-1] if self._sights else self._last
+        modes = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
+        told = (*self._notes, f"{why}; the state stands still, and a connection is tried every second")
+        self._notes = []
+        self._sights.append(replace(latest, tick=self._count.silence(), modes=modes, told=told))
+
+
+_NEXT = (
+    "Next: see that the robot is on, that this machine reaches its address, and that its RTDE interface is enabled "
+    "in its security settings"
+)
