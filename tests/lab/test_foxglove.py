@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from tvist_cli.commands.log.export import export as export_command
 from tvist_cli.failure import Failure
+from tvist_cli.log_options import LogOptions
 from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
 from tvist_lab.foxglove.export import export
@@ -142,5 +143,5 @@ def test_a_file_that_was_cut_off_is_exported_up_to_there(run, tmp_path, capsys):
     assert read(tmp_path / "cut.foxglove.mcap").counts == read(cut).counts
     with pytest.raises(Failure, match=r"foxglove\.mcap exists already"):
         export_command(cut, to="foxglove")
-    with pytest.raises(Failure, match="columns is for a CSV"):
-        export_command(cut, to="foxglove", columns="time=t")
+    with pytest.raises(Failure, match="--imu are for logs"):
+        export_command(cut, to="foxglove", logs=LogOptions(columns="time=t"))
