@@ -88,13 +88,17 @@ def _ur5e() -> dict[str, Any]:
         info, run = asyncio.run(run_beside(name, [poses["Q1"], poses["Q3"]]))
         assert info.geometry is not None  # of our own server
         tracks.append(Track(Shown(label, Look(info.geometry, info.payload)), run.states, run.truths))
-    spans = [moves(track.signals) for track in tracks]
-    assert spans[0] is not None
-    start = spans[0][0] - 0.1
+    span = moves(tracks[0].signals)
+    assert span is not None  # it is a motion of ours
+    start, stop = span[0] - 0.1, span[1]
     packed = [track.packed(start) for track in tracks]
     for one in packed:
         one["samples"] = {name: one["samples"][name] for name in ("time", "alpha")}
-    return {"tracks": packed, "left": [largest_after_stop(track) for track in tracks]}
+    return {
+        "tracks": packed,
+        "left": [largest_after_stop(track) for track in tracks],
+        "stop": stop - start,
+    }
 
 
 def checked() -> dict[str, Any]:

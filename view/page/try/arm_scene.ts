@@ -18,13 +18,15 @@ const LINES = [
 ];
 
 export function armScene(page: Page, arm: ArmParameters): SceneOf {
-  const sliders = { q: control(page, "q", "elbow", 1, "°", 0, "hint_elbow"), e: control(page, "e", "error", 1, " %", 0, "hint_error") };
+  const sliders = { q: control(page, "q", "elbow", 1, "°", 0, "hint_elbow"), e: control(page, "e", "error", 5, " %", 0, "hint_error") };
   const chosen = choice(page, Object.keys(SHAPERS).filter((name) => name !== "none"));
   page.panel.append(sliders.q.row, sliders.e.row, chosen.row);
   const trace = newPlot(page.plots, say("plot_twist"), LINES, { least: 1, signed: true });
-  const curve = newPlot(page.plots, say("plot_left"), [...LINES.slice(1), { label: "", colour: COLOURS.without, points: true }], { least: 100, x: "%" });
+  const curve = newPlot(page.plots, say("plot_left"), [...LINES.slice(1), { label: say("this"), colour: COLOURS.without, points: true }], { least: 100, x: "%" });
   const move = marker(trace);
   let runs: ArmRun[] = [], time = 0, waiting: (() => void)[] = [], drawn = "";
+  let found: (number | null)[][] = [], here: (number | null)[] = [];
+  const showCurve = (): void => curve.show([ERRORS, ...found, here]);
 
   /** From the other end of the elbow's range, both joints turning the same way. */
   const moved = (state: State, ways: ("none" | "fixed" | "following")[], error: number): ArmRun[] => {
@@ -48,19 +50,18 @@ export function armScene(page: Page, arm: ArmParameters): SceneOf {
       page.result(say("is_left", { share: percent(shares[1] / none) }), say("explain_arm", {
         fixed: percent(shares[0] / none), elbow: state.q, f: f_d.toFixed(2), z: zeta.toFixed(3),
       }));
-      const here = [...ERRORS.map(() => null)] as (number | null)[];
       const nearest = ERRORS.reduce((best, one, k) => (Math.abs(one - state.e) < Math.abs(ERRORS[best] - state.e) ? k : best), 0);
-      here[nearest] = (100 * shares[1]) / none;
+      here = ERRORS.map((_, k) => (k === nearest ? (100 * shares[1]) / none : null));
       const key = `${state.q} ${state.s}`;
-      if (key === drawn) return;
+      if (key === drawn) return showCurve();
       drawn = key;
       // One error of the curve between two pictures, so that none of them comes late.
-      const found = [ERRORS.map(() => null), ERRORS.map(() => null)] as (number | null)[][];
+      found = [ERRORS.map(() => null), ERRORS.map(() => null)];
       curve.top = 100;
       waiting = ERRORS.map((error, k) => () => {
         moved(state, ["fixed", "following"], error / 100).forEach((one, way) => (found[way][k] = (100 * left(one)) / none));
         curve.say(k < ERRORS.length - 1 ? say("counting", { done: k + 1, count: ERRORS.length }) : "");
-        curve.show([ERRORS, ...found, ERRORS.map(() => null)]);
+        showCurve();
       });
     },
     frame(seconds) {

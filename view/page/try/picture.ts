@@ -90,9 +90,9 @@ export interface ArmShown {
 /** Arms beside each other, the twist of the shoulder magnified. */
 export function drawArms(canvas: HTMLCanvasElement, arms: ArmShown[], lengths: number[], factor: number): void {
   const { pen, width, height } = begin(canvas);
-  const cell = width / arms.length, scale = Math.min(cell / 1.05, (height - 30) / 0.8);
+  const cell = width / arms.length, scale = Math.min(cell / 0.78, (height - 34) / 0.68);
   arms.forEach(({ name, colour, motor, link }, number) => {
-    const x = cell * (number + 0.5) - 0.08 * scale, y = height - 0.2 * scale;
+    const x = cell * (number + 0.5) + 0.04 * scale, y = height - 0.11 * scale;
     label(pen, name, cell * (number + 0.5), 20, colour, "center");
     const shown = link.map((angle, j) => motor[j] + (j === 0 ? factor * (angle - motor[j]) : angle - motor[j]));
     const joints = (angles: number[]): [number, number][] => {

@@ -13,6 +13,8 @@ import type { State } from "./state.js";
 import { percent, say } from "./words.js";
 
 const LENGTH = 4, EVERY = 5, PERMITTED = 0.05, TESTED = 0.1;
+/** Shapers whose curves stand beside that of the one that is shown. */
+const BESIDE = [["zv", "#8A8A8A"], ["zvd", COLOURS.third], ["ei", "#CC79A7"]] as const;
 const ERRORS = Array.from({ length: 101 }, (_, k) => k - 50);
 
 export function springScene(page: Page, own: boolean, zetaMax: Record<string, number>): SceneOf {
@@ -25,12 +27,12 @@ export function springScene(page: Page, own: boolean, zetaMax: Record<string, nu
   const fields = own ? typing(page) : null;
   page.panel.append(...(fields ? fields.rows : []), sliders.e.row, sliders.f.row, sliders.z.row, ...(own ? [] : [chosen.row]));
   const trace = newPlot(page.plots, say("plot_swing"), [{ label: say("unshaped"), colour: COLOURS.without }, { label: say("shaped"), colour: COLOURS.with }], { least: 10, signed: true });
-  const curve = newPlot(page.plots, say("plot_left"), [{ label: "", colour: COLOURS.with }, { label: say("this"), colour: COLOURS.without, points: true }], { least: 100, x: "%" });
+  const curve = newPlot(page.plots, say("plot_left"), [...BESIDE.map(([name, colour]) => ({ label: name.toUpperCase(), colour })), { label: say("shaped"), colour: COLOURS.with }, { label: say("this"), colour: COLOURS.without, points: true }], { least: 100, x: "%" });
   const box = h("div", { class: "stems" });
   const impulses = h("figure", { class: "plot", ariaLabel: say("plot_impulses") }, h("figcaption", { class: "head" }, h("b", {}, say("plot_impulses"))), box);
   page.plots.append(impulses);
   const move = marker(trace);
-  let runs: Swing[] = [], time = 0, slow = 1;
+  let runs: Swing[] = [], time = 0;
 
   const believed = (state: State): [number, number] => [state.f * (1 + state.e / 100), state.z];
   const shaperOf = (state: State): { shaper: Shaper; name: string } | Refusal => {
@@ -49,21 +51,19 @@ export function springScene(page: Page, own: boolean, zetaMax: Record<string, nu
       fields?.set(state);
       const made = shaperOf(state);
       fields?.refuse("field" in made ? made : null);
-      if ("field" in made) return page.result("", "");
+      const unshaped = swing(state.f, state.z, { A: [1], tau: [0] }, LENGTH);
+      if ("field" in made) { // then only what needs no shaper is shown
+        runs = [unshaped];
+        return page.result("", "");
+      }
       const train = made.shaper(...believed(state)), share = residual(state.f, state.z, train);
-      runs = [swing(state.f, state.z, { A: [1], tau: [0] }, LENGTH), swing(state.f, state.z, train, LENGTH)];
+      runs = [unshaped, swing(state.f, state.z, train, LENGTH)];
       const thin = (values: number[]): number[] => values.filter((_, i) => i % EVERY === 0);
       trace.top = 10;
-      trace.show([thin(runs[0].deflection.map((_, i) => i * STEP)), ...runs.map((run) => thin(run.deflection).map((one) => -100 * one))]);
-      const left = ERRORS.map((error) => {
-        try {
-          return 100 * residual(state.f, state.z, made.shaper(state.f * (1 + error / 100), state.z));
-        } catch {
-          return null;
-        }
-      });
+      trace.show([thin(runs[0].deflection.map((_, i) => i * STEP)), ...runs.map((run) => thin(run.deflection).map((one) => 100 * one))]);
+      const over = (shaper: Shaper): number[] => ERRORS.map((error) => 100 * residual(state.f, state.z, shaper(state.f * (1 + error / 100), state.z)));
       curve.top = 100;
-      curve.show([ERRORS, left, ERRORS.map((error) => (error === Math.round(state.e) ? 100 * share : null))]);
+      curve.show([ERRORS, ...BESIDE.map(([name]) => over(SHAPERS[name])), over(made.shaper), ERRORS.map((error) => (error === Math.round(state.e) ? 100 * share : null))]);
       stems(box, train.A, train.tau);
       const range = !own && made.name !== state.s ? ` ${say("shaper_range", { name: state.s.toUpperCase(), most: zetaMax[state.s] })}` : "";
       page.result(say("is_left", { share: percent(share) }), say("explain_mass", {
@@ -73,7 +73,7 @@ export function springScene(page: Page, own: boolean, zetaMax: Record<string, nu
     },
     frame(seconds) {
       if (!runs.length) return;
-      time = (time + slow * seconds) % LENGTH;
+      time = (time + seconds) % LENGTH;
       const i = Math.min(Math.floor(time / STEP), runs[0].reference.length - 1);
       drawCarts(page.canvas, runs.map((run, k) => ({
         name: say(k === 0 ? "unshaped" : "shaped"), colour: k === 0 ? COLOURS.without : COLOURS.with,
@@ -83,7 +83,6 @@ export function springScene(page: Page, own: boolean, zetaMax: Record<string, nu
     },
     leave() {
       for (const plot of [trace, curve]) plot.remove();
-      slow = 0;
     },
   };
 }

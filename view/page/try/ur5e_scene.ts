@@ -5,18 +5,20 @@ import type { Page, SceneOf } from "./scene.js";
 import { marker } from "./scene.js";
 import { percent, say } from "./words.js";
 
-const FACTOR = 100, SLOW = 0.4;
+const FACTOR = 100, SLOW = 0.4, BEFORE = 0.15;
 const APPEARANCE = { factor: FACTOR, gravity: false, ghost: false, trace: true };
 
 export interface Ur5e {
   tracks: object[];
   /** Largest acceleration after the stop, unshaped and shaped [m/s²]. */
   left: number[];
+  /** When the reference stops before it is shaped [s]. */
+  stop: number;
 }
 
 let kept: { scene: Stage3D; tracks: Track[] } | null = null; // a page has few contexts of WebGL, so it keeps its own
 
-export function ur5eScene(page: Page, { tracks: packed, left }: Ur5e): SceneOf {
+export function ur5eScene(page: Page, { tracks: packed, left, stop }: Ur5e): SceneOf {
   const trace = newPlot(page.plots, say("plot_alpha"), [{ label: say("unshaped"), colour: COLOURS.without }, { label: say("shaped"), colour: COLOURS.with }], { least: 1 });
   const move = marker(trace);
   let time = 0, failed = false;
@@ -24,6 +26,7 @@ export function ur5eScene(page: Page, { tracks: packed, left }: Ur5e): SceneOf {
     if (!kept) {
       const scene = newScene(page.solid, { theme: theme() });
       scene.sparing = true;
+      scene.resize(page.solid.clientWidth, page.solid.clientHeight); // its look depends on the picture's shape
       const tracks = packed.map((one, number) => newTrack(scene, one, number, packed.length));
       scene.keep(tracks.flatMap((track) => track.outlines(APPEARANCE)));
       kept = { scene, tracks };
@@ -40,9 +43,9 @@ export function ur5eScene(page: Page, { tracks: packed, left }: Ur5e): SceneOf {
     show() {
       if (kept) {
         const longest = kept.tracks.reduce((a, b) => (b.samples.time.length > a.samples.time.length ? b : a)).samples.time;
-        const from = longest.findIndex((one) => one >= 0), shown = Array.from(longest).slice(from).filter((_, i) => i % 2 === 0);
+        const from = longest.findIndex((one) => one >= stop - BEFORE), shown = Array.from(longest).slice(from);
         trace.show([shown, ...kept.tracks.map(({ samples }) => shown.map((_, i) => {
-          const value = samples.alpha[from + 2 * i];
+          const value = samples.alpha[from + i];
           return Number.isFinite(value) ? value : null;
         }))]);
       }
@@ -53,7 +56,7 @@ export function ur5eScene(page: Page, { tracks: packed, left }: Ur5e): SceneOf {
       time = (time + SLOW * seconds) % end;
       for (const track of kept.tracks) track.robot.show(track.row(time), APPEARANCE);
       kept.scene.draw(seconds);
-      move(time / end);
+      move((time - stop + BEFORE) / (end - stop + BEFORE));
     },
     leave() {
       watched.disconnect();
