@@ -1,7 +1,7 @@
-"""`python -m tools.try_page`: writes what the page for trying shaping takes from the packages, and what it is checked by.
+"""`python -m tools.try_page`: writes what the page for trying shaping takes from the packages, and what checks it.
 
-In `view/page/try/made`, `taken.json` becomes part of the page: the catalogue's rows, the arm with one flexible joint, and
-a UR5e's motion from Q1 to Q3. `checked.json` has numbers of the packages, which a test compares with those of the page.
+In `view/page/try/made`, `taken.json` becomes part of the page: the catalogue's rows, the arm with one flexible joint,
+and a UR5e's motion from Q1 to Q3. `checked.json` has numbers of the packages, which a test compares with those of the page.
 Runs in a checkout; `make page` builds the page.
 """
 
@@ -121,9 +121,9 @@ def _of_shaper(name: str, f_d: float, zeta: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _band(name: str) -> list[float | None]:
-    """Band of 5 % without damping, in design frequencies; None is infinite."""
-    return [end if np.isfinite(end) else None for end in SHAPERS[name].band(0.05)]
+def _band(name: str) -> list[float | str]:
+    """Band of 5 % without damping, in design frequencies; what is not finite as a word."""
+    return [end if np.isfinite(end) else str(end) for end in SHAPERS[name].band(0.05)]
 
 
 def _filtered() -> dict[str, Any]:
