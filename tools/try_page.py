@@ -1,8 +1,8 @@
 """`python -m tools.try_page`: writes what the page for trying shaping takes from the packages, and what checks it.
 
 In `view/page/try/made`, `taken.json` becomes part of the page: the catalogue's rows, the arm with one flexible joint,
-and a UR5e's motion from Q1 to Q3. `checked.json` has numbers of the packages, which a test compares with those of the page.
-Runs in a checkout; `make page` builds the page.
+and a UR5e's motion from Q1 to Q3. `checked.json` has numbers of the packages, which a test compares with those of the
+page. Runs in a checkout; `make page` builds the page.
 """
 
 import asyncio
