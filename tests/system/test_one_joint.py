@@ -82,3 +82,14 @@ def test_the_lesson_prints_its_numbers_and_draws_its_figure(tmp_path):
     assert said["poses"]["Q1"]["left_percent"]["zv_fixed"] > 25.0
     assert said["poses"]["Q1"]["left_percent"]["tvist_identified"] < 2.0
     assert (tmp_path / "figure_02.png").exists()
+
+
+def test_a_port_for_a_lesson_that_is_not_served_is_refused():
+    tvist("lesson", "--port", "9000").assert_failed(2, "give --serve, too")
+
+
+def test_the_lesson_is_a_file_that_is_there(monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    said = "".join(tvist("lesson").assert_done().out.split("\n"))
+    assert "try.html: open it in any browser" in said

@@ -48,7 +48,7 @@ def test_the_curve_is_zero_without_an_error_and_rises_to_both_sides():
 
 
 def test_every_browser_has_sliders_of_its_own():
-    with Page(command="lesson") as served, browser() as chromium:
+    with Page("--serve", command="lesson") as served, browser() as chromium:
         first = opened(chromium, served)
         before = words(first)
         first.get_by_role("slider").first.press("End")

@@ -13,6 +13,10 @@ ASSETS = Path(__file__).parent / "assets"
 LOGO = Path("docs/images/logo.svg")
 FIRST = "---\nhide: [navigation, toc]\n---\n\n"
 """What stands above the front page: it has the whole width."""
+TRY = ROOT / "view" / "tvist_view" / "try.html"
+FRAME = '<iframe class="try" src="try.html" title="Try shaping"></iframe>\n\n'
+"""The page to try shaping, which the front page of the site has above its picture."""
+PICTURE = "<picture>"
 
 
 def stage(folder: Path) -> Path:
@@ -31,7 +35,10 @@ def stage(folder: Path) -> Path:
     pages, others = collect()
     to = folder / "pages"
     for page in pages:
-        text = (FIRST if page == HOME else "") + _with_links_of_the_site(page)
+        text = _with_links_of_the_site(page)
+        if page == HOME:
+            assert PICTURE in text
+            text = FIRST + text.replace(PICTURE, FRAME + PICTURE, 1)
         _write(to / page.relative_to(ROOT), text)
     for path in (path for path in others if path.suffix in sources.PICTURES):
         _place(to / path.relative_to(ROOT)).write_bytes(path.read_bytes())
@@ -41,6 +48,7 @@ def stage(folder: Path) -> Path:
             _write(to / path, text)
     _write(to / reference.FOLDER / "README.md", reference.overview(modules))
     _place(to / LOGO).write_bytes((ROOT / LOGO).read_bytes())
+    _place(to / TRY.name).write_bytes(TRY.read_bytes())
     shutil.copytree(ASSETS, to / "assets")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     configuration = {

@@ -1,10 +1,14 @@
 """`tvist lesson`: one flexible joint and two impulses, on a page or in numbers."""
 
 import asyncio
+import os
+import sys
+import webbrowser
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tvist_cli.failure import told
+from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import out, print_json, progress, table, typed
 from tvist_cli.pages import Door, serve_page
@@ -13,6 +17,8 @@ from tvist_cli.serving import compile_if_new
 if TYPE_CHECKING:
     from tvist_view.lesson import Compared, OneMass
 
+HERE = Door("127.0.0.1", 8080, insecure=False)
+"""Where the page is served if nothing else is asked."""
 MOVED = ("Q1", "Q2")
 """The motion of the UR5e: it ends stretched out, where it is slowest."""
 
@@ -23,12 +29,16 @@ def lesson(
     figures: Path | None = None,
     look: FigureOptions = AS_USUAL,
     markdown: Path | None = None,
-    address: str = "127.0.0.1",
-    port: int = 8080,
-    insecure: bool = False,
+    serve: bool = False,
+    address: str = HERE.address,
+    port: int = HERE.port,
+    insecure: bool = HERE.insecure,
     json: bool = False,
 ) -> None:
-    """Show on a web page why an arm rings and what two impulses do about it: one mass first, then the UR5e.
+    """Open a page on which to try shaping: a mass on a spring, an arm that folds, a shaper of your own, a UR5e.
+
+    The page is one file that computes in the browser, without a server or a network; the command says where it is, to
+    be copied. With --serve, a page is served instead whose simulated UR5e moves with the error that you choose.
 
     With --numbers, --figures, --markdown or --json there is no page: the robot one-joint is simulated, which takes
     about ten seconds. It is plucked at many angles of its elbow, to compare its frequency and damping with their
@@ -39,17 +49,24 @@ def lesson(
         figures: Folder to write figure 2 to.
         look: How to write the figures.
         markdown: File to write a page with the formulas and the tables to.
-        address: Address on which the page is served.
-        port: Port on which the page is served; 0 takes a free one.
-        insecure: Serve the page to other machines.
+        serve: Serve a page whose UR5e is simulated as you ask, until Control+C.
+        address: With --serve: address on which the page is served.
+        port: With --serve: port on which the page is served; 0 takes a free one.
+        insecure: With --serve: serve the page to other machines.
         json: Print one JSON object.
     """
     look.check(figures, markdown)
+    door = Door(address, port, insecure)
+    if not serve and door != HERE:
+        raise Failure("address, port and insecure are of a page that is served: give --serve, too", code=2)
     if not (numbers or json or figures is not None or markdown is not None):
+        if not serve:
+            _open_page()
+            return
         from tvist_view.lesson import Lesson
 
         shown = Lesson(_one_mass(), _moved)
-        serve_page(shown.page, shown.meet, Door(address, port, insecure))
+        serve_page(shown.page, shown.meet, door)
         return
     from tvist_lab.one_joint import lesson as run
     from tvist_lab.one_joint.markdown import MODES, delays, left, modes, page
@@ -79,6 +96,17 @@ def lesson(
         left(done),
     )
     table("how much longer the motions last", ("", *ends), delays(done))
+
+
+def _open_page() -> None:
+    """Say where the page is, and show it in the browser of a graphical session."""
+    page = Path(str(files("tvist_view").joinpath("try.html")))
+    out.print(f"the page is the file {page}: open it in any browser, or copy it to wherever it is wanted")
+    graphical = sys.platform in {"darwin", "win32"} or bool(
+        {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()
+    )
+    if graphical:  # elsewhere a browser in the terminal would open, which draws nothing
+        webbrowser.open(page.as_uri())
 
 
 def _one_mass() -> "OneMass":
