@@ -67,3 +67,15 @@ def test_a_stop_that_does_not_ring_says_nothing():
         q = poses(random)
         found += heard(listener, ring_down(listener, 0, q, 1.0, 0.0, random), q)
     assert len(found) <= 2
+
+
+def test_a_stop_with_missing_readings_says_nothing_and_does_not_count():
+    random = np.random.default_rng(2)
+    listener, found = RingListener(ROBOT, None, PAYLOAD), []
+    for stop in range(FIRST + 1):
+        q = poses(random)
+        alpha = ring_down(listener, 12, q, 1.0, 0.8, random)
+        alpha[20, 0] = np.nan if stop == 0 else alpha[20, 0]
+        found += heard(listener, alpha, q)
+    assert len(found) >= FIRST - 2
+    assert abs(np.log(BASES[listener._base] / BASES[12])) < 0.5

@@ -485,3 +485,13 @@ def test_names_for_a_file_that_has_its_own_are_not_used_and_a_note_says_so(tmp_p
     found = read(path, "q=joint_{}:deg")
     assert found["actual_q"][:, 0] == pytest.approx(np.sin(t))
     assert found.notes[-1] == "its columns have names, so those given were not used"
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_that_overflow_are_refused_by_their_line_alone(tmp_path):
+    file = tmp_path / "log.csv"
+    rows = (f"{0.002 * k:.3f},0.1,0.1,1e308,1e308,1e308" for k in range(50))
+    names = [f"actual_tool_accelerometer_{k}" for k in range(3)]
+    file.write_text("\n".join([",".join(["timestamp", "actual_q_0", "actual_q_1", *names]), *rows]) + "\n")
+    with pytest.raises(RecordingError, match=r"line 2, .*no number of a robot"):
+        read(file)

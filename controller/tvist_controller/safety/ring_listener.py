@@ -159,6 +159,8 @@ class RingListener:
             so far with the one by which it is found.
         """
         alpha, count = alpha[SKIP : self._columns.shape[1]], alpha[SKIP : self._columns.shape[1]].size
+        if not np.isfinite(alpha).all():  # as of a log in which the accelerometer has a gap
+            return []
         chosen = range(len(BASES)) if self._base is None else [self._base]
         left = np.empty((len(chosen), len(SCALES)))
         for row, base in enumerate(chosen):
