@@ -70,7 +70,8 @@ def test_the_best_shaper_of_one_mode_is_aimed_at_it_and_leaves_nearly_nothing(ri
     assert advice.best.aim.modes[0][0][0] == pytest.approx(MODE[0], rel=0.03)
     assert advice.best.left_percent < 10.0
     assert advice.best.still_s < advice.still_s
-    (line,) = command(advice, [rings])
+    imports, line = command(advice, [rings])
+    assert imports == "from tvist_shaping import Fixed, make_filter"
     assert line.startswith(f'shaped = make_filter("{advice.best.shaper}", Fixed(f_d=[')
 
 
@@ -117,6 +118,30 @@ def test_there_is_nothing_to_do_where_nothing_rings():
     assert advice.best is None
     assert verdict(advice, [log])[0].startswith("Nothing to do")
     assert command(advice, [log]) == []
+
+
+@pytest.mark.parametrize("mode", [(9.0, 0.002, 2.0), (9.0, 0.02, 2.0), (4.0, 0.01, 2.0)])
+def test_what_still_rings_when_the_rest_ends_is_no_noise(mode):
+    advice = advise([log_of(mode, motions=3)])
+    assert len(advice.ringing) == 3
+    assert advice.best.aim.modes[0][0][0] == pytest.approx(mode[0], rel=0.03)
+
+
+def test_a_frequency_at_the_end_of_the_search_is_no_advice():
+    log = log_of((1.5, 0.02, 2.0), motions=3)
+    advice = advise([log])
+    assert advice.best is None
+    assert "none from 5 to 25 Hz" in verdict(advice, [log])[0]
+
+
+def test_logs_of_different_robots_are_refused(tmp_path):
+    for joints in (5, 6):
+        t = 0.002 * np.arange(500)
+        names = ",".join(["timestamp", *(f"actual_q_{i}" for i in range(joints))])
+        rows = np.column_stack([t] + [np.sin(t)] * joints)
+        np.savetxt(tmp_path / f"{joints}.csv", rows, "%g", ",", header=names, comments="")
+    with pytest.raises(Failure, match=r"one robot: .* have 5 and 6 joints"):
+        command_line(tmp_path / "5.csv", tmp_path / "6.csv")
 
 
 def test_motions_that_were_shaped_are_told_apart(recorded):

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from tvist_lab.advice.advise import Advice
-from tvist_lab.advice.options import EACH, ROBOT, Modes, Option
+from tvist_lab.advice.options import ANY, EACH, ROBOT, Modes, Option
 from tvist_lab.metrics import Measured
 from tvist_lab.words import counted, spread
 
-NEVER = "beyond the recorded rest"
+NEVER = "ring longer than the recorded rest"
 NAMED = 3
 """Largest number of modes that a sentence names."""
 
@@ -32,7 +32,7 @@ def verdict(advice: Advice, logs: Sequence[Measured]) -> list[str]:
         said.append(
             f"{counted(len(advice.shaped), 'motion')} made with {names} already: not counted as unshaped."
         )
-    if any(_untold(log) for log in logs):
+    if advice.best is not None and any(_untold(log) for log in logs):
         said.append(
             "A log without the reference before shaping cannot show whether a shaper was on: it must have been off."
         )
@@ -61,11 +61,25 @@ def _first(advice: Advice) -> str:
             )
         return f"{lead}{sooner}, for motions that end {1e3 * best.added_s:.0f} ms later."
     if advice.ringing:
-        return "No shaper that keeps the arm's limits would help: change the motions or the mount."
+        return _none_helps(advice)
     if advice.quiet:
         return f"Nothing to do: nothing rings noticeably after {counted(measured, 'unshaped stop')}."
     if advice.shaped:
         return "No advice: every motion had a shaper already. Record the same motions without one."
+    return _unmeasured(advice)
+
+
+def _none_helps(advice: Advice) -> str:
+    if advice.options:
+        return "No shaper that keeps the arm's limits would help: change the motions or the mount."
+    low, high = ANY
+    return (
+        f"No advice: what rings has no frequency that is known, or none from {low:g} to {high:g} Hz. Record longer "
+        "rests, and each motion several times."
+    )
+
+
+def _unmeasured(advice: Advice) -> str:
     if advice.weak is not None:
         f_d, count = advice.weak
         return (
@@ -73,8 +87,9 @@ def _first(advice: Advice) -> str:
             "which is weak evidence: record the tool's acceleration."
         )
     why = Counter(reason for *_, reason in advice.refused).most_common(1)
-    reason = f" ({why[0][0]})" if why else ""
-    return f"No advice: no stop could be measured{reason}. Record the tool's acceleration, and rests of a second."
+    if not why:
+        return "No advice: nothing moves in the log. Record motions with a second of rest after each."
+    return f"No advice: no stop could be measured ({why[0][0]}). Record the tool's acceleration, and rests of a second."
 
 
 def _ringing(advice: Advice) -> str:
@@ -85,8 +100,9 @@ def _ringing(advice: Advice) -> str:
         f"{one.f_d:.1f} Hz (ζ {one.zeta:.2f}, {one.motions} of them)" for one in advice.modes[:NAMED]
     )
     until = f", still {spread(known, 'ms')} after the stop" if known else ""
-    later = f", {len(stills) - len(known)} only {NEVER}" if len(known) < len(stills) else ""
-    return f"{len(advice.ringing)} of {many} ring{f' at {modes}' if modes else ''}{until}{later}."
+    later = f"; {len(stills) - len(known)} of them {NEVER}" if len(known) < len(stills) else ""
+    rings = "rings" if len(advice.ringing) == 1 else "ring"
+    return f"{len(advice.ringing)} of {many} {rings}{f' at {modes}' if modes else ''}{until}{later}."
 
 
 def _reasons(advice: Advice, best: Option) -> list[str]:
@@ -98,7 +114,8 @@ def _reasons(advice: Advice, best: Option) -> list[str]:
     said = [f"Instead of a shaper, {' and '.join(others)}."] if others else []
     if best.aim.optimistic:
         many = counted(len(best.aim.optimistic), "motion")
-        said.append(f"Without repetitions, {many} are predicted from their own modes, which is optimistic.")
+        alone = "is predicted from its" if len(best.aim.optimistic) == 1 else "are predicted from their"
+        said.append(f"Without repetitions, {many} {alone} own modes, which is optimistic.")
     return said
 
 
@@ -136,7 +153,9 @@ def command(advice: Advice, logs: Sequence[Measured]) -> list[str]:
             break
         numbers = sorted({one.number for one in advice.ringing if one.group == group})
         lines[-1] += f"  # before motion {', '.join(map(str, numbers))}"
-    return [*lines, f'await arm.set_shaper("{best.shaper}", modes={best.count})'] if ours else lines
+    if ours:
+        return [*lines, f'await arm.set_shaper("{best.shaper}", modes={best.count})']
+    return ["from tvist_shaping import Fixed, make_filter", *lines]
 
 
 def _joints(logs: Sequence[Measured]) -> int:

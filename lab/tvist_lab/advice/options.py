@@ -115,6 +115,9 @@ def options(stops: Sequence[Stop]) -> list[Option]:
     return [
         option
         for aim in _aims(stops)
+        if not any(
+            f_d in ANY for modes in aim.judged.values() for f_d, _ in modes
+        )  # the search ended at its limit
         for name in SHAPERS
         if name != "none" and (option := _judged(name, aim)) is not None
     ]

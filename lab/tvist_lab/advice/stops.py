@@ -7,7 +7,7 @@ What the gears excite is no such sum, see `ripple`.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -15,9 +15,10 @@ import numpy as np
 
 from tvist_lab.advice.ripple import Ripple, fitted, poles_of
 from tvist_lab.metrics import Measured, MotionResult, MotionRows, NotMeasurableError
-from tvist_lab.metrics.common_clock import NOISE_PEAK, STILL
+from tvist_lab.metrics.common_clock import NOISE_PEAK, RINGS, STILL
 from tvist_lab.metrics.comparison import Way
 from tvist_lab.metrics.felt import felt
+from tvist_lab.metrics.ring_down import fit_ring_down
 from tvist_lab.metrics.vibration import low_pass_at
 from tvist_lab.recordings import Floats
 from tvist_shaping import Impulses
@@ -96,8 +97,7 @@ class Stop:
             even, recording.time[rows] - recording.time[motion.arm_stop(recording)], recording[name][rows]
         )
         time = even
-        tail = alpha[time >= time[-1] - TAIL]
-        noise = float(np.sum(np.var(tail, axis=0)))
+        noise = _noise(alpha[time >= time[-1] - TAIL], recording.period)
         return cls(file, place + 1, measured, motion, measured.results[place], time, alpha, q, noise)
 
     @cached_property
@@ -178,6 +178,12 @@ class Stop:
         return Left((max(float(np.mean(power[counts])) - noise, 0.0) + least) ** 0.5, still)
 
 
+def _noise(tail: Floats, period: float) -> float:
+    """Mean square of the noise over all axes [m²/s⁴]: of a tail that still rings, what its modes leave."""
+    rings = fit_ring_down(tail, period, modes=2, offset=True, skip=0.0, window=TAIL)
+    return 3.0 * rings.rms**2 if rings.r_squared > RINGS else float(np.sum(np.var(tail, axis=0)))
+
+
 def _at(times: Floats, time: Floats, values: Floats) -> Floats:
     return np.column_stack([np.interp(times, time, axis) for axis in values.T])
 
@@ -189,8 +195,6 @@ def shaped_by(stop: Stop, impulses: Impulses, *, gears: bool = True) -> Left:
 
 def grouped(stops: Sequence[Stop]) -> list[Stop]:
     """Return the stops with the numbers of their motions, and with the least noise that each file's sensor shows."""
-    from dataclasses import replace
-
     noise = {
         file: min(one.noise for one in stops if one.file == file) for file in {one.file for one in stops}
     }

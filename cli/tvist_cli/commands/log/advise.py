@@ -41,6 +41,10 @@ def advise(
         for recording in logs.read(*files):
             measured.append(Measured.of(recording))
             bar(1, None)
+    joints = sorted({log.recording["actual_q"].shape[1] for log in measured})
+    if len(joints) > 1:
+        have = " and ".join(map(str, joints))
+        raise Failure(f"advice is about one robot: these logs have {have} joints; give the logs of one")
     notes = [
         f"{file}: {note}" for file, log in zip(files, measured, strict=True) for note in log.recording.notes
     ]
