@@ -37,6 +37,8 @@ def changes(measured: Measured) -> list[str]:
     A recording of this controller is judged as the robot judges itself, see `FitMonitor`. Of a log of another one the
     masses are not known: there the strongest mode after each stop is compared with those before in the same pose.
     """
+    if not measured.motions:
+        return []
     recording = measured.recording
     description = None if recording.info is None or recording.foreign else _described(recording.info.model)
     if (
