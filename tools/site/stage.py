@@ -82,7 +82,10 @@ def _with_links_of_the_site(page: Path) -> str:
     for match in reversed(links(text)):
         target, mark, anchor = match["target"].partition("#")
         path = linked(page, target)
-        if path.suffix != ".md" and path.suffix not in sources.PICTURES:
+        if path == TRY:  # its anchor says what it shows
+            way = sources.way(page.relative_to(ROOT), Path(TRY.name))
+            text = text[: match.start()] + way + mark + anchor + text[match.end() :]
+        elif path.suffix != ".md" and path.suffix not in sources.PICTURES:
             text = sources.to_repository(text, match.start(), match.end(), path)
         elif target:
             way = sources.way(page.relative_to(ROOT), path.relative_to(ROOT))
