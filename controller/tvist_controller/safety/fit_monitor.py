@@ -1,6 +1,7 @@
 """Whether the arm is still the one of the motions before: payload, gears, and what rings after stops."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -119,7 +120,7 @@ class FitMonitor:
         detectors, said = (self._mass, self._modes), self._said
         excess, bound = mass
         if bound < 2.0 * HEAVY:
-            said += _told("payload_mismatch", _of_mass(detectors[0].take(excess, 0.5 * bound)))
+            said += _told("payload_mismatch", detectors[0].take(excess, 0.5 * bound), _of_mass)
         yield
         for joint, detector in enumerate(self._gears):
             if twist[joint] * torque[joint] <= 0.0:
@@ -127,21 +128,23 @@ class FitMonitor:
             error = float(np.hypot(FRICTION * self._friction[joint] / torque[joint], OFF / twist[joint]))
             if error < VAGUE:
                 softer = float(np.log(twist[joint] * self._stiffness[joint] / torque[joint]))
-                said += _told("model_mismatch", _of_gear(detector.take(softer, error), self._names[joint]))
+                said += _told(
+                    "model_mismatch",
+                    detector.take(softer, error),
+                    partial(_of_gear, joint=self._names[joint]),
+                )
                 yield
         heard = yield from self._listener.study(alpha, q)
         for u, error in heard:
-            said += _told("model_mismatch", _of_modes(detectors[1].take(u, error)))
+            said += _told("model_mismatch", detectors[1].take(u, error), _of_modes)
             yield
 
 
-def _told(code: Code, why: str) -> list[tuple[Code, str]]:
-    return [(code, why)] if why else []
+def _told(code: Code, change: Change | None, why: Callable[[Change], str]) -> list[tuple[Code, str]]:
+    return [] if change is None else [(code, why(change))]
 
 
-def _of_mass(change: Change | None) -> str:
-    if change is None:
-        return ""
+def _of_mass(change: Change) -> str:
     more = change.after - change.before
     return (
         f"the arm carries about {abs(more):.1f} kg {'more' if more > 0.0 else 'less'} than in the motions before "
@@ -150,9 +153,7 @@ def _of_mass(change: Change | None) -> str:
     )
 
 
-def _of_gear(change: Change | None, joint: str) -> str:
-    if change is None:
-        return ""
+def _of_gear(change: Change, joint: str) -> str:
     stiffness = 100.0 * (np.exp(change.before - change.after) - 1.0)
     return (
         f"the gear of the {joint} is {abs(stiffness):.0f} % {'softer' if stiffness < 0.0 else 'stiffer'} than in "
@@ -161,9 +162,7 @@ def _of_gear(change: Change | None, joint: str) -> str:
     )
 
 
-def _of_modes(change: Change | None) -> str:
-    if change is None:
-        return ""
+def _of_modes(change: Change) -> str:
     higher = 100.0 * (np.exp(change.after - change.before) - 1.0)
     return (
         f"what rings after stops is {abs(higher):.0f} % {'higher' if higher > 0.0 else 'lower'} in frequency than "

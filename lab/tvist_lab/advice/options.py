@@ -139,12 +139,22 @@ def _judged(name: str, aim: Aim) -> Option | None:
 
 def by_the_modes(stop: Stop, impulses: Impulses) -> float | None:
     """Root of the share of a stop's modes' energy that impulses leave [-]; None if no modes are known."""
+    return left_of_modes(stop, lambda f_d, zeta: float(residual(f_d, zeta, impulses)))
+
+
+def left_of_modes(stop: Stop, left: Callable[[float, float], float]) -> float | None:
+    """Root of the share of a stop's modes' energy that is left [-]; None if no modes are known.
+
+    Args:
+        stop: A recorded stop.
+        left: From f_d [Hz] and ζ of a mode, the share of its amplitude that is left [-].
+    """
     before = after = 0.0
     for mode in stop.result.modes:
         f_d, zeta = mode["f_d_hz"], mode["zeta"]
         energy = mode["amplitude"] ** 2 / decay_rate(f_d, zeta)
         before += energy
-        after += energy * float(residual(f_d, zeta, impulses)) ** 2
+        after += energy * left(f_d, zeta) ** 2
     return math.sqrt(after / before) if before > 0.0 else None
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from tvist_lab.advice.options import left_of_modes
 from tvist_lab.advice.stops import Stop
 from tvist_lab.metrics import NotMeasurableError
 from tvist_lab.metrics.ring_down import decay_rate
@@ -44,20 +45,16 @@ def slowed(stop: Stop, added: float) -> float | None:
         Root of the energy of the modes over that of the recorded motion; None if no modes or no joint angles are known.
     """
     time, speed = _speed(stop)
-    if not stop.result.modes or time[-1] <= time[0]:
+    if time[-1] <= time[0]:
         return None
     slower = 1.0 + added / float(time[-1] - time[0])
-    before = after = 0.0
-    for mode in stop.result.modes:
-        rate = decay_rate(mode["f_d_hz"], mode["zeta"])
-        pole = complex(rate, 2.0 * math.pi * mode["f_d_hz"])
-        energy = mode["amplitude"] ** 2 / rate
-        excited = [
-            abs(np.trapezoid(speed * np.exp(k * pole * (time - time[-1])), time)) for k in (1.0, slower)
-        ]
-        before += energy
-        after += energy * float(excited[1] / excited[0]) ** 2
-    return 100.0 * math.sqrt(after / before)
+
+    def excited(f_d: float, zeta: float, slowness: float) -> float:
+        pole = slowness * complex(decay_rate(f_d, zeta), 2.0 * math.pi * f_d)
+        return float(abs(np.trapezoid(speed * np.exp(pole * (time - time[-1])), time)))
+
+    share = left_of_modes(stop, lambda f_d, zeta: excited(f_d, zeta, slower) / excited(f_d, zeta, 1.0))
+    return None if share is None else 100.0 * share
 
 
 def _speed(stop: Stop) -> tuple[Floats, Floats]:
