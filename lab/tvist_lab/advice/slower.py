@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from tvist_lab.advice.options import left_of_modes
-from tvist_lab.advice.stops import Stop
+from tvist_lab.advice.stops import Stop, followed
 from tvist_lab.metrics import NotMeasurableError
 from tvist_lab.metrics.ring_down import decay_rate
 from tvist_lab.recordings import Floats
@@ -61,7 +61,6 @@ def _speed(stop: Stop) -> tuple[Floats, Floats]:
     """Time until the reference stops [s], and the speed of the joint that moves farthest [rad/s]."""
     recording, motion = stop.measured.recording, stop.motion
     rows = slice(motion.start, motion.reference_stop + 2)
-    name = next(one for one in ("reference_q", "target_q", "actual_q") if one in recording)
-    q, time = recording[name][rows], recording.time[rows]
+    q, time = recording[followed(recording)][rows], recording.time[rows]
     joint = int(np.argmax(np.ptp(q, axis=0)))
     return time, np.asarray(np.gradient(q[:, joint], time))

@@ -20,7 +20,7 @@ from tvist_lab.metrics.comparison import Way
 from tvist_lab.metrics.felt import felt
 from tvist_lab.metrics.ring_down import fit_ring_down
 from tvist_lab.metrics.vibration import low_pass_at
-from tvist_lab.recordings import Floats
+from tvist_lab.recordings import Floats, Recording
 from tvist_shaping import Impulses
 
 LATE = 0.02
@@ -91,7 +91,7 @@ class Stop:
             raise NotMeasurableError("the accelerometer shows the same value throughout the rest")
         even = np.arange(time[0], time[-1], recording.period)
         alpha = _at(even, time, low_pass_at(time, alpha, recording.period))
-        name = next(one for one in ("reference_q", "target_q", "actual_q") if one in recording)
+        name = followed(recording)
         rows = slice(motion.start, motion.end)
         q = _at(
             even, recording.time[rows] - recording.time[motion.arm_stop(recording)], recording[name][rows]
@@ -176,6 +176,11 @@ class Stop:
             still = np.inf
         least = (NONLINEAR * self.unshaped.rms) ** 2 if len(sizes) > 1 else 0.0
         return Left((max(float(np.mean(power[counts])) - noise, 0.0) + least) ** 0.5, still)
+
+
+def followed(recording: Recording) -> str:
+    """Return the column of joint angles that is nearest to the reference."""
+    return next(one for one in ("reference_q", "target_q", "actual_q") if one in recording)
 
 
 def _noise(tail: Floats, period: float) -> float:

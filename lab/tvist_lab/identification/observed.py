@@ -11,6 +11,7 @@ from tvist_lab.identification.everyday_stops import INEXACT, Log, Stop, noise_of
 from tvist_lab.metrics import MotionRows, motions
 from tvist_lab.metrics.vibration import SENSOR
 from tvist_lab.recordings import Floats, RecordingError
+from tvist_lab.recordings.kabsch import rotation
 from tvist_lab.study.line import Unchanged
 from tvist_plant.description import RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
@@ -165,9 +166,8 @@ def felt_by(response: Response, motion: Observed, mounting: Floats) -> Floats:
 
 
 def mounting_of(pairs: Sequence[tuple[Floats, Floats]]) -> Floats:
-    """Rotation from flange to accelerometer, from simulated and measured forces (Kabsch, 1976), shape (3, 3)."""
-    u, _, v = np.linalg.svd(sum((measured.T @ simulated for simulated, measured in pairs), np.zeros((3, 3))))
-    return np.asarray(u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v)
+    """Rotation from flange to accelerometer, from simulated and measured forces, shape (3, 3)."""
+    return rotation(sum((measured.T @ simulated for simulated, measured in pairs), np.zeros((3, 3))))
 
 
 def apart(response: Response, motion: Observed, mounting: Floats, torque: Floats) -> Floats:

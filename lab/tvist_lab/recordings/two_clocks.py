@@ -13,6 +13,7 @@ from scipy.signal import correlate, find_peaks
 from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
+from tvist_lab.recordings import kabsch
 from tvist_lab.recordings.flange_motion import RATE, Felt
 from tvist_lab.recordings.recording import Floats
 
@@ -117,9 +118,7 @@ def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | No
         w, moved, since = first.vector[both], rate[both], t[both] - middle
         u = np.column_stack([np.interp(then[both], other.time, axis) for axis in other.vector.T])
         if rotation is None:
-            left_basis, _, right_basis = np.linalg.svd((w - w.mean(0)).T @ (u - u.mean(0)))
-            left_basis[:, 2] *= np.linalg.det(left_basis @ right_basis)
-            rotation = Rotation.from_matrix(left_basis @ right_basis)
+            rotation = Rotation.from_matrix(kabsch.rotation((w - w.mean(0)).T @ (u - u.mean(0))))
         u = rotation.apply(u)
         X = np.concatenate(
             [np.stack([moved, moved * since[:, None]], axis=2), _turns(u),
