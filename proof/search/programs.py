@@ -7,8 +7,6 @@ from typing import Any
 from proof.search import space
 from proof.search.scripts import Author
 from proof.search.sequences import SENT, Sequence
-from tvist_controller.api.line import CLEARANCE
-from tvist_lab.recordings import Floats
 from tvist_protocol import programs as p
 from tvist_protocol.io import SetRegisters
 from tvist_protocol.replies import Refused
@@ -23,13 +21,6 @@ STARTERS = (
     frozenset({"move", "stream", "program_run", "program_load", "program_play", *space.SENT}) - STOPPERS
 )
 """Commands that ask for motions."""
-
-DIP = 1e-4
-"""How much nearer than the clearance two bodies may be [m].
-
-Ways are checked at places up to 4 mm apart, and a curved one may be some 0.03 mm nearer in between. Programs find such
-places, since they often begin where the one before was stopped at the clearance.
-"""
 
 
 class ProgramSequence(Sequence):
@@ -104,11 +95,6 @@ class ProgramSequence(Sequence):
         orphan = controller.motion.motions.running and self._number not in self.robot.numbers
         if orphan and controller.programs.state == "STOPPED" and controller.motion.activity in DRIVEN:
             raise self._broken("a program has ended, and its motion goes on")
-
-    def _watch_clearance(self, q: Floats) -> None:
-        meeting = self.robot.controller.motion.collisions.meeting(q[-1])
-        if meeting is None or meeting.distance < CLEARANCE - DIP:
-            super()._watch_clearance(q)
 
     def _hear(self, event: Event) -> None:
         if event.kind != "motion_started":
