@@ -1,13 +1,12 @@
 """A real UR5 that rings: seven stops of a published recording, see `data/NOTICE`."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tvist_lab.metrics import Measured, NotMeasurableError, predicted
-from tvist_lab.metrics.vibration import SENSOR
+from tvist_lab.advice import advise
+from tvist_lab.metrics import Measured
 from tvist_lab.recordings import read
 
 RECORDED = Path(__file__).parent / "data" / "ur5_stops.csv.gz"
@@ -72,26 +71,10 @@ def test_repetitions_of_a_stop_agree_within_their_intervals(found):
         assert max(one.f_d_interval_hz[0] for one in again) < min(one.f_d_interval_hz[1] for one in again)
 
 
-def test_two_modes_of_other_repetitions_predict_that_a_sixth_of_a_real_arms_ringing_is_left(found, measured):
-    """Each stop by the modes of the other one at its pose; what one mode leaves is twice that."""
-    places = [place for place, stop in enumerate(STOPS.values()) if stop != A_SLOW]
-    left = [[each.left_percent for each in predicted(found, place)] for place in places]
-    one, two = np.array(left).T
-    measured("one mode leaves [%]", np.median(one))
-    measured("two modes leave [%]", np.median(two))
-    assert np.all((one > 22.0) & (one < 50.0))
-    assert np.median(two) <= 20.0
-
-
-def test_a_stop_without_repetition_is_not_predicted(found):
-    with pytest.raises(NotMeasurableError, match="no repetition of this motion"):
-        predicted(found, list(STOPS.values()).index(A_SLOW))
-
-
-def test_a_stop_at_which_the_accelerometer_is_frozen_is_not_predicted(found):
-    felt = found.recording[SENSOR].copy()
-    rows = slice(found.motions[3].start, found.motions[3].end)
-    felt[rows] = (0.0, 0.0, 9.75)
-    frozen = replace(found.recording, columns={**found.recording.columns, SENSOR: felt})
-    with pytest.raises(NotMeasurableError, match="felt nothing"):
-        predicted(replace(found, recording=frozen), 3)
+def test_two_modes_leave_a_sixth_of_a_real_arms_ringing_and_one_mode_twice_that(found, measured):
+    advice = advise([found])
+    left = {option.count: option.left_percent for option in advice.options if option.shaper == "zv"}
+    measured("one mode leaves [%]", left[1])
+    measured("two modes leave [%]", left[2])
+    assert 22.0 < left[1] < 50.0
+    assert left[2] <= 20.0

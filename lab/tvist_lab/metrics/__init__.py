@@ -17,7 +17,6 @@ from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.pairing import Pair, pairs, shaper_of
-from tvist_lab.metrics.predicted import Predicted, predicted
 from tvist_lab.metrics.residual import Residual, residual
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
 from tvist_lab.metrics.settling import Settling, attained_position, distance, settling
@@ -43,7 +42,6 @@ __all__ = [
     "MotionRows",
     "NotMeasurableError",
     "Pair",
-    "Predicted",
     "Residual",
     "RingDown",
     "Runs",
@@ -67,7 +65,6 @@ __all__ = [
     "peak_acceleration",
     "peak_after_stop",
     "peak_velocity",
-    "predicted",
     "residual",
     "rigid_acceleration",
     "settling",

@@ -10,7 +10,7 @@ from tvist_cli.output import out, print_json, progress, say, table
 
 if TYPE_CHECKING:
     from tvist_lab.figures import FigureFiles
-    from tvist_lab.metrics import Measured, MotionRows, Predicted
+    from tvist_lab.metrics import MotionRows
     from tvist_lab.recordings import Recording
 
 
@@ -20,7 +20,6 @@ def analyze(
     figures: Path | None = None,
     look: FigureOptions = AS_USUAL,
     logs: LogOptions = AS_IT_IS,
-    predict: bool = False,
     json: bool = False,
 ) -> None:
     """Measure each motion of a recording or a robot's log, and print the columns of the paper's Table 2.
@@ -34,7 +33,6 @@ def analyze(
         figures: Folder for the figures of each motion: what was recorded, and the ring-down after it.
         look: How to write the figures.
         logs: How to read logs.
-        predict: Predict from repetitions of the same motion what zv for one and for two modes would leave of each.
         json: Print one JSON object.
     """
     look.check(figures)
@@ -54,17 +52,14 @@ def analyze(
         say(f"{file}: {note}")
     if figures is not None:
         _draw(recording, found, look.into(figures))
-    measured = Measured(recording, found, results)
-    forecasts, changed = _forecasts(measured) if predict else [], changes(measured)
+    changed = changes(Measured(recording, found, results))
     if json:
-        predicted = {"predicted": [[one._asdict() for one in each] for each in forecasts]} if predict else {}
         print_json(
             {
                 "file": str(file),
                 "motions": [result.as_dict() for result in results],
                 "changes": changed,
                 "notes": list(recording.notes),
-                **predicted,
             }
         )
         return
@@ -77,28 +72,6 @@ def analyze(
     table(f"{file}: {counted(len(results), 'motion')}{since}", tuple(COLUMNS), rows)
     for note in (*changed, *grouped_notes(results)):
         out.print(note, markup=False)
-    if predict:
-        heads = ("motion", "modes Hz", "leaves % rms", "of the peak %")
-        cells = [
-            (str(place), ", ".join(f"{f_d:.1f}" for f_d in one.f_d_hz), f"{one.left_percent:.0f}",
-             f"{one.peak_percent:.0f}")
-            for place, each in enumerate(forecasts, 1) for one in each
-        ]  # fmt: skip
-        table("what zv would leave, by repetitions", heads, cells)
-
-
-def _forecasts(measured: "Measured") -> "list[tuple[Predicted, ...]]":
-    """Predict what shapers would leave of each motion; empty, with a line on stderr, where that cannot be told."""
-    from tvist_lab.metrics import NotMeasurableError, predicted
-
-    found: list[tuple[Predicted, ...]] = []
-    for place in range(len(measured.motions)):
-        try:
-            found.append(predicted(measured, place))
-        except NotMeasurableError as error:
-            say(f"motion {place + 1}: no prediction: {error}")
-            found.append(())
-    return found
 
 
 def _draw(recording: "Recording", found: "list[MotionRows]", files: "FigureFiles") -> None:
