@@ -1,1 +1,1 @@
-"""A UR robot that is moved: a program of ours on its controller follows the set-points that we write."""
+"""A UR robot that is moved: a program of ours runs on it and follows set-points that come in RTDE's registers."""
