@@ -18,9 +18,10 @@ Command = TypeVar("Command", bound=Callable[..., object])
 _BOXES = {
     "Robot": "name robot robots workers profile start state programs",
     "Arm and shaper": (
-        "plant enable_motion speed_cap hidden cell payload overload adapt learn calibration shaper shape_servo quiet floor compensate_sag seed "
+        "plant hidden cell payload overload adapt learn calibration shaper shape_servo quiet floor compensate_sag seed "
         "truth"
     ),
+    "Real arm": "enable_motion speed_cap tcp",
     "Clock": "clock speed realtime_priority processor lock_memory",
     "Recording": "record keep dump",
     "Network": "listen connect namespace metrics security insecure",

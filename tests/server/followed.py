@@ -8,7 +8,6 @@ from tvist_protocol.io import Registers, SetRegisters
 from tvist_protocol.programs import ProgramRun
 from tvist_server.moving import registers as r
 from tvist_server.moving.program import program
-from tvist_server.moving.window import Window
 
 SPEED, DECELERATION = 0.5, 4.0
 RUN = 71

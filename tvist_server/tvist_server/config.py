@@ -100,6 +100,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     speed_cap: Annotated[float, Meta(ge=0.05, le=3.2)] = 0.5
     """With --enable-motion: largest speed of every joint in rad/s, for moves, streams and programs alike. The limits of
     the robot file and of the robot itself hold as well."""
+    tcp: tuple[float, float, float, float, float, float] | None = None
+    """With --enable-motion: tool centre point that the robot has to have, x,y,z in m and rotation vector rx,ry,rz in
+    rad in the flange frame; another one is refused [any: the robot's is taken over]."""
     hidden: Seed | None = None
     """Simulate an arm that is not quite its file: springs, dampers, loops, rotors, friction and payload are drawn from
     this seed and told to nobody. With several robots, each further one uses the next."""
@@ -326,7 +329,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
                 shape_servo=self.shape_servo,
                 adapt=self.adapt,
-                plant=None if self.plant is None else self._plant(self.plant),
+                plant=None if self.plant is None else self._plant(self.plant, description),
                 hidden=self.hidden,
             )
             setup = shaped_by(setup, "none" if watched else _either(self.shaper, profile.shaper))
@@ -361,7 +364,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                     f"{name} is {value}, but the robot at {self.plant} is only watched: leave {name} out"
                 )
 
-    def _plant(self, place: str) -> OwnPlant:
+    def _plant(self, place: str, description: RobotDescription) -> OwnPlant:
         """Find a plant: the robot at an address, or what `load_plant` finds.
 
         Raises:
@@ -372,7 +375,12 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             return load_plant(place)
         where = place_of(place)
         if self.enable_motion:
-            return OwnPlant(str(where), "", partial(MovedRobot, where, cap=self.speed_cap))
+            start = None if self.start is None else posture(self.start, description)
+            return OwnPlant(
+                str(where),
+                "",
+                partial(MovedRobot, where, speed_cap=self.speed_cap, tool=self.tcp, start=start),
+            )
         return OwnPlant(str(where), "", partial(WatchedRobot, where))
 
     @property

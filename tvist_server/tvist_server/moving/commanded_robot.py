@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from tvist_server.moving.connection import CommandingConnection
 from tvist_server.moving.registers import INPUTS, OUTPUTS
-from tvist_server.rtde.client import Row
 from tvist_server.rtde.commanding import CommandingClient
 from tvist_server.watching.connection import Connection
 from tvist_server.watching.variables import NEEDED, OPTIONAL
@@ -26,6 +25,6 @@ class CommandedRobot(WatchedRobot):
         return CommandingConnection(self._place, self._address, client)
 
     @property
-    def said(self) -> Row:
-        """The newest row."""
-        return self.newest
+    def connected(self) -> bool:
+        """Whether it is connected."""
+        return self._connection is not None

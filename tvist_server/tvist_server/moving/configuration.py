@@ -90,9 +90,7 @@ def narrowed(
         speed_cap: Largest velocity of every joint [rad/s].
     """
     limits = description.limits
-    position, velocity, acceleration = map(
-        np.array, (limits.position, limits.velocity, limits.acceleration)
-    )
+    position, velocity, acceleration = map(np.array, (limits.position, limits.velocity, limits.acceleration))
     velocity = np.minimum(velocity, speed_cap)
     if configuration is not None:
         position = np.minimum(position, np.minimum(-configuration.least, configuration.most))

@@ -51,7 +51,9 @@ def answers_trouble(wanted: Wanted, answers: Mapping[str, str], own: Configurati
     if told is not None and series(told) != series(model):
         return f"it is a {told}, and the robot file is that of a {model}: give --robot its model"
     if own is not None and not own.is_of(wanted.description):
-        return f"its dimensions are not those of a {model}: give --robot its model, or a robot file of your own"
+        return (
+            f"its dimensions are not those of a {model}: give --robot its model, or a robot file of your own"
+        )
     return remote_trouble(answers)
 
 
@@ -121,8 +123,8 @@ def _load_trouble(wanted: Wanted, sight: Sight) -> str | None:
         apart = np.abs(np.array(tool) - np.array(wanted.tool))
         if apart[:3].max() > SAME_PLACE or apart[3:].max() > SAME_TURN:
             return (
-                f"its tool centre point is {_listed(tool)}, and --tcp says {_listed(wanted.tool)}: set the right one at "
-                "the robot, or leave --tcp out to take over its own"
+                f"its tool centre point is {_listed(tool)}, and --tcp says {_listed(wanted.tool)}: set the right one "
+                "at the robot, or leave --tcp out to take over its own"
             )
     return None
 

@@ -7,8 +7,10 @@ import threading
 from tvist_server.moving.dashboard import asked
 from tvist_server.moving.dialogue import PATIENCE
 from tvist_server.moving.ports import Ports
+from tvist_server.moving.start_checks import REMOTE, remote_trouble
 
-REMOTE = "is in remote control"
+LOOK_EVERY = 0.2
+"""Longest time after which the thread ends [s]."""
 
 
 class Upload:
@@ -24,24 +26,21 @@ class Upload:
         self.trouble: str | None = None
         """Why the program cannot run, in words."""
         self._closed = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="tvist-upload", daemon=True)
-        self._thread.start()
+        threading.Thread(target=self._run, name="tvist-upload", daemon=True).start()
 
     def close(self) -> None:
         """Let the connection go."""
         self._closed.set()
 
     def _run(self) -> None:
-        if asked(self._ports.dashboard, [REMOTE]).get(REMOTE) == "false":
-            self.trouble = (
-                "it is in local control, or another client controls it: switch it to remote control"
-            )
+        self.trouble = remote_trouble(asked(self._ports.dashboard, [REMOTE]))
+        if self.trouble is not None:
             return
         where = self._ports.primary
         try:
             with socket.create_connection((where.host, where.port), PATIENCE) as connection:
                 connection.sendall(self._text.encode())
-                connection.settimeout(0.5)
+                connection.settimeout(LOOK_EVERY)
                 while not self._closed.is_set():
                     with contextlib.suppress(TimeoutError):
                         if not connection.recv(1 << 16):
