@@ -315,10 +315,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             profile = PLAIN if chosen is None else PROFILES[chosen]
             real = self.plant is not None and is_place(self.plant)
             watched = real and not self.enable_motion
-            if real:
-                self._check_real()
-            elif given := [name for name in _REAL if getattr(self, name)]:
-                raise ValueError(f"{given[0]} is for a robot of UR's: give --plant ur://ADDRESS, too")
+            self._check_real(real=real)
             calibration = calibration_for(self.calibration, description)
             cell = None if self.cell is None else read_cell(self.cell)
             setup = Setup(
@@ -353,24 +350,29 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 raise ConfigError(f"{error}: give --overload to insist") from error
         return setup
 
-    def _check_real(self) -> None:
-        """Check that nothing is asked of a robot of UR's that it cannot do.
+    def _check_real(self, *, real: bool) -> None:
+        """Check that nothing is asked of a robot of UR's that it cannot do, and that what is for one has one.
 
         Raises:
-            ValueError: It is.
+            ValueError: It is, or has none.
         """
-        given = {
+        if not real:
+            given = [name for name in _REAL if getattr(self, name)]
+            if given:
+                raise ValueError(f"{given[0]} is for a robot of UR's: give --plant ur://ADDRESS, too")
+            return
+        asked: dict[str, object] = {
             "adapt": self.adapt, "cell": self.cell, "state": self.state, "truth": self.truth or None,
             "robots": self.robots,
         }  # fmt: skip
         what = "only knows what its own controller tells"
         if not self.enable_motion:
-            given |= {
+            asked |= {
                 "shaper": self.shaper, "learn": self.learn, "start": self.start, "speed_cap": self.speed_cap,
                 "tcp": self.tcp, "shape_servo": self.shape_servo or None,
             }  # fmt: skip
             what = "is only watched"
-        for name, value in given.items():
+        for name, value in asked.items():
             if value is not None:
                 raise ValueError(f"{name} is {value}, but the robot at {self.plant} {what}: leave {name} out")
 

@@ -8,6 +8,7 @@ import numpy as np
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, PlantError, Sight
+from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_server.moving.commanded_robot import CommandedRobot
 from tvist_server.moving.configuration import configuration_of, narrowed
 from tvist_server.moving.dashboard import asked
@@ -78,6 +79,8 @@ class MovedRobot:
         self._held = False
         self._run: Run | None = None
         self._halt: Halt | None = None
+        self._left_paused = False
+        """Whether our program is paused there by a safety stop, so that it may be replaced."""
 
     def _refuse_if(self, trouble: str | None) -> None:
         if trouble is not None:
@@ -98,7 +101,8 @@ class MovedRobot:
         """Return where its own controller holds it, if it may be moved from there."""
         run = self._run
         if run is None or not run.ready:
-            self._refuse_if(state_trouble(self._wanted, self._sight, may_play=run is not None))
+            may_play = run is not None or self._left_paused
+            self._refuse_if(state_trouble(self._wanted, self._sight, may_play=may_play))
         last = None if run is None else run.last
         return self._measured(last or self._robot.newest["target_q"])
 
@@ -147,6 +151,7 @@ class MovedRobot:
             self._number += 1
             speed = max(self._wanted.description.limits.velocity)
             self._run = Run(self._robot, self._ports, self._number, speed)
+        self._left_paused &= sight.modes[2] in {RuntimeState.PAUSING, RuntimeState.PAUSED}
         if self._run is not None:
             told = self._run.take(sight)
             self._told += [] if told is None else [told]
@@ -179,4 +184,5 @@ class MovedRobot:
 
     def _let_go(self, halt: Halt) -> None:
         self.stop()
+        self._left_paused = halt.safety_mode not in {SafetyMode.NORMAL, SafetyMode.UNDEFINED}
         self._halt = Halt(f"the robot at {self._place} does not follow: {halt.why}", halt.safety_mode)
