@@ -38,6 +38,7 @@ def bridge(arm):
     with a_bridge(HOST) as served:
         wait_until_it_follows(served)
         yield served
+        print(served.said)
 
 
 def eventually(true):
@@ -47,6 +48,9 @@ def eventually(true):
 
 
 def wait_until_it_follows(served):
+    import atexit
+
+    atexit.register(lambda: print(served.said))
     with Robot.connect(served.endpoint, "bridge") as robot, robot.control("me") as control:
         move_by_nothing(robot, control)
 
@@ -65,7 +69,7 @@ def refused(do, words):
         why = str(refusal)
     else:
         return False
-    assert words in why
+    assert words in why, why
     return True
 
 

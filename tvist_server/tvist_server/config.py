@@ -20,7 +20,7 @@ from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.cell_file import read_cell
 from tvist_server.durations import ticks_of
 from tvist_server.fleet import MOST, members
-from tvist_server.initial import calibration_for, posture, read_state, shaped_by
+from tvist_server.initial import calibration_for, posture, read_state, shaped_by, tool_of
 from tvist_server.moving.moved_robot import MovedRobot
 from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
 from tvist_server.program_folder import ProgramFolder
@@ -104,7 +104,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     speed_cap: Annotated[float, Meta(ge=0.05, le=3.2)] | None = None
     """With --enable-motion: largest speed of every joint in rad/s, for moves, streams and programs alike; the limits of
     the robot file and of the robot itself hold as well [0.5]."""
-    tcp: tuple[float, float, float, float, float, float] | None = None
+    tcp: str | tuple[float, ...] | None = None
     """With --enable-motion: tool centre point that the robot has to have, x,y,z in m and rotation vector rx,ry,rz in
     rad in the flange frame; another one is refused [any: the robot's is taken over]."""
     hidden: Seed | None = None
@@ -395,7 +395,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                     MovedRobot,
                     where,
                     speed_cap=_either(self.speed_cap, SPEED_CAP),
-                    tool=self.tcp,
+                    tool=tool_of(self.tcp),
                     start=start,
                 ),
             )

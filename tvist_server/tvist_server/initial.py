@@ -1,5 +1,6 @@
 """The initial state of a robot, read from a file with the fields of `simulation.reset`."""
 
+import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -144,3 +145,20 @@ def posture(start: str | tuple[float, ...], description: RobotDescription) -> tu
         raise ValueError(
             f"start is {start.strip()!r}: must be one of {known}, or angles separated by commas"
         ) from None
+
+
+def tool_of(tcp: str | tuple[float, ...] | None) -> tuple[float, ...] | None:
+    """Return a tool centre point, given as numbers or separated by commas; None for None.
+
+    Raises:
+        ValueError: It is none.
+    """
+    if tcp is None:
+        return None
+    try:
+        numbers = tuple(map(float, tcp.split(",") if isinstance(tcp, str) else tcp))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 6 or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"tcp is {tcp!r}: must be x,y,z,rx,ry,rz, six numbers in m and rad")
+    return numbers

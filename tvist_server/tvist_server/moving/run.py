@@ -36,8 +36,8 @@ class Run:
     def __init__(self, robot: CommandedRobot, ports: Ports, number: int, speed: float) -> None:
         self._robot, self._number, self._window = robot, number, Window()
         self._begun, self._plays = time.monotonic(), False
-        self.ready = False
-        """Whether the program follows."""
+        self._waiting = self.ready = False
+        """Whether the program waits for the first set-point; and whether it follows."""
         self.halt: Halt | None = None
         """Why it does not, and will not any more."""
         self._told, self._told_at = (0, 0), 0.0
@@ -51,9 +51,11 @@ class Run:
         return self._window.values(Order.FOLLOW)[2:8] if self._window.number else None
 
     def add(self, q: Floats) -> None:
-        """Add the next set-point, shape (6,) [rad], once the program follows."""
+        """Add the next set-point, shape (6,) [rad]; until the program follows, where the robot stands."""
         if self.ready:
             self._window.add(q.tolist())
+        elif self._waiting:
+            self._window.add(self.last or self._robot.newest["target_q"])
 
     def write(self, order: Order = Order.FOLLOW) -> None:
         """Write the newest set-points."""
@@ -64,7 +66,7 @@ class Run:
         """Let the program brake and end."""
         self.write(Order.END)
         self._upload.close()
-        self.ready = False
+        self._waiting = self.ready = False
 
     def take(self, sight: Sight) -> str | None:
         """See by a row what has become of the program; return what people should know."""
@@ -84,9 +86,8 @@ class Run:
                 self.halt = Halt(f"{why}, then power on here", sight.modes[1])
             return None
         self.halt = self.halt or halt_by_program(ended, sight.modes)
-        if state == State.WAITING:
-            self._window.add(self.last or self._robot.newest["target_q"])
         self.ready = state == State.FOLLOWING and self.halt is None
+        self._waiting = state == State.WAITING and self.halt is None
         return self._tell_missed((missed[0], missed[1]))
 
     def _tell_missed(self, missed: tuple[int, int]) -> str | None:
