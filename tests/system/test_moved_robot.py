@@ -240,7 +240,7 @@ def test_bad_starts_are_one_sentence_and_nothing_moves(arm):
             ((*motion, "--start", "Q2"), ["--start says"]),
             ((*motion, "--shaper", "elastic"), ["takes positions only"]),
             ((*motion, "--clock", "lockstep"), ["gives the tick"]),
-            ((*motion, "--speed-cap", "9"), ["speed-cap"]),
+            ((*motion, "--speed-cap", "9"), ["speed_cap is 9"]),
         ):
             code, said = refused_to_start(*options)
             assert code == 2, said

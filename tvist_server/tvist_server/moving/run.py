@@ -17,6 +17,9 @@ LOOKAHEAD, GAIN = 0.03, 2000.0
 """Parameters of `servoj` with which the arm follows most closely [s, -]."""
 DECELERATION = 5.0
 """Deceleration of the fastest joint when the program brakes [rad/s²]."""
+SETTLES = 25
+"""Number of rows of the waiting program after which it gets the first set-point: what its start has delayed has come
+by then, since it ends when numbers come faster than it counts."""
 BEGINS = 5.0
 """Longest time in which the program has to begin [s]."""
 TELL_EVERY = 10.0
@@ -36,8 +39,9 @@ class Run:
     def __init__(self, robot: CommandedRobot, ports: Ports, number: int, speed: float) -> None:
         self._robot, self._number, self._window = robot, number, Window()
         self._begun, self._plays = time.monotonic(), False
-        self._waiting = self.ready = False
-        """Whether the program waits for the first set-point; and whether it follows."""
+        self._waiting, self._settled = False, 0
+        self.ready = False
+        """Whether the program follows."""
         self.halt: Halt | None = None
         """Why it does not, and will not any more."""
         self._told, self._told_at = (0, 0), 0.0
@@ -54,7 +58,7 @@ class Run:
         """Add the next set-point, shape (6,) [rad]; until the program follows, where the robot stands."""
         if self.ready:
             self._window.add(q.tolist())
-        elif self._waiting:
+        elif self._waiting and self._settled > SETTLES:
             self._window.add(self.last or self._robot.newest["target_q"])
 
     def write(self, order: Order = Order.FOLLOW) -> None:
@@ -88,6 +92,7 @@ class Run:
         self.halt = self.halt or halt_by_program(ended, sight.modes)
         self.ready = state == State.FOLLOWING and self.halt is None
         self._waiting = state == State.WAITING and self.halt is None
+        self._settled += state == State.WAITING
         return self._tell_missed((missed[0], missed[1]))
 
     def _tell_missed(self, missed: tuple[int, int]) -> str | None:
