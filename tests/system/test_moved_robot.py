@@ -38,7 +38,6 @@ def bridge(arm):
     with a_bridge(HOST) as served:
         wait_until_it_follows(served)
         yield served
-        print(served.said)
 
 
 def eventually(true):
@@ -48,9 +47,6 @@ def eventually(true):
 
 
 def wait_until_it_follows(served):
-    import atexit
-
-    atexit.register(lambda: print(served.said))
     with Robot.connect(served.endpoint, "bridge") as robot, robot.control("me") as control:
         move_by_nothing(robot, control)
 
@@ -250,6 +246,7 @@ def test_bad_starts_are_one_sentence_and_nothing_moves(arm):
             assert code == 2
             assert "local control, or another client" in said
         with a_bridge(HOST) as bridge:
+            wait_until_it_follows(bridge)
             code, said = refused_to_start(*motion)
             assert code == 2
             assert "another client holds its inputs" in said

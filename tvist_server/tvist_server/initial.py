@@ -147,18 +147,16 @@ def posture(start: str | tuple[float, ...], description: RobotDescription) -> tu
         ) from None
 
 
-def tool_of(tcp: str | tuple[float, ...] | None) -> tuple[float, ...] | None:
-    """Return a tool centre point, given as numbers or separated by commas; None for None.
+def numbers_of(name: str, given: str | tuple[float, ...], count: int) -> tuple[float, ...]:
+    """Return the numbers of an option, given as such or separated by commas.
 
     Raises:
-        ValueError: It is none.
+        ValueError: They are not as many, or not finite.
     """
-    if tcp is None:
-        return None
     try:
-        numbers = tuple(map(float, tcp.split(",") if isinstance(tcp, str) else tcp))
+        numbers = tuple(map(float, given.split(",") if isinstance(given, str) else given))
     except ValueError:
         numbers = ()
-    if len(numbers) != 6 or not all(map(math.isfinite, numbers)):
-        raise ValueError(f"tcp is {tcp!r}: must be x,y,z,rx,ry,rz, six numbers in m and rad")
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{name} is {given!r}: must be {count} numbers, separated by commas")
     return numbers

@@ -2,19 +2,21 @@
 
 import time
 
-from tvist_plant.model import Floats
+import numpy as np
+
+from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import Halt, Sight
+from tvist_plant.robot_tables import ArmLimits
 from tvist_protocol.modes import RuntimeState
 from tvist_server.moving.commanded_robot import CommandedRobot
 from tvist_server.moving.halts import halt_by_modes, halt_by_program
 from tvist_server.moving.ports import Ports
 from tvist_server.moving.program import program
 from tvist_server.moving.registers import ALONE, ENDED, INPUTS, LEFT_OUT, RUN, STATE, Order, State
+from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
 from tvist_server.moving.upload import Upload
 from tvist_server.moving.window import Window
 
-LOOKAHEAD, GAIN = 0.03, 2000.0
-"""Parameters of `servoj` with which the arm follows most closely [s, -]."""
 DECELERATION = 5.0
 """Deceleration of the fastest joint when the program brakes [rad/s²]."""
 SETTLES = 25
@@ -33,11 +35,16 @@ class Run:
         robot: The robot, which is connected.
         ports: Its interfaces.
         number: Number of the run.
-        speed: Fastest set-points [rad/s].
+        limits: Limits of the robot.
+        lag: Lag of its `servoj`; None if it is not known.
     """
 
-    def __init__(self, robot: CommandedRobot, ports: Ports, number: int, speed: float) -> None:
+    def __init__(
+        self, robot: CommandedRobot, ports: Ports, number: int, limits: ArmLimits, lag: ServoLag | None
+    ) -> None:
         self._robot, self._number, self._window = robot, number, Window()
+        stands, speed = np.array(robot.newest["target_q"]), max(limits.velocity)
+        self._setpoints = Setpoints(stands, lag, fastest=speed, reach=np.array(limits.position))
         self._begun, self._plays = time.monotonic(), False
         self._waiting, self._settled = False, 0
         self.ready = False
@@ -54,12 +61,14 @@ class Run:
         """The newest set-point [rad]; None before the first."""
         return self._window.values(Order.FOLLOW)[2:8] if self._window.number else None
 
-    def add(self, q: Floats) -> None:
-        """Add the next set-point, shape (6,) [rad]; until the program follows, where the robot stands."""
+    def add(self, command: DriveCommand) -> None:
+        """Add the next set-point; until the program follows, where the robot stands."""
         if self.ready:
-            self._window.add(q.tolist())
+            self._window.add(self._setpoints.next(command).tolist())
         elif self._waiting and self._settled > SETTLES:
-            self._window.add(self.last or self._robot.newest["target_q"])
+            stands = self._robot.newest["target_q"] if self.last is None else self.last
+            self._setpoints.begin(np.array(stands))
+            self._window.add(stands)
 
     def write(self, order: Order = Order.FOLLOW) -> None:
         """Write the newest set-points."""
