@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from tests.conformance.served import refused_to_start
+from tests.conformance.served import PATIENCE, refused_to_start
 from tests.places import own_address
 from tests.system.moved_robot import (
     Link,
