@@ -180,7 +180,7 @@ def swings(count, speed, *, rest=30, h=H):
 
 
 def late(random, count, *, base=1.0, jitter=0.6, stalls=0.0, longest=12):
-    """Packages by the tick in which they arrive, in order. A stall of up to `longest` ticks holds up all that follow."""
+    """Packages by the tick in which they arrive, in order; a stall, of up to `longest` ticks, holds up the rest."""
     arrivals, free = [[] for _ in range(count + int(base + jitter) + longest + 3)], 0.0
     for k in range(count):
         if random.random() < stalls:
