@@ -225,7 +225,7 @@ def test_it_does_not_go_on_after_a_pause(how, periods, moment):
     if how == "pause":
         robot.robot.send(ProgramPause)
     else:
-        robot.robot.controller.receive(SimulationInject(token=robot.robot.token, kind="protective_stop"))
+        robot.robot.controller.receive(SimulationInject(token=robot.robot.token, fault="protective_stop"))
     while np.abs(robot.targets[-1] - robot.targets[-2]).max() > 0.0 or robot.tick < moment + 2 + periods:
         robot.play(sent, [[min(robot.tick - 2, 1399)]])
     still, calls = robot.targets[-1], len(robot.told)
