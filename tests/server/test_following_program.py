@@ -164,6 +164,18 @@ def test_it_brakes_within_40_ms_of_the_last_set_point(speed, moment):
     assert before <= robot.most
 
 
+@pytest.mark.parametrize("lost", [3, 7, 12, 17])
+def test_a_sender_that_has_lost_periods_for_good_is_followed_later_by_as_many(lost):
+    path = swings(1000, 0.45)
+    robot, _ = followed(path, [[k] for k in range(200)], 600)
+    robot.play(packages(path, 600), [*([] for _ in range(lost)), *([200 + k] for k in range(400))])
+    told, numbers = np.array(robot.told), np.array(robot.numbers)
+    assert robot.state is r.State.FOLLOWING
+    assert robot.tick - 2 - lost - 2 <= numbers[-1] <= robot.tick - lost
+    assert np.abs(told - of_path(path, numbers))[-1].max() <= 1e-6
+    assert robot.output(r.ALONE) <= 2 * lost + 4
+
+
 @pytest.mark.parametrize(
     ("change", "why"),
     [

@@ -126,14 +126,14 @@ def $name():
   while why == $ended_not:
     now = read_input_integer_register($NUMBER)
     silence = silence + step
-    if now > newest:
+    if now > newest and not blind: # set-points that come too late to be played are none
       silence = 0.0
     end
     number = number + 1
     behind = now - number
     if behind > 2: # it began while they came late, or has missed a period: leave some out
       number = now - 2
-    elif now == number and now > newest and blind: # they come late: give them a period more
+    elif now <= number and now > newest and blind: # they come late: give them a period more
       number = number - 1
     end
 
