@@ -40,7 +40,7 @@ class OtherController:
     def seen(self):
         return self.sight
 
-    def wait(self, timeout):
+    def wait(self, timeout):  # noqa: ARG002
         return True
 
     def switch(self, *, power, brakes):

@@ -2,6 +2,7 @@
 
 import struct
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
@@ -13,14 +14,17 @@ from tests.controller.robots import UR5E, Robot
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.line.kinematics import ForwardKinematics
 from tvist_plant.description import Payload, load
+from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import Measurement, Sight
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.gateways.ur.primary.packages import robot_state
+from tvist_server.moving import registers as r
 from tvist_server.moving.configuration import Configuration, found, narrowed
 from tvist_server.moving.halts import halt_by_modes, halt_by_program
 from tvist_server.moving.pace import MOST, SILENT, Pace
 from tvist_server.moving.ports import ports_of
 from tvist_server.moving.registers import Ended
+from tvist_server.moving.run import Run
 from tvist_server.moving.start_checks import (
     Wanted,
     answers_trouble,
@@ -224,3 +228,80 @@ def test_other_ports_are_as_far_away_as_that_of_rtde():
     dashboard, primary = ports_of(place_of("ur://robot:31004"))
     assert (dashboard.port, primary.port) == (30999, 31001)
     assert ports_of(place_of("ur://robot")).dashboard.port == 29999
+
+
+class Written:
+    """A robot whose program follows, and what is written to it."""
+
+    def __init__(self):
+        self.newest = {"target_q": tuple(Q)} | dict.fromkeys(r.OUTPUTS, (0,))
+        self.written = []
+
+    def write(self, numbers):
+        self.written.append(tuple(numbers))
+
+    def says(self, place, number):
+        self.newest[f"output_int_register_{place}"] = (number,)
+
+
+@pytest.fixture
+def running(monkeypatch):
+    """A run whose program waits for the first set-point, and its robot."""
+    monkeypatch.setattr(
+        "tvist_server.moving.run.Upload", lambda *_: SimpleNamespace(trouble=None, close=lambda: None)
+    )
+    robot = Written()
+    run = Run(robot, ports_of(place_of("ur://robot")), 7, UR5E.limits, None)
+    robot.says(r.RUN, 7)
+    robot.says(r.STATE, r.State.WAITING)
+    playing = replace(GOOD, modes=(7, 1, RuntimeState.PLAYING))
+    for _ in range(50):
+        run.take(playing)
+    return run, robot, playing
+
+
+@pytest.mark.parametrize("interval", [1, 4])
+def test_a_period_of_the_robot_gets_one_set_point_and_begins_where_it_stands(running, interval):
+    run, robot, playing = running
+    assert robot.written == [(0,) * len(r.INPUTS)]
+    run.add(DriveCommand(Q + 1.0, np.zeros(6), np.zeros(6)), played=True)
+    run.write()
+    assert robot.written[-1] == (1, r.Order.FOLLOW, *(4 * tuple(Q)))
+    robot.says(r.STATE, r.State.FOLLOWING)
+    run.take(playing)
+    assert run.ready
+    for tick in range(1, 9):
+        q = Q + 1e-4 * tick
+        run.add(DriveCommand(q, np.zeros(6), np.zeros(6)), played=tick % interval == 0)
+    run.write()
+    number, order, *angles = robot.written[-1]
+    assert (number, order) == (1 + 8 // interval, r.Order.FOLLOW)
+    assert angles[:6] == pytest.approx(Q + 8e-4)
+    assert angles[6:12] == pytest.approx(Q + 1e-4 * (8 - interval))
+    run.end()
+    assert robot.written[-1][1] == r.Order.END
+
+
+def test_modes_have_some_rows_to_tell_why_the_program_has_ended(running):
+    run, _, playing = running
+    stopped = replace(playing, modes=(7, 1, RuntimeState.STOPPED))
+    run.take(stopped)
+    assert run.halt is None
+    run.take(replace(stopped, modes=(7, SafetyMode.ROBOT_EMERGENCY_STOP, RuntimeState.STOPPED)))
+    assert "emergency stop" in run.halt.why
+
+
+def test_a_program_that_stops_without_another_reason_is_told_within_20_ms(running):
+    run, _, playing = running
+    for _ in range(10):
+        run.take(replace(playing, modes=(7, 1, RuntimeState.STOPPED)))
+    assert "its program was stopped at the robot" in run.halt.why
+
+
+def test_registers_of_an_earlier_run_are_not_taken_for_ours(running):
+    run, robot, playing = running
+    robot.says(r.RUN, 6)
+    robot.says(r.ENDED, Ended.SILENCE)
+    run.take(playing)
+    assert run.halt is None
+    assert not run.ready

@@ -63,11 +63,18 @@ class Run:
         """The newest set-point [rad]; None before the first."""
         return self._window.values(Order.FOLLOW)[2:8] if self._window.number else None
 
-    def add(self, command: DriveCommand) -> None:
-        """Add the next set-point; until the program follows, where the robot stands."""
+    def add(self, command: DriveCommand, *, played: bool) -> None:
+        """Take the command of a tick, or where the robot stands until the program follows.
+
+        Args:
+            command: The command.
+            played: Whether a period of the robot ends with the tick, so that it gets a set-point.
+        """
         if self.ready:
-            self._window.add(self._setpoints.next(command).tolist())
-        elif self._waiting and self._settled > SETTLES:
+            setpoint = self._setpoints.next(command).tolist()
+            if played:
+                self._window.add(setpoint)
+        elif played and self._waiting and self._settled > SETTLES:
             stands = self._robot.newest["target_q"] if self.last is None else self.last
             self._setpoints.begin(np.array(stands))
             self._window.add(stands)
