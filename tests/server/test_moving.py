@@ -22,7 +22,6 @@ from tvist_server.moving import registers as r
 from tvist_server.moving.configuration import Configuration, found, narrowed
 from tvist_server.moving.halts import halt_by_modes, halt_by_program
 from tvist_server.moving.pace import MOST, SILENT, Pace
-from tvist_server.moving.ports import ports_of
 from tvist_server.moving.registers import Ended
 from tvist_server.moving.run import Run
 from tvist_server.moving.start_checks import (
@@ -225,9 +224,8 @@ def test_time_that_was_long_away_is_not_made_up_for():
 
 
 def test_other_ports_are_as_far_away_as_that_of_rtde():
-    dashboard, primary = ports_of(place_of("ur://robot:31004"))
-    assert (dashboard.port, primary.port) == (30999, 31001)
-    assert ports_of(place_of("ur://robot")).dashboard.port == 29999
+    assert place_of("ur://robot:31004").beside(29999) == ("robot", 30999)
+    assert place_of("ur://robot").beside(30001) == ("robot", 30001)
 
 
 class Written:
@@ -251,7 +249,7 @@ def running(monkeypatch):
         "tvist_server.moving.run.Upload", lambda *_: SimpleNamespace(trouble=None, close=lambda: None)
     )
     robot = Written()
-    run = Run(robot, ports_of(place_of("ur://robot")), 7, UR5E.limits, None)
+    run = Run(robot, place_of("ur://robot"), 7, UR5E.limits, None)
     robot.says(r.RUN, 7)
     robot.says(r.STATE, r.State.WAITING)
     playing = replace(GOOD, modes=(7, 1, RuntimeState.PLAYING))

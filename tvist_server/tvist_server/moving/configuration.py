@@ -11,6 +11,8 @@ from tvist_server.moving.dialogue import NoAnswerError, ask
 from tvist_server.watching.place import Place
 
 _PACKAGE, _PART, _DATA = Struct(">iB"), Struct(">IB"), Struct(">53d4i")
+PRIMARY = 30001
+"""Port of the primary interface on a robot of UR's."""
 STATE, CONFIGURATION = 16, 6
 """Type of the packages with a robot's state, and number of the part with its configuration."""
 FAR, TURNED = 5e-3, 0.01
@@ -43,7 +45,7 @@ class Configuration(NamedTuple):
 def configuration_of(place: Place) -> Configuration | None:
     """Ask a robot for its configuration; None if it does not tell any."""
     try:
-        return ask(place, b"", found)
+        return ask(place.beside(PRIMARY), b"", found)
     except NoAnswerError:
         return None
 

@@ -20,20 +20,15 @@ class CommandingConnection(Connection):
         super().__init__(place, address, client)
         self._commanding = client
         self._rest = b""
-        self.unsent = 0
-        """Number of packages that were left out, since those before them still waited to be sent."""
 
     def write(self, numbers: Sequence[float]) -> None:
         """Write all inputs, without waiting: while a link takes nothing, packages are left out, and not kept."""
         if not self.client.started:
             return
-        if self._rest:
-            self._rest = self._rest[self._give(self._rest) :]
-        if self._rest:
-            self.unsent += 1
-            return
-        data = self._commanding.write(numbers)
-        self._rest = data[self._give(data) :]
+        self._rest = self._rest[self._give(self._rest) :]
+        if not self._rest:
+            data = self._commanding.write(numbers)
+            self._rest = data[self._give(data) :]
 
     def _give(self, data: bytes) -> int:
         try:

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from tvist_server.moving.dialogue import NoAnswerError, ask
 from tvist_server.watching.place import Place
 
+PORT = 29999
+"""Its port on a robot of UR's."""
 _UNKNOWN = "could not understand"
 
 
@@ -22,6 +24,6 @@ def asked(place: Place, questions: Sequence[str]) -> dict[str, str]:
         return {question: line.strip() for question, line in found if _UNKNOWN not in line}
 
     try:
-        return ask(place, text, answers)
+        return ask(place.beside(PORT), text, answers)
     except NoAnswerError:
         return {}

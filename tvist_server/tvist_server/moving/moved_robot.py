@@ -14,7 +14,6 @@ from tvist_server.moving.configuration import configuration_of, narrowed
 from tvist_server.moving.dashboard import asked
 from tvist_server.moving.halts import SILENT
 from tvist_server.moving.pace import Pace
-from tvist_server.moving.ports import ports_of
 from tvist_server.moving.run import Run
 from tvist_server.moving.servo_lag import ServoLag
 from tvist_server.moving.start_checks import (
@@ -59,10 +58,11 @@ class MovedRobot:
         lag: ServoLag | None = None,
     ) -> None:
         self._robot = CommandedRobot(place, description, payload)
-        self._place, self._ports = place, ports_of(place)
-        self._sight, self._told = self._robot.first(), list[str]()
-        own = configuration_of(self._ports.primary)
-        answers = asked(self._ports.dashboard, QUESTIONS)
+        self._place = place
+        self._sight = self._robot.first()
+        self._told = [f"no joint moves faster than {speed_cap:g} rad/s (--speed-cap)"]
+        own = configuration_of(place)
+        answers = asked(place, QUESTIONS)
         file = Wanted(description, payload, tool, start)
         self._refuse_if(answers_trouble(file, answers, own))
         self._wanted = file._replace(description=narrowed(description, own, speed_cap))
@@ -73,11 +73,9 @@ class MovedRobot:
         else:
             self._told.append("its accelerometer does not tell gravity: nobody has checked how it is mounted")
         if own is None:
-            port = self._ports.primary.port
-            self._told.append(f"its port {port} tells no limits: those of the robot file hold alone")
+            self._told.append("its primary interface tells no limits: those of the robot file hold alone")
         if not answers:
-            port = self._ports.dashboard.port
-            self._told.append(f"its port {port} answers nothing: model and remote control were not checked")
+            self._told.append("it has no dashboard: model and remote control were not checked")
         self._pace, self._number = Pace(), int(time.time()) % NUMBERS
         self._held, self._lag, self._interval = False, lag, round(self._robot.interval() / PERIOD)
         self._run: Run | None = None
@@ -153,7 +151,7 @@ class MovedRobot:
         if self._held and self._run is None:
             self._number += 1
             limits = self._wanted.description.limits
-            self._run = Run(self._robot, self._ports, self._number, limits, self._lag)
+            self._run = Run(self._robot, self._place, self._number, limits, self._lag)
         self._left_paused &= sight.modes[2] in {RuntimeState.PAUSING, RuntimeState.PAUSED}
         if self._run is not None:
             told = self._run.take(sight)

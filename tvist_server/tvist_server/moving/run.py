@@ -10,12 +10,12 @@ from tvist_plant.robot_tables import ArmLimits
 from tvist_protocol.modes import RuntimeState
 from tvist_server.moving.commanded_robot import CommandedRobot
 from tvist_server.moving.halts import halt_by_modes, halt_by_program
-from tvist_server.moving.ports import Ports
 from tvist_server.moving.program import program
 from tvist_server.moving.registers import ALONE, ENDED, INPUTS, LEFT_OUT, RUN, STATE, Order, State
 from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
 from tvist_server.moving.upload import Upload
 from tvist_server.moving.window import Window
+from tvist_server.watching.place import Place
 
 DECELERATION = 5.0
 """Deceleration of the fastest joint when the program brakes [rad/s²]."""
@@ -35,14 +35,14 @@ class Run:
 
     Args:
         robot: The robot, which is connected.
-        ports: Its interfaces.
+        place: Where it is.
         number: Number of the run.
         limits: Limits of the robot.
         lag: Lag of its `servoj`; None if it is not known.
     """
 
     def __init__(
-        self, robot: CommandedRobot, ports: Ports, number: int, limits: ArmLimits, lag: ServoLag | None
+        self, robot: CommandedRobot, place: Place, number: int, limits: ArmLimits, lag: ServoLag | None
     ) -> None:
         self._robot, self._number, self._window = robot, number, Window()
         stands, speed = np.array(robot.newest["target_q"]), max(limits.velocity)
@@ -56,7 +56,7 @@ class Run:
         self._told, self._told_at = (0, 0), 0.0
         robot.write((0,) * len(INPUTS))  # what an earlier run has left there is not played
         text = program(number, speed=speed, deceleration=DECELERATION, lookahead=LOOKAHEAD, gain=GAIN)
-        self._upload = Upload(ports, text)
+        self._upload = Upload(place, text)
 
     @property
     def last(self) -> tuple[float, ...] | None:

@@ -4,10 +4,11 @@ import contextlib
 import socket
 import threading
 
+from tvist_server.moving.configuration import PRIMARY
 from tvist_server.moving.dashboard import asked
 from tvist_server.moving.dialogue import PATIENCE
-from tvist_server.moving.ports import Ports
 from tvist_server.moving.start_checks import REMOTE, remote_trouble
+from tvist_server.watching.place import Place
 
 LOOK_EVERY = 0.2
 """Longest time after which the thread ends [s]."""
@@ -17,12 +18,12 @@ class Upload:
     """Sends a program, and keeps the connection: some robots end a program whose sender is gone.
 
     Args:
-        ports: The robot's interfaces.
+        place: The robot.
         text: The program.
     """
 
-    def __init__(self, ports: Ports, text: str) -> None:
-        self._ports, self._text = ports, text
+    def __init__(self, place: Place, text: str) -> None:
+        self._place, self._text = place, text
         self.trouble: str | None = None
         """Why the program cannot run, in words."""
         self._closed = threading.Event()
@@ -33,10 +34,10 @@ class Upload:
         self._closed.set()
 
     def _run(self) -> None:
-        self.trouble = remote_trouble(asked(self._ports.dashboard, [REMOTE]))
+        self.trouble = remote_trouble(asked(self._place, [REMOTE]))
         if self.trouble is not None:
             return
-        where = self._ports.primary
+        where = self._place.beside(PRIMARY)
         try:
             with socket.create_connection((where.host, where.port), PATIENCE) as connection:
                 connection.sendall(self._text.encode())
