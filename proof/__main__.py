@@ -124,6 +124,13 @@ def _parser() -> argparse.ArgumentParser:
         "--robots", type=_up_to(1000), default=5, help="Hidden robots of each of two arms [5]."
     )
     advice.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one.")
+    bridge = part(
+        _bridge, "bridge", "Let a bridge to a robot fail at random moments, and see how the robot stops."
+    )
+    bridge.add_argument("what", choices=["faults"], help="What to try.")
+    bridge.add_argument("--moments", type=_up_to(100_000), default=200, help="Number of moments [200].")
+    bridge.add_argument("--seed", type=_up_to(2**31 - 1), default=7, help="Seed of robot and moments [7].")
+    bridge.add_argument("--speed", type=float, default=1.0, help="Speed of the robot's time [1].")
     return parser
 
 
@@ -249,6 +256,17 @@ def _advice(given: argparse.Namespace) -> int:
     result = report(given.robots, given.seed, _tell)
     _print(result, given.json, tables(result))
     return 0
+
+
+def _bridge(given: argparse.Namespace) -> int:
+    from proof.bridge.faults import Faults, broken, report, tables
+
+    result = report(Faults(given.seed, given.speed).run(given.moments, _counted(given.moments)))
+    _print(result, given.json, tables(result))
+    found = broken(result)
+    for one in found:
+        _tell(one)
+    return 1 if found else 0
 
 
 def _print(result: dict[str, Any], json: bool, tables: Sequence[Table]) -> None:

@@ -15,6 +15,14 @@ class Place(NamedTuple):
     """Name or IP address."""
     port: int = PORT
 
+    def beside(self, port: int) -> "Place":
+        """Return the place of another of its interfaces, as far from that of RTDE as on a robot of UR's.
+
+        Args:
+            port: Port of that interface on a robot of UR's.
+        """
+        return self._replace(port=port + self.port - PORT)
+
     def __str__(self) -> str:
         """Return it as people write it."""
         host = f"[{self.host}]" if ":" in self.host else self.host

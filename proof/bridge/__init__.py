@@ -1,0 +1,1 @@
+"""A robot in another process that is moved over a link that can fail."""
