@@ -36,8 +36,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m proof", description=__doc__)
     parts = parser.add_subparsers(required=True, metavar="PART")
 
-    def part(run: Callable[[argparse.Namespace], int], name: str, what: str) -> argparse.ArgumentParser:
-        one = parts.add_parser(name, help=what, description=what)
+    def part(
+        run: Callable[[argparse.Namespace], int], name: str, what: str, among: Any = parts
+    ) -> argparse.ArgumentParser:
+        one: argparse.ArgumentParser = among.add_parser(name, help=what, description=what)
         one.set_defaults(run=run, refuse=one.error)
         one.add_argument("--json", action="store_true", help="Print one JSON object.")
         return one
@@ -124,14 +126,28 @@ def _parser() -> argparse.ArgumentParser:
         "--robots", type=_up_to(1000), default=5, help="Hidden robots of each of two arms [5]."
     )
     advice.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one.")
-    bridge = part(
-        _bridge, "bridge", "Let a bridge to a robot fail at random moments, and see how the robot stops."
-    )
-    bridge.add_argument("what", choices=["faults"], help="What to try.")
-    bridge.add_argument("--moments", type=_up_to(100_000), default=200, help="Number of moments [200].")
-    bridge.add_argument("--seed", type=_up_to(2**31 - 1), default=7, help="Seed of robot and moments [7].")
-    bridge.add_argument("--speed", type=float, default=1.0, help="Speed of the robot's time [1].")
+    _add_bridge(parts, part)
     return parser
+
+
+def _add_bridge(parts: Any, part: Callable[..., argparse.ArgumentParser]) -> None:
+    """Add the parts about a robot at the end of the line."""
+    bridge = parts.add_parser("bridge", help="Measure what stands between programs and a hidden robot.")
+    among = bridge.add_subparsers(required=True, metavar="PART")
+    faults = part(
+        _faults,
+        "faults",
+        "Let a bridge to a robot fail at random moments, and see how the robot stops.",
+        among,
+    )
+    faults.add_argument("--moments", type=_up_to(100_000), default=200, help="Number of moments [200].")
+    faults.add_argument("--seed", type=_up_to(2**31 - 1), default=7, help="Seed of robot and moments [7].")
+    faults.add_argument("--speed", type=float, default=1.0, help="Speed of the robot's time [1].")
+    loss = part(_loss, "loss", "See how late set-points come over a cable that loses packets.", among)
+    loss.add_argument("--seconds", type=_up_to(86_400), default=60, help="Seconds of each share [60].")
+    loss.add_argument(
+        "--percent", type=float, nargs="+", default=[0.0, 0.1, 1.0], help="Shares of lost packets [0 0.1 1]."
+    )
 
 
 def _up_to(most: int) -> Callable[[str], int]:
@@ -258,15 +274,27 @@ def _advice(given: argparse.Namespace) -> int:
     return 0
 
 
-def _bridge(given: argparse.Namespace) -> int:
+def _faults(given: argparse.Namespace) -> int:
     from proof.bridge.faults import Faults, broken, report, tables
 
-    result = report(Faults(given.seed, given.speed).run(given.moments, _counted(given.moments)))
+    faults = Faults(given.seed, _tell, given.speed)
+    trials = faults.run(given.moments, _counted(given.moments))
+    result = report(trials, faults.others)
     _print(result, given.json, tables(result))
     found = broken(result)
     for one in found:
         _tell(one)
     return 1 if found else 0
+
+
+def _loss(given: argparse.Namespace) -> int:
+    from proof.bridge.loss import measure
+
+    rows = [measure(percent / 100.0, given.seconds) for percent in given.percent]
+    columns = list(rows[0])
+    table = columns, [[f"{row[name]:.4g}" for name in columns] for row in rows]
+    _print({"rows": rows}, given.json, [table])
+    return 0
 
 
 def _print(result: dict[str, Any], json: bool, tables: Sequence[Table]) -> None:

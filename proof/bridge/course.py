@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_plant.plant import PERIOD
+from tvist_protocol.modes import RuntimeState
 from tvist_server.moving.registers import ALONE, ENDED, LEFT_OUT, NUMBER, PLAYED, STATE, State
 from tvist_server.rtde.client import Row, RtdeClient
 from tvist_server.rtde.wire import Wire
@@ -75,6 +76,11 @@ class Watch:
     def state(self) -> State:
         """What the program does."""
         return State(self.now(_COUNTS[0]))
+
+    @property
+    def plays(self) -> bool:
+        """Whether the robot plays a program."""
+        return self.now("runtime_state") == RuntimeState.PLAYING
 
     @property
     def speed(self) -> float:

@@ -1,5 +1,6 @@
 """What a robot that is moved through a bridge does at random moments at which something goes wrong."""
 
+import contextlib
 import random
 import signal
 import socket
@@ -12,6 +13,7 @@ from proof.bridge.link import LinkProcess
 from proof.bridge.processes import Server, until_done
 from tvist_client.blocking import Robot
 from tvist_client.blocking_classes import Arm
+from tvist_protocol.modes import RobotMode
 from tvist_server.moving.registers import Ended, State
 
 ROBOT, NEAR = "127.42.7.1", "127.42.7.2"
@@ -54,11 +56,15 @@ class Faults:
 
     Args:
         seed: Seed of the moments, and of what the hidden robot has.
+        tell: Called with what a bridge said instead of why it stopped.
         speed: Speed of the robot's time, for machines on which others compute; all times are by its clock.
     """
 
-    def __init__(self, seed: int, speed: float = 1.0) -> None:
+    def __init__(self, seed: int, tell: Callable[[str], None], speed: float = 1.0) -> None:
+        self._tell = tell
         self._random, self._seed, self._speed = random.Random(seed), seed, speed  # noqa: S311  nothing secret
+        self.others = 0
+        """Number of stops between the faults, as on a machine that is too busy."""
 
     def run(self, moments: int, progress: Callable[[str], None]) -> Sequence[Trial]:
         """Return what the faults have led to, which take turns."""
@@ -91,21 +97,21 @@ class Faults:
 
     def _try(self, fault: str, bridge: Server, link: LinkProcess, watch: Watch) -> tuple[Trial, Server]:
         with bridge.connect() as robot, robot.control("faults") as arm:
-            until_done(lambda: arm.move_j(robot.state().target_q, velocity=SPEED))
-            first, said = watch.count, len(bridge.said)
-            self._begin_a_move(robot, arm)
-            time.sleep(self._random.uniform(0.05, 1.2) / self._speed)
+            first, said = self._until_moving(bridge, watch, robot, arm)
             going_on = self._break(fault, bridge, link)
-            wait_for(lambda: watch.state is State.ENDED and watch.speed < STILL, 20.0, f"rest after {fault}")
+            wait_for(lambda: not watch.plays and watch.speed < STILL, 20.0, f"rest after {fault}")
             rested = watch.count
             braking = watch.since(first).silence if fault in {"kill", "freeze", "cut"} else None
             time.sleep(self._random.uniform(0.0, 0.3))
             going_on()
             if fault != "kill":
-                wait_for(lambda: EXPECTED[fault] in bridge.said[said:], 20.0, f"words on {fault}")
+                with contextlib.suppress(TimeoutError):
+                    wait_for(lambda: EXPECTED[fault] in bridge.said[said:], 10.0, f"words on {fault}")
             time.sleep(0.2 / self._speed)
             waited = watch.since(rested)
-            told = fault == "kill" or EXPECTED[fault] in bridge.said[said:]
+            told = EXPECTED[fault] in bridge.said[said:]
+            if not told:
+                self._tell(f"{fault}, of which the bridge said: {bridge.said[said:]}")
             ended = Ended(int(waited.ended[-1])).name
             if fault != "kill":
                 until_done(arm.unlock_protective_stop if fault == "protective stop" else arm.power_on)
@@ -124,6 +130,27 @@ class Faults:
         step, acceleration = course.largest_step, course.largest_acceleration
         return Trial(fault, braking, step, acceleration, moved, ended, told, course.missing)
 
+    def _until_moving(self, bridge: Server, watch: Watch, robot: Robot, arm: Arm) -> tuple[int, int]:
+        """Move until a random moment, unless the robot stops before; return the numbers of the row and sign before."""
+        while True:
+            self._hold(robot, arm)
+            first, said = watch.count, len(bridge.said)
+            self._begin_a_move(robot, arm)
+            time.sleep(self._random.uniform(0.05, 1.2) / self._speed)
+            if watch.state is State.FOLLOWING:
+                return first, said
+            self.others += 1
+
+    def _hold(self, robot: Robot, arm: Arm) -> None:
+        """Move by nothing, after a stop for which no fault was the cause once it is over."""
+
+        def hold() -> None:
+            if robot.state().robot_mode != RobotMode.RUNNING:
+                arm.power_on()
+            arm.move_j(robot.state().target_q, velocity=SPEED)
+
+        until_done(hold)
+
     def _begin_a_move(self, robot: Robot, arm: Arm) -> None:
         goal = list(self._centre)
         goal[0] += SWING if robot.state().target_q[0] < self._centre[0] else -SWING
@@ -131,7 +158,7 @@ class Faults:
         arm.move_j(goal, velocity=SPEED, wait=False)
 
     def _go_on(self, robot: Robot, arm: Arm) -> None:
-        until_done(lambda: arm.move_j(robot.state().target_q, velocity=SPEED))
+        self._hold(robot, arm)
         goal = list(robot.state().target_q)
         goal[0] += 0.02 if goal[0] < self._centre[0] else -0.02
         arm.move_j(goal, velocity=SPEED)
@@ -180,8 +207,8 @@ def _secondary(text: str) -> None:
         connection.sendall(text.encode())
 
 
-def report(trials: Sequence[Trial]) -> dict[str, Any]:
-    """Return the largest figures of each fault."""
+def report(trials: Sequence[Trial], others: int) -> dict[str, Any]:
+    """Return the largest figures of each fault, and the number of stops beside them."""
     rows = []
     for fault in EXPECTED:
         of_it = [one for one in trials if one.fault == fault]
@@ -201,7 +228,7 @@ def report(trials: Sequence[Trial]) -> dict[str, Any]:
                 "rows_missing": sum(one.missing for one in of_it),
             }
         )
-    return {"faults": rows}
+    return {"faults": rows, "other_stops": others}
 
 
 def broken(result: dict[str, Any]) -> list[str]:
@@ -221,7 +248,8 @@ def broken(result: dict[str, Any]) -> list[str]:
 def tables(result: dict[str, Any]) -> list[tuple[Sequence[str], Sequence[Sequence[str]]]]:
     """Return the figures as tables."""
     columns = list(result["faults"][0])
-    return [(columns, [[_shown(row[name]) for name in columns] for row in result["faults"]])]
+    rows = [[_shown(row[name]) for name in columns] for row in result["faults"]]
+    return [(columns, rows), (["other stops"], [[str(result["other_stops"])]])]
 
 
 def _shown(value: Any) -> str:
