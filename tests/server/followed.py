@@ -23,7 +23,7 @@ class Followed:
     """
 
     def __init__(self, **changes):
-        self.robot = Robot(plant=NoArm(), q=URSIM, shaper="none", payload=None)
+        self.robot = Robot(plant=NoArm(), q=URSIM, shaper="none")
         self.told, self.arrived = [], []
         guidance = self.robot.controller.programs._access.guidance
         servo = guidance.servo

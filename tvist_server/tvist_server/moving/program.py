@@ -21,7 +21,7 @@ _REGISTERS = ("NUMBER", "ORDER", "SETPOINTS", "STATE", "PLAYED", "ENDED", "ALONE
 
 
 def program(run: int, *, speed: float, deceleration: float, lookahead: float, gain: float) -> str:
-    """Return the text of the program, which uses only functions of e-Series (5.6 or later) and CB3 (3.12 or later).
+    """Return the text of the program, which uses only functions of e-Series (5.9 or later) and CB3 (3.14 or later).
 
     Args:
         run: Number of this run, 1 to `registers.MOST`, which the program says in its registers.
@@ -82,8 +82,9 @@ def $name():
 
   step = get_steptime()
   most = $speed * step # largest way of a joint in a period [rad]
-  near = $away + 2.0 * $speed * ($lookahead + 4.0 * step) # largest distance of the arm from where servoj leads it [rad]
-  z = $fade / ($fade + step) # a distance from the set-points is damped critically, and both its poles are this
+  near = $away + 4.0 * $speed * ($lookahead + 4.0 * step) # largest distance of the arm from where servoj leads it [rad]
+  keep = pow($fade / ($fade + step), 2) # a distance from the set-points fades as if damped critically:
+  pull = pow(step / ($fade + step), 2) # what a period keeps of its velocity, and how it pulls
 
   # What the registers hold may be from before: only a number that changes has a sender.
   old = read_input_integer_register($NUMBER)
@@ -97,15 +98,15 @@ def $name():
 
   q = get_target_joint_positions() # where servoj leads the arm
   change = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # of q in the last period
-  extra = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # how much of that was not the change of the set-points
-  last = setpoint($SETPOINTS + 12) # last set-point that was played
+  extra = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # what of that was not the change of the set-points
+  last = setpoint($SETPOINTS + 12) # last set-point that was there
   number = newest - 2 # of the present one, which becomes the last but one, so that the newest may be late by a period
   last_number = number
   start = number
   played = 0
   alone = 0
   silence = 0.0
-  blind = True # whether the last period had no set-point
+  blind = True # whether the last period was without a set-point
 
   why = $ended_not
   i = 0
@@ -131,7 +132,6 @@ def $name():
     number = number + 1
     if now - number > 2: # this program has missed a period: leave a set-point out
       number = number + 1
-      blind = True
     elif now == number and blind: # they come late: give them a period more
       number = number - 1
     end
@@ -140,58 +140,52 @@ def $name():
       why = $ended_ordered
     elif now < newest or now - number > 2: # another sender, or a pause: the arm must not catch up
       why = $ended_lost
-    elif silence > $silence - 2.5 * step: # half a period less than two, for what is read late and told late
+    elif silence > $silence - 2.5 * step: # earlier by what reading and telling may take
       why = $ended_silence
     end
     newest = now
 
-    there = why == $ended_not and now >= number
+    there = now >= number
     if there:
-      at = $SETPOINTS + 6 * (now - number)
-      new = setpoint(at)
-      previous = last
-      if blind:
-        previous = setpoint(at + 6)
-      end
-      there = read_input_integer_register($NUMBER) == now # else a package has come in between
+      new = setpoint($SETPOINTS + 6 * (now - number))
+      there = read_input_integer_register($NUMBER) == now # else the next package has come meanwhile
     end
+    way = change # without a set-point, the arm goes on as before
     if there:
-      arm = get_target_joint_positions()
-      i = 0
-      while i < 6:
-        if not (norm(new[i] - last[i]) <= most * (number - last_number)): # no number is not, either
-          why = $ended_too_fast
-        elif norm(q[i] - arm[i]) > near:
+      own = new - last
+      joined = number - last_number == 1 # else there is no velocity of the set-points yet
+      if joined:
+        if blind:
+          extra = change - own
+        elif norm(q - get_target_joint_positions()) > near:
           why = $ended_lost
         end
-        own = new[i] - previous[i]
-        if blind:
-          extra[i] = change[i] - own
-        end
-        wanted = own + z * z * extra[i] - (1.0 - z) * (1.0 - z) * (q[i] - previous[i])
-        if wanted > most:
-          wanted = most
-        elif wanted < -most:
-          wanted = -most
-        end
-        extra[i] = wanted - own
-        change[i] = wanted
-        q[i] = q[i] + wanted
-        i = i + 1
+        way = own + extra * keep - (q - last) * pull
       end
-      last = new
-      last_number = number
-      played = played + 1
-      blind = False
-    elif why == $ended_not: # go on with the last velocity
+      far = most * (number - last_number)
       i = 0
       while i < 6:
-        q[i] = q[i] + change[i]
+        if not (norm(own[i]) <= far): # nor is what is no number
+          why = $ended_too_fast
+        elif norm(way[i]) > most:
+          way[i] = change[i]
+        end
         i = i + 1
       end
-      alone = alone + 1
+      extra = way - own
+      last = new
+      last_number = number
+      blind = not joined
+    else:
       blind = True
     end
+    if blind:
+      alone = alone + 1
+    else:
+      played = played + 1
+    end
+    q = q + way
+    change = way
 
     if why == $ended_not:
       write_output_integer_register($PLAYED, number)
