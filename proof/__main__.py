@@ -124,6 +124,23 @@ def _parser() -> argparse.ArgumentParser:
         "--robots", type=_up_to(1000), default=5, help="Hidden robots of each of two arms [5]."
     )
     advice.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one.")
+    bridge = part(
+        _bridge, "bridge", "Compare shapers in hidden robots with the same ones in front of them, over a link."
+    )
+    bridge.add_argument(
+        "what", choices=("motions", "figure"), help="Make motions; or draw one, made in three ways."
+    )
+    bridge.add_argument(
+        "--robots", type=_up_to(1000), default=3, help="Hidden robots, of two arms in turn [3]."
+    )
+    bridge.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one [0].")
+    bridge.add_argument(
+        "--shapers", nargs="+", default=["auto", "auto-target"], help="Shapers [auto auto-target]."
+    )
+    bridge.add_argument(
+        "--random", type=_up_to(100_000), default=100, help="Random moves after the paper's motions [100]."
+    )
+    bridge.add_argument("--output", type=Path, default=Path("bridge.png"), help="File of the figure [bridge.png].")
     return parser
 
 
@@ -247,6 +264,26 @@ def _advice(given: argparse.Namespace) -> int:
     from proof.advice.hidden import report, tables
 
     result = report(given.robots, given.seed, _tell)
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _bridge(given: argparse.Namespace) -> int:
+    from proof.bridge.motions import report, tables
+    from tvist_shaping import BUILT_IN
+    from tvist_shaping.errors import ShapingError
+
+    try:
+        for name in given.shapers:
+            BUILT_IN.check(name)
+    except ShapingError as error:
+        given.refuse(str(error))
+    if given.what == "figure":
+        from proof.bridge.figure import draw
+
+        draw(given.seed, given.output)
+        return 0
+    result = report(given.robots, given.seed, given.shapers, given.random, _tell)
     _print(result, given.json, tables(result))
     return 0
 

@@ -74,25 +74,36 @@ class Way:
 
 
 class HiddenRobot:
-    """A hidden robot with our controller, whose truth is recorded.
+    """A hidden robot with our controller.
 
     Args:
         description: The robot file, which is all that its controller knows.
-        seed: Seed of the hidden robot.
+        seed: Seed of the hidden robot, and of its gears' errors.
         q: Joint angles at which it rests at first, shape (n,) [rad].
         payload: Declared payload.
         shaper: Its shaper.
     """
 
+    late = 0
+    """Ticks by which its target is later than `wanted`."""
+
     def __init__(
         self, description: RobotDescription, seed: int, q: Floats, payload: Payload, shaper: str = "none"
     ) -> None:
-        setup = setup_of(description, q, payload, shaper, truth=True)
-        self.controller = Controller(setup, hidden_variant(seed).make(description, body(payload), seed))
+        self.plant = hidden_variant(seed).make(description, body(payload), seed)
+        self.controller = Controller(setup_of(description, q, payload, shaper, seed), self.plant)
         self._token = control(self.controller)
-        self.states: list[State] = []
-        self.truths: list[Truth] = []
         self.events: list[Event] = []
+
+    @property
+    def robot(self) -> "HiddenRobot":
+        """The robot whose arm moves."""
+        return self
+
+    @property
+    def wanted(self) -> Floats:
+        """Joint angles to which the line leads the arm, shape (n,) [rad]."""
+        return self.controller.cycle.sample.target.q
 
     def send(self, kind: Callable[..., Command], **fields: object) -> Reply:
         """Send a command of the client in control."""
@@ -101,10 +112,6 @@ class HiddenRobot:
     def tick(self) -> State:
         """Advance by a control period."""
         state, events = self.controller.tick()
-        truth = self.controller.truth()
-        assert truth is not None, "a simulated arm knows it"
-        self.states.append(state)
-        self.truths.append(truth)
         self.events += events
         return state
 
@@ -114,10 +121,16 @@ class Counts:
     """What the link and the limits did."""
 
     ticks: int = 0
+    """Ticks since the beginning."""
     played: dict[int, int] = field(default_factory=dict)
     """Age of the set-points played, in ticks of the robot since the tick in which each was computed."""
-    most: float = 0.0
-    """Largest step of the robot's own target between two ticks [rad]."""
+    largest_step: float = 0.0
+    """Largest step of a joint's own target between two ticks [rad]."""
+
+    @property
+    def usual(self) -> int:
+        """Age that most of them have."""
+        return max(self.played, key=lambda age: self.played[age])
 
 
 class Port:
@@ -134,8 +147,10 @@ class Port:
         self.robot, self.setpoints = robot, setpoints
         self.payload = robot.controller.cycle.line.plant.payload
         self.counts = Counts()
-        self.commands: list[Floats] = []
-        """Positions that the line wanted, one for each of the robot's ticks [rad]."""
+        self.wanted = np.array(robot.controller.latest.target_q)
+        """Position that the line wanted last, shape (n,) [rad]."""
+        self.sent = self.wanted
+        """Set-point that was sent for it, shape (n,) [rad]."""
         self._window = Window()
         self._there, self._back = (Way(link, [seed, 83, way]) for way in (0, 1))
         self._packages = deque[tuple[float, tuple[float, ...]]]()
@@ -157,8 +172,9 @@ class Port:
         begun = min(row, now + LATEST)
         while self._rows and self._rows[0][0] <= begun:
             self._measured = self._rows.popleft()[1]
-        self.commands.append(command.q)
-        self._window.add(self.setpoints.next(command).tolist())
+        self.wanted = command.q
+        self.sent = self.setpoints.next(command)
+        self._window.add(self.sent.tolist())
         self._packages.append(
             (self._there.arrival(begun + COMPUTING), self._window.values(r.Order.FOLLOW))
         )
@@ -166,7 +182,7 @@ class Port:
         self._deliver(now + TICK)
         before = robot.controller.latest.target_q
         state = robot.tick()
-        counts.most = max(counts.most, float(np.abs(np.subtract(state.target_q, before)).max()))
+        counts.largest_step = max(counts.largest_step, float(np.abs(np.subtract(state.target_q, before)).max()))
         age = counts.ticks - self.output(r.PLAYED)
         counts.played[age] = counts.played.get(age, 0) + 1
         return self._measured
@@ -232,11 +248,21 @@ class Bridge:
         # The robot's own controller lets motors lead by the gears' wind-up: ours must not do so, too.
         leads = (0.0,) * description.joints
         plain = structs.replace(description, drives=structs.replace(description.drives, windup_feedforward=leads))
-        self.controller = Controller(setup_of(plain, q, payload, shaper, truth=False), self.port)
+        self.controller = Controller(setup_of(plain, q, payload, shaper, seed), self.port)
         self._token = control(self.controller)
         self.events: list[Event] = []
         while self.port.output(r.STATE) != r.State.FOLLOWING:
             self.tick()
+
+    @property
+    def wanted(self) -> Floats:
+        """Joint angles to which the line leads the arm, shape (n,) [rad]."""
+        return self.port.wanted
+
+    @property
+    def late(self) -> int:
+        """Ticks by which the robot's target is later than `wanted`."""
+        return self.port.counts.usual + 1  # for the robot's own differentiator
 
     def send(self, kind: Callable[..., Command], **fields: object) -> Reply:
         """Send a command of the client in control."""
@@ -250,11 +276,11 @@ class Bridge:
 
 
 def setup_of(
-    description: RobotDescription, q: Floats, payload: Payload, shaper: str, *, truth: bool
+    description: RobotDescription, q: Floats, payload: Payload, shaper: str, seed: int
 ) -> Setup:
-    """Return the setup of a robot whose calibration is that of its model."""
+    """Return the setup of a robot whose calibration is that of its model, and whose gear errors are a seed's."""
     return Setup(
-        description=description, q=tuple(q.tolist()), payload=payload, shaper=shaper, clock="free", truth=truth,
+        description=description, q=tuple(q.tolist()), payload=payload, shaper=shaper, clock="free", seed=seed,
         calibration=load_calibration(f"{description.robot.name}_modal"),
     )  # fmt: skip
 
