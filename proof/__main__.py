@@ -125,7 +125,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     advice.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one.")
     bridge = part(
-        _bridge, "bridge", "Compare shapers in hidden robots with the same ones in front of them, over a link."
+        _bridge,
+        "bridge",
+        "Compare shapers in hidden robots with the same ones in front of them, over a link.",
     )
     bridge.add_argument(
         "what", choices=("motions", "figure"), help="Make motions; or draw one, made in three ways."
@@ -140,7 +142,9 @@ def _parser() -> argparse.ArgumentParser:
     bridge.add_argument(
         "--random", type=_up_to(100_000), default=100, help="Random moves after the paper's motions [100]."
     )
-    bridge.add_argument("--output", type=Path, default=Path("bridge.png"), help="File of the figure [bridge.png].")
+    bridge.add_argument(
+        "--output", type=Path, default=Path("bridge.png"), help="File of the figure [bridge.png]."
+    )
     return parser
 
 

@@ -22,7 +22,7 @@ from tvist_protocol.commands import Command, TakeControl
 from tvist_protocol.io import Registers, SetRegisters
 from tvist_protocol.programs import ProgramRun
 from tvist_protocol.replies import Accepted, Refused, Reply
-from tvist_protocol.stream import Event, State, Truth
+from tvist_protocol.stream import Event, State
 from tvist_protocol.values import Payload
 from tvist_server.moving import registers as r
 from tvist_server.moving.program import MARGIN, program
@@ -161,7 +161,9 @@ class Port:
         """Return where the robot's target is."""
         state = self.robot.controller.latest
         found = measured(state)
-        return Measurement(np.array(state.target_q), np.zeros_like(found.q), found.moment, found.accelerometer)
+        return Measurement(
+            np.array(state.target_q), np.zeros_like(found.q), found.moment, found.accelerometer
+        )
 
     def step(self, command: DriveCommand) -> Measurement:
         """Send the set-point, and let the robot tick; return its row with which this tick began."""
@@ -175,14 +177,14 @@ class Port:
         self.wanted = command.q
         self.sent = self.setpoints.next(command)
         self._window.add(self.sent.tolist())
-        self._packages.append(
-            (self._there.arrival(begun + COMPUTING), self._window.values(r.Order.FOLLOW))
-        )
+        self._packages.append((self._there.arrival(begun + COMPUTING), self._window.values(r.Order.FOLLOW)))
         counts.ticks += 1
         self._deliver(now + TICK)
         before = robot.controller.latest.target_q
         state = robot.tick()
-        counts.largest_step = max(counts.largest_step, float(np.abs(np.subtract(state.target_q, before)).max()))
+        counts.largest_step = max(
+            counts.largest_step, float(np.abs(np.subtract(state.target_q, before)).max())
+        )
         age = counts.ticks - self.output(r.PLAYED)
         counts.played[age] = counts.played.get(age, 0) + 1
         return self._measured
@@ -201,9 +203,7 @@ class Port:
         number, order, *angles = values
         doubles = Registers(bank="input_double", first=r.SETPOINTS, values=tuple(angles))
         self.robot.controller.receive(
-            SetRegisters(
-                bank="input_int", first=r.NUMBER, values=(int(number), int(order)), also=(doubles,)
-            )
+            SetRegisters(bank="input_int", first=r.NUMBER, values=(int(number), int(order)), also=(doubles,))
         )
 
 
@@ -247,7 +247,9 @@ class Bridge:
         self.port = Port(self.robot, setpoints, link, seed)
         # The robot's own controller lets motors lead by the gears' wind-up: ours must not do so, too.
         leads = (0.0,) * description.joints
-        plain = structs.replace(description, drives=structs.replace(description.drives, windup_feedforward=leads))
+        plain = structs.replace(
+            description, drives=structs.replace(description.drives, windup_feedforward=leads)
+        )
         self.controller = Controller(setup_of(plain, q, payload, shaper, seed), self.port)
         self._token = control(self.controller)
         self.events: list[Event] = []
@@ -275,9 +277,7 @@ class Bridge:
         return state
 
 
-def setup_of(
-    description: RobotDescription, q: Floats, payload: Payload, shaper: str, seed: int
-) -> Setup:
+def setup_of(description: RobotDescription, q: Floats, payload: Payload, shaper: str, seed: int) -> Setup:
     """Return the setup of a robot whose calibration is that of its model, and whose gear errors are a seed's."""
     return Setup(
         description=description, q=tuple(q.tolist()), payload=payload, shaper=shaper, clock="free", seed=seed,

@@ -36,9 +36,9 @@ PAPER = ("Q2", "Q1", "Q3", "Q1")
 """Where the paper's motions end, from Q1."""
 SPEEDS = ((1.5, 2.0, 100.0), (1.05, 1.4, 50.0), (0.8, 2.0, 200.0))
 """Velocity, acceleration and jerk of the motions [rad/s, rad/s², rad/s³]; the first are the paper's."""
-REST = 300
+REST = 250
 """Ticks at rest after a motion."""
-TORQUE = 0.7
+TORQUE = 0.85
 """Share of the joints' torques that a motion of a rigid arm may need: an unshaped arm rings with more [-]."""
 POINTS = 3.0
 """Largest loss by the bridge that counts as none [percentage points]."""
@@ -107,7 +107,10 @@ def asked(description: RobotDescription, count: int, seed: int) -> Iterator[Aske
     They are free of collisions, and need no more than a share of the torques with the declared payload.
     """
     payload, random = paper_payload(description), np.random.default_rng([seed, 79])
-    collision, dynamics = CollisionModel(description, body(payload)), InverseDynamics(description, body(payload))
+    collision, dynamics = (
+        CollisionModel(description, body(payload)),
+        InverseDynamics(description, body(payload)),
+    )
     most = TORQUE * np.array(description.limits.torque)
     here = np.array(description.poses["Q1"])
     for name in PAPER:
@@ -117,7 +120,9 @@ def asked(description: RobotDescription, count: int, seed: int) -> Iterator[Aske
         far = random.uniform([*WORKSPACE.low, -2.0, -2.0], [*WORKSPACE.high, 2.0, 2.0])
         there = here + random.uniform(0.3, 1.0) * (far - here)
         speed = SPEEDS[random.integers(len(SPEEDS))]
-        states = zip(*central_differences(point_to_point(here, there, MotionLimits(*speed)), PERIOD), strict=True)
+        states = zip(
+            *central_differences(point_to_point(here, there, MotionLimits(*speed)), PERIOD), strict=True
+        )
         if all((np.abs(dynamics.torque(*state)) <= most).all() for state in states) and is_free(
             collision, Move(tuple(here.tolist()), tuple(there.tolist()), payload.mass)
         ):
@@ -136,7 +141,9 @@ def made(side: HiddenRobot | Bridge, motions: Sequence[Asked]) -> Made:
             done.stops.append(str(reply))
             break
         peak = _made(side)
-        bad = [f"{event.kind}: {event.why}" for event in (*side.events, *side.robot.events) if event.kind in BAD]
+        bad = [
+            f"{event.kind}: {event.why}" for event in (*side.events, *side.robot.events) if event.kind in BAD
+        ]
         if bad:
             done.stops.append(bad[0])
             break
@@ -188,9 +195,7 @@ def rows_of(
     return found
 
 
-def _row(
-    name: str, seed: int, shaper: str, plain: Made, inside: Made, through: Made, bridge: Bridge
-) -> Row:
+def _row(name: str, seed: int, shaper: str, plain: Made, inside: Made, through: Made, bridge: Bridge) -> Row:
     number = min(len(one.peaks) for one in (plain, inside, through))
     before, within, behind = (np.array(one.peaks[:number]) for one in (plain, inside, through))
     counts, port = before >= WORTH, bridge.port

@@ -13,6 +13,8 @@ FIRST = 10.0
 """Time to wait for the first set-point [s]."""
 AWAY = 0.01
 """Largest distance of a joint from the first set-point [rad]."""
+AGAIN = 0.016
+"""Longest time from the arrival of the last set-point in which the next is expected to be on its way again [s]."""
 FADE = 0.05
 """Time constant with which a distance from the set-points fades [s]."""
 MARGIN = 1.05
@@ -48,7 +50,7 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         | {f"state_{one.name.lower()}": int(one) for one in State}
         | {"name": NAME, "run": run, "follow": int(Order.FOLLOW), "speed": float(MARGIN * speed)}
         | {"deceleration": float(deceleration), "lookahead": float(lookahead), "gain": float(gain)}
-        | {"silence": SILENCE, "first": FIRST, "away": AWAY, "fade": FADE}
+        | {"silence": SILENCE, "first": FIRST, "away": AWAY, "fade": FADE, "again": AGAIN}
         | {"angles": ", ".join(f"read_input_float_register(at + {joint})" for joint in range(JOINTS))}
     )
 
@@ -98,7 +100,8 @@ def $name():
 
   q = get_target_joint_positions() # where servoj leads the arm
   change = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # of q in the last period
-  extra = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # what of that was not the change of the set-points
+  bend = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # how much more that was than in the period before
+  extra = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # what of the change was not that of the set-points
   last = setpoint($SETPOINTS + 12) # last set-point that was there
   number = newest - 2 # of the present one, which becomes the last but one, so that the newest may be late by a period
   last_number = number
@@ -151,7 +154,7 @@ def $name():
       new = setpoint($SETPOINTS + 6 * (now - number))
       there = read_input_integer_register($NUMBER) == now # else the next package has come meanwhile
     end
-    way = change # without a set-point, the arm goes on as before
+    way = change + bend # without a set-point, the arm goes on as before, with its acceleration
     if there:
       own = new - last
       joined = number - last_number == 1 # else there is no velocity of the set-points yet
@@ -178,6 +181,9 @@ def $name():
       last_number = number
       blind = not joined
     else:
+      if silence > $again or norm(way) > most: # nobody knows any more how it would go on
+        way = change
+      end
       blind = True
     end
     if blind:
@@ -186,6 +192,7 @@ def $name():
       played = played + 1
     end
     q = q + way
+    bend = way - change
     change = way
 
     if why == $ended_not:
