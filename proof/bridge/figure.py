@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,7 +21,7 @@ from tvist_server.moving.servo_lag import ServoLag
 
 ROBOT, SHAPER, TARGET, JOINT = "ur5e", "auto", "Q2", 0
 """The robot, its shaper, where the motion from Q1 ends, and the joint whose angle is drawn."""
-SENT = {"color": FAINT, "linewidth": 1.0, "label": "Set-points sent"}
+SENT: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "label": "Set-points sent"}
 """How they are drawn."""
 BEFORE, AFTER = 0.1, 0.2
 """Time before and after the stop that is drawn [s]."""
