@@ -36,8 +36,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m proof", description=__doc__)
     parts = parser.add_subparsers(required=True, metavar="PART")
 
-    def part(run: Callable[[argparse.Namespace], int], name: str, what: str) -> argparse.ArgumentParser:
-        one = parts.add_parser(name, help=what, description=what)
+    def part(
+        run: Callable[[argparse.Namespace], int], name: str, what: str, among: Any = parts
+    ) -> argparse.ArgumentParser:
+        one: argparse.ArgumentParser = among.add_parser(name, help=what, description=what)
         one.set_defaults(run=run, refuse=one.error)
         one.add_argument("--json", action="store_true", help="Print one JSON object.")
         return one
@@ -124,28 +126,44 @@ def _parser() -> argparse.ArgumentParser:
         "--robots", type=_up_to(1000), default=5, help="Hidden robots of each of two arms [5]."
     )
     advice.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one.")
-    bridge = part(
-        _bridge,
-        "bridge",
-        "Compare shapers in hidden robots with the same ones in front of them, over a link.",
+    _add_bridge(parts, part)
+    return parser
+
+
+def _add_bridge(parts: Any, part: Callable[..., argparse.ArgumentParser]) -> None:
+    """Add the parts about a robot at the end of the line."""
+    bridge = parts.add_parser("bridge", help="Measure what stands between programs and a hidden robot.")
+    among = bridge.add_subparsers(required=True, metavar="PART")
+    faults = part(
+        _faults,
+        "faults",
+        "Let a bridge to a robot fail at random moments, and see how the robot stops.",
+        among,
     )
-    bridge.add_argument(
-        "what", choices=("motions", "figure"), help="Make motions; or draw one, made in three ways."
+    faults.add_argument("--moments", type=_up_to(100_000), default=200, help="Number of moments [200].")
+    faults.add_argument("--seed", type=_up_to(2**31 - 1), default=7, help="Seed of robot and moments [7].")
+    faults.add_argument("--speed", type=float, default=1.0, help="Speed of the robot's time [1].")
+    loss = part(_loss, "loss", "See how late set-points come over a cable that loses packets.", among)
+    loss.add_argument("--seconds", type=_up_to(86_400), default=60, help="Seconds of each share [60].")
+    loss.add_argument(
+        "--percent", type=float, nargs="+", default=[0.0, 0.1, 1.0], help="Shares of lost packets [0 0.1 1]."
     )
-    bridge.add_argument(
+    motions = part(
+        _motions, "motions", "Compare shapers in hidden robots with the same ones in front of them.", among
+    )
+    motions.add_argument(
         "--robots", type=_up_to(1000), default=3, help="Hidden robots, of two arms in turn [3]."
     )
-    bridge.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one [0].")
-    bridge.add_argument(
+    motions.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one [0].")
+    motions.add_argument(
         "--shapers", nargs="+", default=["auto", "auto-target"], help="Shapers [auto auto-target]."
     )
-    bridge.add_argument(
+    motions.add_argument(
         "--random", type=_up_to(100_000), default=100, help="Random moves after the paper's motions [100]."
     )
-    bridge.add_argument(
-        "--output", type=Path, default=Path("bridge.png"), help="File of the figure [bridge.png]."
-    )
-    return parser
+    figure = part(_figure, "figure", "Draw the end of a motion that is shaped in front of a robot.", among)
+    figure.add_argument("--seed", type=_up_to(2**31 - 1), default=1, help="Seed of the robot [1].")
+    figure.add_argument("--output", type=Path, default=Path("bridge.png"), help="File to write [bridge.png].")
 
 
 def _up_to(most: int) -> Callable[[str], int]:
@@ -272,7 +290,30 @@ def _advice(given: argparse.Namespace) -> int:
     return 0
 
 
-def _bridge(given: argparse.Namespace) -> int:
+def _faults(given: argparse.Namespace) -> int:
+    from proof.bridge.faults import Faults, broken, report, tables
+
+    faults = Faults(given.seed, _tell, given.speed)
+    trials = faults.run(given.moments, _counted(given.moments))
+    result = report(trials, faults.others)
+    _print(result, given.json, tables(result))
+    found = broken(result)
+    for one in found:
+        _tell(one)
+    return 1 if found else 0
+
+
+def _loss(given: argparse.Namespace) -> int:
+    from proof.bridge.loss import measure
+
+    rows = [measure(percent / 100.0, given.seconds) for percent in given.percent]
+    columns = list(rows[0])
+    table = columns, [[f"{row[name]:.4g}" for name in columns] for row in rows]
+    _print({"rows": rows}, given.json, [table])
+    return 0
+
+
+def _motions(given: argparse.Namespace) -> int:
     from proof.bridge.motions import report, tables
     from tvist_shaping import BUILT_IN
     from tvist_shaping.errors import ShapingError
@@ -282,13 +323,15 @@ def _bridge(given: argparse.Namespace) -> int:
             BUILT_IN.check(name)
     except ShapingError as error:
         given.refuse(str(error))
-    if given.what == "figure":
-        from proof.bridge.figure import draw
-
-        draw(given.seed, given.output)
-        return 0
     result = report(given.robots, given.seed, given.shapers, given.random, _tell)
     _print(result, given.json, tables(result))
+    return 0
+
+
+def _figure(given: argparse.Namespace) -> int:
+    from proof.bridge.figure import draw
+
+    draw(given.seed, given.output)
     return 0
 
 

@@ -1,1 +1,1 @@
-"""A robot controller of ours in front of a hidden robot, with a link between them that delays, jitters and loses."""
+"""A robot that is moved over a link that delays, loses and fails: in another process, or in lockstep in this one."""

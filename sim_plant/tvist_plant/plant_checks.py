@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tvist_plant.plant import Measurement, Pacing, Plant, PlantError, Standing
+from tvist_plant.plant import Measurement, Pacing, Plant, PlantError, Standing, Supervised
 
 
 def check_unpaced(plant: Plant) -> None:
@@ -36,7 +36,8 @@ def measured_standing(plant: Plant, joints: int) -> Measurement:
     try:
         measured = plant.measure()
     except PlantError as error:
-        raise ValueError(f"plant {name}: where it stands is unknown: {error}") from error
+        said = "" if isinstance(plant, Supervised) else f"plant {name}: where it stands is unknown: "
+        raise ValueError(f"{said}{error}") from error
     check_measurement(measured, joints, plant)
     if not np.isfinite(measured.q).all():
         raise ValueError(f"plant {name}: measured q is {measured.q.tolist()}: must be finite")

@@ -27,11 +27,12 @@ class Followed:
     Attributes:
         told: What `servoj` was told, one posture a call, and the tick of each.
         numbers: The number that the program said in each of these ticks.
+        alone: The number of periods without a set-point that it said then.
     """
 
     def __init__(self, speed, deceleration, step):
         self.speed, self.most, self.tick = speed, MARGIN * speed * step, 0
-        self.told, self.at, self.numbers = [], [], []
+        self.told, self.at, self.numbers, self.alone = [], [], [], []
         self.text = program(RUN, speed=speed, deceleration=deceleration, lookahead=0.03, gain=2000.0)
         if step != H:
             self.text = self.text.replace("get_steptime()", str(step))
@@ -43,6 +44,7 @@ class Followed:
             self.tick += 1
             if len(self.told) > before:
                 self.numbers.append(self.output(r.PLAYED))
+                self.alone.append(self.output(r.ALONE))
 
     def _tell(self, q):
         self.told.append(np.array(q.items))
@@ -74,9 +76,11 @@ class Followed:
         """Check all that holds whatever came; `last_came` is the tick of the last new number."""
         told = np.array([HERE, *self.told])
         assert np.abs(np.diff(told, axis=0)).max(initial=0.0) <= self.most * (1 + 1e-9)
-        served = len(self.told)
-        played = self.numbers[-1] - self.numbers[0] + 1 - self.output(r.LEFT_OUT) if served else 0
-        assert played + self.output(r.ALONE) == served
+        played = np.array(self.numbers)[np.diff([0, *self.alone]) == 0]
+        assert set(np.diff([0, *self.alone])) <= {0, 1}
+        if len(played):
+            assert self.output(r.LEFT_OUT) == played[-1] - played[0] + 1 - len(set(played))
+        assert (np.diff(played) >= 0).all()
         if self.state is r.State.ENDED:
             assert self.ended is not r.Ended.NOT
             assert not self.at or self.at[-1] < last_came + PATIENCE

@@ -139,6 +139,15 @@ def test_a_replay_does_not_move_an_arm_that_gives_the_tick(tmp_path, place):
         replay_file(content, plant=real)
 
 
+def test_a_replay_of_a_real_arm_says_why_there_is_none(tmp_path, place):
+    at = "ur://192.168.0.10"
+    content = recorded(tmp_path, OwnPlant(at, "", load_plant(place).maker))
+    with pytest.raises(ReplayError, match="it cannot be replayed"):
+        replay_file(content)
+    with pytest.raises(OwnPlantError, match="only tvist serve takes"):
+        load_plant(at)
+
+
 def test_only_the_process_that_serves_it_makes_it():
     _rehearse(setup(plant=OwnPlant("real.py:Arm", "", lambda *_: pytest.fail("it was touched"))))
 

@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from tests.conformance.served import refused_to_start
+from tests.conformance.served import PATIENCE, refused_to_start
 from tests.places import own_address
 from tests.system.moved_robot import (
     Link,
@@ -19,10 +19,11 @@ from tests.system.ur_object import Client
 
 from tvist_client import RefusedError
 from tvist_client.blocking import Robot
+from tvist_protocol.modes import RobotMode
 
 pytestmark = pytest.mark.realtime
 
-HOST, NEAR, OTHER = own_address(51), own_address(52), own_address(53)
+HOST, NEAR, OTHER, NOBODY = (own_address(last) for last in (51, 52, 53, 54))
 STEP = 0.002
 """Largest step of the robot's target beside its motions [rad]."""
 
@@ -41,7 +42,7 @@ def bridge(arm):
 
 
 def eventually(true):
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + PATIENCE
     while not true():
         assert time.monotonic() < deadline, "it never was so"
 
@@ -150,7 +151,27 @@ def test_a_program_that_is_ended_at_the_robot_is_begun_again_where_the_arm_stand
         control.move_j(beside(robot, -0.1), velocity=0.4)
 
 
-def test_a_link_that_holds_lets_the_robot_brake_and_nothing_old_is_played(arm):
+def test_an_arm_without_power_is_switched_on_at_the_robot_and_then_here(arm, bridge):
+    stopped(bridge, lambda: tell(HOST, "power off"), "its program was stopped at the robot", mode=1)
+    with (
+        Robot.connect(arm.endpoint) as there,
+        Robot.connect(bridge.endpoint, "bridge") as robot,
+        robot.control("me") as control,
+    ):
+        eventually(lambda: there.state().robot_mode == RobotMode.POWER_OFF)
+        there.advance(100)
+        with pytest.raises(RefusedError, match="switch it on and release its brakes at the robot"):
+            control.power_on()
+        tell(HOST, "power on", "brake release")
+        eventually(lambda: not refused(control.power_on, "is not moved"))
+        move_by_nothing(robot, control)
+        control.power_off()
+    tvist("unlock", bridge.endpoint, "--name", "bridge", "--power-on").assert_done()
+    wait_until_it_follows(bridge)
+
+
+@pytest.mark.parametrize("how", ["hold", "cut"])
+def test_a_link_that_fails_lets_the_robot_brake_and_nothing_old_is_played(arm, how):
     with Link(HOST, NEAR) as link, a_bridge(NEAR) as bridge:
         wait_until_it_follows(bridge)
         with (
@@ -161,11 +182,11 @@ def test_a_link_that_holds_lets_the_robot_brake_and_nothing_old_is_played(arm):
             control.move_j(beside(robot, 0.3), velocity=0.4, wait=False)
             robot.advance(150)
             with states_of(there) as states:
-                link.hold()
+                getattr(link, how)()
                 bridge.wait_until_said("it says nothing any more")
                 eventually(lambda: max(map(abs, there.state().target_qd)) < 1e-3)
                 stands = there.state().target_q
-                link.flow()
+                link.flow() if how == "hold" else link.restore()
                 eventually(lambda: not refused(control.power_on, "is not moved"))
                 move_by_nothing(robot, control)
             assert largest_step(states) < STEP
@@ -223,13 +244,39 @@ def test_what_the_robot_cannot_carry_is_refused(bridge):
         control.set_shaper("zv")
 
 
+def test_a_program_for_the_robot_moves_it_through_the_bridge_s_own_interfaces(arm):
+    with a_bridge(HOST, "--ur", "--ur-address", OTHER, "--shaper", "zv") as bridge:
+        wait_until_it_follows(bridge)
+        with (
+            Client("rtde_control", "RTDEControlInterface", OTHER) as control,
+            Client("rtde_receive", "RTDEReceiveInterface", HOST) as seen,
+        ):
+            goal = list(seen.getTargetQ())
+            goal[0] += 0.2
+            assert control.moveJ(goal, 1.0, 1.5)
+            eventually(lambda: seen.getTargetQ() == pytest.approx(goal, abs=1e-3))
+
+
+def test_set_points_that_make_up_for_the_servo_s_lag_bring_it_closer(arm):
+    """How far the robot's target is from ours in a motion, without and with it."""
+    far = []
+    for option in ((), ("--servo-lag", "simulated")):
+        with a_bridge(HOST, *option) as bridge:
+            wait_until_it_follows(bridge)
+            with Robot.connect(bridge.endpoint, "bridge") as robot, robot.control("me") as control:
+                with states_of(robot) as states:
+                    control.move_j(beside(robot, 0.2 if option else -0.2), velocity=0.4)
+                far.append(max(abs(state.target_q[0] - state.actual_q[0]) for state in states))
+    assert far[1] < 0.5 * far[0]
+
+
 def test_bad_starts_are_one_sentence_and_nothing_moves(arm):
     with Robot.connect(arm.endpoint) as there:
         before = there.state().target_q
         motion = ("--plant", f"ur://{HOST}", "--enable-motion")
         for options, words in (
             (("--enable-motion",), ["--plant ur://"]),
-            (("--plant", f"ur://{OTHER}", "--enable-motion"), ["no robot answers", "Next:"]),
+            (("--plant", f"ur://{NOBODY}", "--enable-motion"), ["no robot answers", "Next:"]),
             ((*motion, "--robot", "ur10e"), ["is no UR10e"]),
             ((*motion, "--payload", "2"), ["payload of 5 kg", "--payload"]),
             ((*motion, "--tcp", "0,0,0.1,0,0,0"), ["tool centre point", "--tcp"]),

@@ -79,7 +79,7 @@ class MovedRobot:
             port = self._ports.dashboard.port
             self._told.append(f"its port {port} answers nothing: model and remote control were not checked")
         self._pace, self._number = Pace(), int(time.time()) % NUMBERS
-        self._held, self._lag = False, lag
+        self._held, self._lag, self._interval = False, lag, round(self._robot.interval() / PERIOD)
         self._run: Run | None = None
         self._halt: Halt | None = None
         self._left_paused = False
@@ -112,7 +112,7 @@ class MovedRobot:
     def step(self, command: DriveCommand) -> Measurement:
         """Write a set-point, and return the latest measurements; of several periods at once only the last writes."""
         if self._run is not None:
-            self._run.add(command)
+            self._run.add(command, played=(self._pace.tick - self._sight.tick) % self._interval == 0)
             if not self._pace.owed:
                 self._run.write()
         return self._measured(self._sight.measured.q)

@@ -51,7 +51,11 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         | {"name": NAME, "run": run, "follow": int(Order.FOLLOW), "speed": float(MARGIN * speed)}
         | {"deceleration": float(deceleration), "lookahead": float(lookahead), "gain": float(gain)}
         | {"silence": SILENCE, "first": FIRST, "away": AWAY, "fade": FADE, "again": AGAIN}
-        | {"angles": ", ".join(f"read_input_float_register(at + {joint})" for joint in range(JOINTS))}
+        | {
+            "angles": ", ".join(
+                f"read_input_float_register({at})" for at in ("at", *(f"at + {k}" for k in range(1, JOINTS)))
+            )
+        }
     )
 
 
@@ -101,15 +105,14 @@ def $name():
   q = get_target_joint_positions() # where servoj leads the arm
   change = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # of q in the last period
   bend = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # how much more that was than in the period before
-  extra = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # what of the change was not that of the set-points
-  last = setpoint($SETPOINTS + 12) # last set-point that was there
+  extra = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # what of the change was not the change of the set-points
+  last = setpoint($SETPOINTS + 12) # last set-point that was played
   number = newest - 2 # of the present one, which becomes the last but one, so that the newest may be late by a period
   last_number = number
-  start = number
-  played = 0
   alone = 0
+  left_out = 0
   silence = 0.0
-  blind = True # whether the last period was without a set-point
+  blind = True # whether the last period was without a set-point that had come
 
   why = $ended_not
   i = 0
@@ -134,42 +137,57 @@ def $name():
     end
     number = number + 1
     behind = now - number
-    if behind > 2: # it began while they came late, or has missed a period: leave some out
-      number = now - 2
-    elif now == number and now > newest and blind: # they come late: give them a period more
-      number = number - 1
+    if behind > 2 or (behind <= 0 and blind and now > newest): # set-points come later than at first, or less late
+      number = now - 1
     end
 
     if read_input_integer_register($ORDER) != $follow:
       why = $ended_ordered
-    elif now < newest or behind > 10: # another sender, or a pause, after which it must not catch up
+    elif now < newest or behind * step > $silence: # another sender, or a pause: it must not catch up
       why = $ended_lost
     elif silence > $silence - 2.5 * step: # earlier by what reading and telling may take
       why = $ended_silence
     end
     newest = now
 
-    there = why == $ended_not and now >= number
-    if there:
-      new = setpoint($SETPOINTS + 6 * (now - number))
-      there = read_input_integer_register($NUMBER) == now # else the next package has come meanwhile
-    end
-    way = change + bend # without a set-point, the arm goes on as before, with its acceleration
-    if there:
-      own = new - last
-      joined = number - last_number == 1 # else there is no velocity of the set-points yet
-      if joined:
-        if blind:
-          extra = change - own
-        elif norm(q - get_target_joint_positions()) > near:
-          why = $ended_lost
-        end
-        way = own + extra * keep - (q - last) * pull
+    blind = now < number
+    if not blind:
+      at = $SETPOINTS + 6 * (now - number)
+      new = setpoint(at)
+      previous = last
+      gap = number - last_number
+      if gap != 1:
+        previous = setpoint(at + 6)
       end
-      far = most * (number - last_number)
+      blind = read_input_integer_register($NUMBER) != now # the next package has come meanwhile
+    end
+    if blind: # the arm goes on as before, with its acceleration if it is not for long
+      way = change
+      if silence <= $again:
+        way = change + bend
+        i = 0
+        while i < 6:
+          if norm(way[i]) > most:
+            way[i] = change[i]
+          end
+          i = i + 1
+        end
+      end
+      alone = alone + 1
+    else:
+      own = new - previous # change of the set-points in this period
+      leap = own
+      if gap != 1:
+        leap = new - last
+        extra = change - own
+      elif norm(q - get_target_joint_positions()) > near:
+        why = $ended_lost
+      end
+      way = own + extra * keep - (q - previous) * pull
+      far = most * gap
       i = 0
       while i < 6:
-        if not (norm(own[i]) <= far): # nor is what is no number
+        if not (norm(leap[i]) <= far): # nor is what is no number
           why = $ended_too_fast
         elif norm(way[i]) > most:
           way[i] = change[i]
@@ -179,17 +197,6 @@ def $name():
       extra = way - own
       last = new
       last_number = number
-      blind = not joined
-    else:
-      if silence > $again or norm(way) > most: # nobody knows any more how it would go on
-        way = change
-      end
-      blind = True
-    end
-    if blind:
-      alone = alone + 1
-    else:
-      played = played + 1
     end
     q = q + way
     bend = way - change
@@ -197,8 +204,12 @@ def $name():
 
     if why == $ended_not:
       write_output_integer_register($PLAYED, number)
-      write_output_integer_register($ALONE, alone)
-      write_output_integer_register($LEFT_OUT, number - start - played)
+      if blind:
+        write_output_integer_register($ALONE, alone)
+      elif gap > 1:
+        left_out = left_out + gap - 1
+        write_output_integer_register($LEFT_OUT, left_out)
+      end
       servoj(q, t=step, lookahead_time=$lookahead, gain=$gain)
     end
   end

@@ -22,6 +22,8 @@ DECELERATION = 5.0
 SETTLES = 25
 """Number of rows of the waiting program after which it gets the first set-point: what its start has delayed has come
 by then, since it ends when numbers come faster than it counts."""
+GRACE = 5
+"""Number of rows after the program's end in which modes may still tell why."""
 BEGINS = 5.0
 """Longest time in which the program has to begin [s]."""
 TELL_EVERY = 10.0
@@ -46,7 +48,7 @@ class Run:
         stands, speed = np.array(robot.newest["target_q"]), max(limits.velocity)
         self._setpoints = Setpoints(stands, lag, fastest=speed, reach=np.array(limits.position))
         self._begun, self._plays = time.monotonic(), False
-        self._waiting, self._settled = False, 0
+        self._waiting, self._settled, self._ending = False, 0, 0
         self.ready = False
         """Whether the program follows."""
         self.halt: Halt | None = None
@@ -61,11 +63,18 @@ class Run:
         """The newest set-point [rad]; None before the first."""
         return self._window.values(Order.FOLLOW)[2:8] if self._window.number else None
 
-    def add(self, command: DriveCommand) -> None:
-        """Add the next set-point; until the program follows, where the robot stands."""
+    def add(self, command: DriveCommand, *, played: bool) -> None:
+        """Take the command of a tick, or where the robot stands until the program follows.
+
+        Args:
+            command: The command.
+            played: Whether a period of the robot ends with the tick, so that it gets a set-point.
+        """
         if self.ready:
-            self._window.add(self._setpoints.next(command).tolist())
-        elif self._waiting and self._settled > SETTLES:
+            setpoint = self._setpoints.next(command).tolist()
+            if played:
+                self._window.add(setpoint)
+        elif played and self._waiting and self._settled > SETTLES:
             stands = self._robot.newest["target_q"] if self.last is None else self.last
             self._setpoints.begin(np.array(stands))
             self._window.add(stands)
@@ -98,8 +107,11 @@ class Run:
                 )
                 self.halt = Halt(f"{why}, then power on here", sight.modes[1])
             return None
-        self.halt = self.halt or halt_by_program(ended, sight.modes)
-        self.ready = state == State.FOLLOWING and self.halt is None
+        ends = halt_by_program(ended, sight.modes)
+        self._ending = 0 if ends is None else self._ending + 1
+        if self._ending > GRACE:
+            self.halt = self.halt or ends
+        self.ready = (state == State.FOLLOWING or self.ready) and self.halt is None
         self._waiting = state == State.WAITING and self.halt is None
         self._settled += state == State.WAITING
         return self._tell_missed((missed[0], missed[1]))
