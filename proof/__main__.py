@@ -148,6 +148,22 @@ def _add_bridge(parts: Any, part: Callable[..., argparse.ArgumentParser]) -> Non
     loss.add_argument(
         "--percent", type=float, nargs="+", default=[0.0, 0.1, 1.0], help="Shares of lost packets [0 0.1 1]."
     )
+    motions = part(
+        _motions, "motions", "Compare shapers in hidden robots with the same ones in front of them.", among
+    )
+    motions.add_argument(
+        "--robots", type=_up_to(1000), default=3, help="Hidden robots, of two arms in turn [3]."
+    )
+    motions.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one [0].")
+    motions.add_argument(
+        "--shapers", nargs="+", default=["auto", "auto-target"], help="Shapers [auto auto-target]."
+    )
+    motions.add_argument(
+        "--random", type=_up_to(100_000), default=100, help="Random moves after the paper's motions [100]."
+    )
+    figure = part(_figure, "figure", "Draw the end of a motion that is shaped in front of a robot.", among)
+    figure.add_argument("--seed", type=_up_to(2**31 - 1), default=1, help="Seed of the robot [1].")
+    figure.add_argument("--output", type=Path, default=Path("bridge.png"), help="File to write [bridge.png].")
 
 
 def _up_to(most: int) -> Callable[[str], int]:
@@ -294,6 +310,28 @@ def _loss(given: argparse.Namespace) -> int:
     columns = list(rows[0])
     table = columns, [[f"{row[name]:.4g}" for name in columns] for row in rows]
     _print({"rows": rows}, given.json, [table])
+    return 0
+
+
+def _motions(given: argparse.Namespace) -> int:
+    from proof.bridge.motions import report, tables
+    from tvist_shaping import BUILT_IN
+    from tvist_shaping.errors import ShapingError
+
+    try:
+        for name in given.shapers:
+            BUILT_IN.check(name)
+    except ShapingError as error:
+        given.refuse(str(error))
+    result = report(given.robots, given.seed, given.shapers, given.random, _tell)
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _figure(given: argparse.Namespace) -> int:
+    from proof.bridge.figure import draw
+
+    draw(given.seed, given.output)
     return 0
 
 

@@ -13,6 +13,8 @@ FIRST = 10.0
 """Time to wait for the first set-point [s]."""
 AWAY = 0.01
 """Largest distance of a joint from the first set-point [rad]."""
+AGAIN = 0.016
+"""Longest time from the arrival of the last set-point in which the next is expected to be on its way again [s]."""
 FADE = 0.05
 """Time constant with which a distance from the set-points fades [s]."""
 MARGIN = 1.05
@@ -48,7 +50,7 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         | {f"state_{one.name.lower()}": int(one) for one in State}
         | {"name": NAME, "run": run, "follow": int(Order.FOLLOW), "speed": float(MARGIN * speed)}
         | {"deceleration": float(deceleration), "lookahead": float(lookahead), "gain": float(gain)}
-        | {"silence": SILENCE, "first": FIRST, "away": AWAY, "fade": FADE}
+        | {"silence": SILENCE, "first": FIRST, "away": AWAY, "fade": FADE, "again": AGAIN}
         | {
             "angles": ", ".join(
                 f"read_input_float_register({at})" for at in ("at", *(f"at + {k}" for k in range(1, JOINTS)))
@@ -102,7 +104,8 @@ def $name():
 
   q = get_target_joint_positions() # where servoj leads the arm
   change = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # of q in the last period
-  extra = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # what of that was not the change of the set-points
+  bend = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # how much more that was than in the period before
+  extra = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # what of the change was not the change of the set-points
   last = setpoint($SETPOINTS + 12) # last set-point that was played
   number = newest - 2 # of the present one, which becomes the last but one, so that the newest may be late by a period
   last_number = number
@@ -158,8 +161,18 @@ def $name():
       end
       blind = read_input_integer_register($NUMBER) != now # the next package has come meanwhile
     end
-    if blind: # the arm goes on as before
+    if blind: # the arm goes on as before, with its acceleration if it is not for long
       way = change
+      if silence <= $again:
+        way = change + bend
+        i = 0
+        while i < 6:
+          if norm(way[i]) > most:
+            way[i] = change[i]
+          end
+          i = i + 1
+        end
+      end
       alone = alone + 1
     else:
       own = new - previous # change of the set-points in this period
@@ -186,6 +199,7 @@ def $name():
       last_number = number
     end
     q = q + way
+    bend = way - change
     change = way
 
     if why == $ended_not:

@@ -1,0 +1,117 @@
+"""Set-points that lead by the servo's lag bring the arm to where the line wants it, and nothing else into it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.controller.robots import Q1, Q3, UR5E
+from tests.examples import examples
+
+from tvist_controller.line.differentiator import central_differences
+from tvist_controller.line.limits import arm_limits
+from tvist_controller.trajectory import JointLine, MotionLimits, Servo, quickest_motion
+from tvist_plant.drives import DriveCommand
+from tvist_plant.plant import PERIOD
+from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
+
+REACH = np.array(UR5E.limits.position)
+FAST = 10.0
+
+
+class AnyTorque:
+    """Torque without limits."""
+
+    allows = staticmethod(lambda *_: True)
+    acceleration = staticmethod(lambda *_: np.inf)
+
+
+def commands():
+    """What the drives get in a motion from Q1 to Q3, and while the arm rests before and after it."""
+    motion, q = quickest_motion(JointLine(Q1, Q3), MotionLimits(1.5, 2.0, 100.0), PERIOD), [Q1] * 5
+    while not motion.finished:
+        q.append(motion.next())
+    q, qd, _ = central_differences(np.array([*q, *[q[-1]] * 300]), PERIOD)
+    return [DriveCommand(*both, np.zeros(6)) for both in zip(q, qd, strict=True)]
+
+
+def errors(lag, lookahead=LOOKAHEAD, gain=GAIN):
+    """Distance of the arm from where it is wanted at each tick [rad]."""
+    motion = commands()
+    start = motion[0].q
+    servo = Servo((start, 0.0 * start, 0.0 * start), arm_limits(UR5E), REACH, AnyTorque(), PERIOD)
+    setpoints, apart = Setpoints(start, lag, fastest=FAST, reach=REACH), []
+    for command in motion:
+        servo.aim(setpoints.next(command), lookahead, gain)
+        apart.append(np.abs(servo.next() - command.q).max())
+    assert setpoints.limited == 0
+    return np.array(apart)
+
+
+@pytest.mark.parametrize(
+    ("lookahead", "gain"), [(0.03, 2000), (0.03, 100), (0.05, 1000), (0.1, 300), (0.2, 100)]
+)
+def test_the_arm_is_where_the_line_wants_it_whatever_the_servo(lookahead, gain):
+    late = errors(None, lookahead, gain)
+    led = errors(ServoLag.simulated(lookahead, gain), lookahead, gain)
+    assert late.max() > 1.4 * lookahead
+    assert led.max() < 1e-5
+    assert led[-1] == 0.0
+
+
+@pytest.mark.parametrize("off", [-0.1, 0.1])
+def test_a_lag_that_is_wrong_by_a_tenth_leaves_a_tenth_of_it_and_the_arm_ends_where_it_should(off):
+    true = ServoLag.simulated()
+    wrong = errors(ServoLag((1.0 + off) * true.time, (1.0 + off) * true.gain))
+    assert 0.05 < wrong.max() / errors(None).max() < 0.15
+    assert wrong[-1] == 0.0
+
+
+@given(st.lists(st.floats(-6.0, 6.0), min_size=6, max_size=6))
+@examples(50)
+def test_at_rest_a_set_point_is_the_position_to_the_last_bit(angles):
+    q = np.array(angles)
+    setpoints = Setpoints(q, ServoLag.simulated(), fastest=FAST, reach=REACH)
+    assert (setpoints.next(DriveCommand(q, np.zeros(6), np.zeros(6))) == q).all()
+
+
+def test_rounding_of_positions_grows_by_less_than_ten_thousand():
+    random, q = np.random.default_rng(0), np.full(6, 3.0)
+    setpoints = Setpoints(q, ServoLag.simulated(), fastest=FAST, reach=REACH)
+    noise = 1e-15 * random.standard_normal((200, 6))
+    for before, now, after in zip(noise, noise[1:], noise[2:], strict=False):
+        command = DriveCommand(q + now, (after - before) / (2 * PERIOD), np.zeros(6))
+        assert np.abs(setpoints.next(command) - q).max() < 1e-11
+
+
+@given(st.integers(0, 2**31), st.floats(0.1, 4.0))
+@examples(50)
+def test_no_set_point_is_beyond_the_range_or_steps_further_than_permitted_and_rest_is_reached(seed, fastest):
+    random = np.random.default_rng(seed)
+    q = random.uniform(-6.0, 6.0, 6)
+    setpoints, sent = Setpoints(q, ServoLag.simulated(), fastest=fastest, reach=REACH), [q]
+    for _ in range(100):
+        velocity = random.uniform(-30.0, 30.0, 6)
+        q = np.clip(q + PERIOD * velocity, -REACH, REACH)
+        sent.append(setpoints.next(DriveCommand(q, velocity, np.zeros(6))))
+    assert setpoints.limited > 0
+    most, rest = int(4.0 * np.pi / (fastest * PERIOD)) + 2, DriveCommand(q, np.zeros(6), np.zeros(6))
+    sent += [setpoints.next(rest) for _ in range(most)]
+    table = np.array(sent)
+    assert np.abs(np.diff(table, axis=0)).max() <= fastest * PERIOD * (1.0 + 1e-9)
+    assert (np.abs(table) <= REACH).all()
+    assert (table[-1] == q).all()
+
+
+def test_a_motion_at_the_end_of_a_joint_s_range_sends_nothing_beyond_it():
+    """Where the arm brakes hard, what leads it would otherwise go beyond its end for a moment."""
+    end = REACH.copy()
+    motion = quickest_motion(JointLine(end - 0.5, end), MotionLimits(3.0, 20.0, 2000.0), PERIOD)
+    q = [end - 0.5] * 2
+    while not motion.finished:
+        q.append(motion.next())
+    q, qd, _ = central_differences(np.array([*q, *[end] * 50]), PERIOD)
+    setpoints = Setpoints(q[0], ServoLag.simulated(), fastest=FAST, reach=REACH)
+    sent = np.array([setpoints.next(DriveCommand(*both, np.zeros(6))) for both in zip(q, qd, strict=True)])
+    assert sent.max() <= REACH.max()
+    assert setpoints.limited > 0
+    assert (sent[-1] == end).all()
