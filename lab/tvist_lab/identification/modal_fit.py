@@ -66,7 +66,10 @@ class _Signal:
         self.mass, self.force = arm.mass(ringing.q, ringing.payload), ringing.force
         self.noise = float(np.hypot(ringing.noise, ringing.inexact))
         self.time = PERIOD * np.arange(len(self.force)) if ringing.time is None else ringing.time
-        self._always = np.column_stack([np.exp(-SLOW_POLE * self.time), np.ones(len(self.force))])
+        still = np.exp(np.outer(self.time, np.array(ringing.driven, dtype=complex)))
+        self._always = np.column_stack(
+            [np.exp(-SLOW_POLE * self.time), np.ones(len(self.force)), still.real, still.imag]
+        )
 
     def left(self, poles: Complex) -> Floats:
         """Residual of the signal for some poles, divided by its noise, flattened."""
