@@ -1,1 +1,1 @@
-"""What a robot at the end of the line does that takes positions only."""
+"""A robot controller of ours in front of a hidden robot, with a link between them that delays, jitters and loses."""
