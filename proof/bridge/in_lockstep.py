@@ -98,6 +98,13 @@ class HiddenRobot:
         """Send a command of the client in control."""
         return self.controller.receive(kind(token=self._token, **fields))
 
+    def follow(self, speed: float, lookahead: float = LOOKAHEAD, gain: float = GAIN) -> None:
+        """Run the program that follows set-points, up to a speed [rad/s]; arguments of `servoj`."""
+        deceleration = min(self.controller.cycle.description.limits.acceleration)
+        text = program(1, speed=speed, deceleration=deceleration, lookahead=lookahead, gain=gain)
+        reply = self.send(ProgramRun, text=text)
+        assert not isinstance(reply, Refused), reply
+
     def tick(self) -> State:
         """Advance by a control period."""
         state, events = self.controller.tick()
@@ -146,7 +153,9 @@ class Port:
         """Return where the robot's target is."""
         state = self.robot.controller.latest
         found = measured(state)
-        return Measurement(np.array(state.target_q), np.zeros_like(found.q), found.moment, found.accelerometer)
+        return Measurement(
+            np.array(state.target_q), np.zeros_like(found.q), found.moment, found.accelerometer
+        )
 
     def step(self, command: DriveCommand) -> Measurement:
         """Send the set-point, and let the robot tick; return its row with which this tick began."""
@@ -159,9 +168,7 @@ class Port:
             self._measured = self._rows.popleft()[1]
         self.commands.append(command.q)
         self._window.add(self.setpoints.next(command).tolist())
-        self._packages.append(
-            (self._there.arrival(begun + COMPUTING), self._window.values(r.Order.FOLLOW))
-        )
+        self._packages.append((self._there.arrival(begun + COMPUTING), self._window.values(r.Order.FOLLOW)))
         counts.ticks += 1
         self._deliver(now + TICK)
         before = robot.controller.latest.target_q
@@ -185,9 +192,7 @@ class Port:
         number, order, *angles = values
         doubles = Registers(bank="input_double", first=r.SETPOINTS, values=tuple(angles))
         self.robot.controller.receive(
-            SetRegisters(
-                bank="input_int", first=r.NUMBER, values=(int(number), int(order)), also=(doubles,)
-            )
+            SetRegisters(bank="input_int", first=r.NUMBER, values=(int(number), int(order)), also=(doubles,))
         )
 
 
@@ -220,18 +225,16 @@ class Bridge:
     ) -> None:
         self.robot = HiddenRobot(description, seed, q, payload)
         speed = min(description.limits.velocity)
-        text = program(
-            1, speed=speed, deceleration=min(description.limits.acceleration), lookahead=lookahead, gain=gain
-        )
-        reply = self.robot.send(ProgramRun, text=text)
-        assert not isinstance(reply, Refused), reply
+        self.robot.follow(speed, lookahead, gain)
         known = ServoLag.simulated(lookahead, gain) if isinstance(lag, str) else lag
         reach = np.array(description.limits.position)
         setpoints = Setpoints(q, known, fastest=(MARGIN - 0.01) * speed, reach=reach)
         self.port = Port(self.robot, setpoints, link, seed)
         # The robot's own controller lets motors lead by the gears' wind-up: ours must not do so, too.
         leads = (0.0,) * description.joints
-        plain = structs.replace(description, drives=structs.replace(description.drives, windup_feedforward=leads))
+        plain = structs.replace(
+            description, drives=structs.replace(description.drives, windup_feedforward=leads)
+        )
         self.controller = Controller(setup_of(plain, q, payload, shaper, truth=False), self.port)
         self._token = control(self.controller)
         self.events: list[Event] = []

@@ -77,6 +77,8 @@ class Ringing:
     """What a linear model may leave of it beside the noise, rms per axis [m/s^2]."""
     driven: tuple[complex, ...] = ()
     """Poles with which the set-point still comes to rest, one of each pair [1/s]; empty if it rests."""
+    softening: float = 0.0
+    """Share by which the gears' hysteresis softens the springs, over the tool's amplitude [1/m]."""
 
     @property
     def rms(self) -> float:
