@@ -77,7 +77,8 @@ class _Signal:
     def __init__(self, arm: ArmModes, ringing: Ringing) -> None:
         self.mass, self.force = arm.mass(ringing.q, ringing.payload), ringing.force
         self.noise = float(np.hypot(ringing.noise, ringing.inexact))
-        self.time: Floats = np.arange(len(self.force)) * PERIOD if ringing.time is None else ringing.time
+        every = np.asarray(PERIOD * np.arange(len(self.force)))
+        self.time: Floats = every if ringing.time is None else ringing.time
         self._lost = np.zeros(len(self.force))
         if ringing.softening:
             self._lost = ringing.softening * cumulative_trapezoid(

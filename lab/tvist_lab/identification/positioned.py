@@ -33,7 +33,7 @@ from tvist_plant.plant import PERIOD
 CANDIDATES = 60
 """Number of configurations to choose from."""
 JOG = Jog(length=0.04, quickness=1.5)
-"""The move that excites the arm: quicker than where no servo smooths it, so that it rings as after a program's motion."""
+"""The quickest jog: quicker than where no servo smooths it, so that the arm rings as after a program's motion."""
 TURN = 0.1
 """Angle by which the last joint turns there and back to show the lag [rad]."""
 GENTLE = 1.0
@@ -221,8 +221,7 @@ def told(
     if len(ringings) < LEAST:
         reasons = "; ".join(sorted({stop.reason for stop in stops if stop.ringing is None}))
         raise IdentificationError(
-            f"{len(ringings)} of {len(stops)} ring-downs can be used, at least {LEAST} are needed: {reasons}. A higher "
-            "--speed-cap lets the arm ring louder"
+            f"{len(ringings)} of {len(stops)} ring-downs can be used, at least {LEAST} are needed: {reasons}"
         )
     progress("comparing ring-downs")
     stops, ringings = _softened(arm, stops)
