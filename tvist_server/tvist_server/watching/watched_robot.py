@@ -16,10 +16,10 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, Measurement, PlantError, Sight
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.rtde.client import Row, RtdeClient
-from tvist_server.watching.connection import Connection, LostError, resolved
+from tvist_server.watching.connection import Connection, LostError, UnreachableError, resolved
 from tvist_server.watching.place import Place
 from tvist_server.watching.row_count import RowCount
-from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, is_finite, sight_of
+from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, has_real_payload, is_finite, sight_of
 
 LOOKED_AT = 25
 """Number of rows from which the time between two is found."""
@@ -114,7 +114,7 @@ class WatchedRobot:
             for row in self._rows(timeout):
                 self._take(row)
         except LostError as error:
-            self._lose(str(error))
+            self._lose(error)
         return bool(self._sights)
 
     def close(self) -> None:
@@ -156,6 +156,11 @@ class WatchedRobot:
         if self._interval > 1:
             self._notes.append(
                 "125 rows a second show vibration up to 62.5 Hz: take what is above that from a sensor of your own"
+            )
+        if not has_real_payload(rows[-1]):
+            told = list(rows[-1]["payload_inertia"])
+            self._notes.append(
+                f"no body has the payload inertia {told} that it was told: it counts as 0; correct it at the robot"
             )
         if lacking:
             self._notes.append(f"its software does not tell {', '.join(lacking)}")
@@ -229,13 +234,16 @@ class WatchedRobot:
         self.payload = sight.payload or self.payload
         return sight
 
-    def _lose(self, why: str) -> None:
-        """Give up the connection, and say so in a tick of its own; once for each reason."""
+    def _lose(self, error: LostError) -> None:
+        """Give up the connection, and say so in a tick of its own; once for each reason.
+
+        That nobody answers there is news only if it is the first.
+        """
         self.close()
-        now = time.monotonic()
+        now, why = time.monotonic(), str(error)
         self._retry_at = now + RETRY
         since, before = self._lost
-        if why == before:
+        if why == before or (before and isinstance(error, UnreachableError)):
             return
         self._lost = (since if before else now), why
         latest = self._sights[-1] if self._sights else self._last
