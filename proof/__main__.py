@@ -36,8 +36,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m proof", description=__doc__)
     parts = parser.add_subparsers(required=True, metavar="PART")
 
-    def part(run: Callable[[argparse.Namespace], int], name: str, what: str) -> argparse.ArgumentParser:
-        one = parts.add_parser(name, help=what, description=what)
+    def part(
+        run: Callable[[argparse.Namespace], int], name: str, what: str, among: Any = parts
+    ) -> argparse.ArgumentParser:
+        one: argparse.ArgumentParser = among.add_parser(name, help=what, description=what)
         one.set_defaults(run=run, refuse=one.error)
         one.add_argument("--json", action="store_true", help="Print one JSON object.")
         return one
@@ -124,7 +126,27 @@ def _parser() -> argparse.ArgumentParser:
         "--robots", type=_up_to(1000), default=5, help="Hidden robots of each of two arms [5]."
     )
     advice.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one.")
+    _add_bridge(parts, part)
     return parser
+
+
+def _add_bridge(parts: Any, part: Callable[..., argparse.ArgumentParser]) -> None:
+    """Add the parts about a robot at the end of the line."""
+    bridge = parts.add_parser("bridge", help="Measure what stands between programs and a hidden robot.")
+    among = bridge.add_subparsers(required=True, metavar="PART")
+    identify = part(
+        _identify, "identify", "Identify hidden robots that take positions alone, and judge it.", among
+    )
+    identify.add_argument("--robots", type=_up_to(1000), default=3, help="Number of hidden robots [3].")
+    identify.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one [0].")
+    identify.add_argument(
+        "--rates",
+        nargs="+",
+        type=int,
+        choices=(500, 125),
+        default=[500, 125],
+        help="Rows a second [500 125].",
+    )
 
 
 def _up_to(most: int) -> Callable[[str], int]:
@@ -247,6 +269,14 @@ def _advice(given: argparse.Namespace) -> int:
     from proof.advice.hidden import report, tables
 
     result = report(given.robots, given.seed, _tell)
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _identify(given: argparse.Namespace) -> int:
+    from proof.bridge.identify import report, tables
+
+    result = report(max(given.robots, 1), given.seed, [500 // rate for rate in given.rates], _tell)
     _print(result, given.json, tables(result))
     return 0
 

@@ -12,7 +12,8 @@ from tvist_cli.output import err, say, table, typed
 if TYPE_CHECKING:
     from tvist_client.arm import Arm
     from tvist_client.robot import Robot
-    from tvist_lab.identification.positioned import MovePlan, Positioned
+    from tvist_lab.identification.modal_plan import ModalPlan
+    from tvist_lab.identification.positioned import Moved, MovePlan
     from tvist_plant.description import RobotDescription
 
 READY = 30.0
@@ -45,6 +46,8 @@ def identify_robot(
         json: Whether to print one JSON object.
     """
     from tvist_lab.identification.fit import FitError
+    from tvist_lab.identification.modal_plan import ModalPlan
+    from tvist_lab.identification.positioned import JOG, identify_moved
     from tvist_lab.served import ServedError, served_robot
     from tvist_plant.description import DescriptionError, load
     from tvist_protocol.calibration import calibration_to_json
@@ -73,13 +76,16 @@ def identify_robot(
     options += [] if mass is None else ["--payload", f"{mass:g}"]
     picture = output.with_suffix(".moves.png")
 
-    async def whole() -> "Positioned":
+    async def moves() -> "tuple[MovePlan, Moved]":
         say(f"starting the server that moves the robot at {place}")
         async with served_robot(options, arm.robot.name) as (client, _):
-            return await _identify(client, arm, (ring_downs, seed), picture, name, sure=sure)
+            return await _moves(
+                client, arm, ModalPlan(ring_downs=ring_downs, seed=seed, jog=JOG), picture, sure=sure
+            )
 
     with told(FitError, ServedError, OSError):
-        done = asyncio.run(whole())
+        plan, moved = asyncio.run(moves())
+        done = identify_moved(plan, moved, name=name, command=typed()[:500], progress=say)
         output.write_bytes(calibration_to_json(done.found.calibration))
     servo = done.servo
     more = {
@@ -103,44 +109,41 @@ def identify_robot(
         )
 
 
-async def _identify(
-    client: "Robot",
-    arm: "RobotDescription",
-    wanted: tuple[int, int],
-    picture: Path,
-    name: str,
-    *,
-    sure: bool,
-) -> "Positioned":
-    """Plan, show, ask and measure as a client."""
+async def _moves(
+    client: "Robot", arm: "RobotDescription", wanted: "ModalPlan", picture: Path, *, sure: bool
+) -> "tuple[MovePlan, Moved]":
+    """Plan, show, ask and move as a client."""
     from tvist_lab.figures import move_plan_figure, save
-    from tvist_lab.identification.modal_plan import ModalPlan
-    from tvist_lab.identification.positioned import JOG, identify_positioned, plan_moves
+    from tvist_lab.identification.positioned import make_moves, plan_moves
 
+    say("planning the moves")
+    plan = await plan_moves(client, arm, wanted)
+    save(move_plan_figure(plan), picture)
+    _show(plan, picture)
+    if not sure and not await asyncio.to_thread(_agreed):
+        raise Failure("nothing was moved")
     async with client.control("identify") as control:
         await _ready(client, control)
-        say("planning the moves")
-        plan = await plan_moves(client, arm, ModalPlan(ring_downs=wanted[0], seed=wanted[1], jog=JOG))
-        save(move_plan_figure(plan), picture)
-        _show(plan, picture)
-        if not sure and not await asyncio.to_thread(_agreed):
-            raise Failure("nothing was moved")
-        return await identify_positioned(
-            client, control, plan, name=name, command=typed()[:500], progress=say
-        )
+        return plan, await make_moves(client, control, plan, say)
 
 
 async def _ready(client: "Robot", control: "Arm") -> None:
-    """Wait until the program on the robot follows."""
+    """Wait until the program on the robot follows, which shows by a move to where the arm stands."""
+    from tvist_protocol.errors import RefusedError
     from tvist_protocol.modes import RobotMode
 
     say("starting the program on the robot")
-    if (await client.state()).robot_mode != RobotMode.RUNNING:
-        await control.power_on()
     deadline = asyncio.get_running_loop().time() + READY
-    while (await client.state()).robot_mode != RobotMode.RUNNING:
-        if asyncio.get_running_loop().time() > deadline:
-            raise Failure(f"the robot does not follow within {READY:g} s: look at its teach pendant")
+    while True:
+        state = await client.state()
+        try:
+            if state.robot_mode == RobotMode.RUNNING:
+                await control.move_j(state.target_q)
+                return
+            await control.power_on()
+        except RefusedError as error:
+            if asyncio.get_running_loop().time() > deadline:
+                raise Failure(f"the robot does not follow within {READY:g} s: {error}") from error
         await client.advance(50)
 
 

@@ -12,7 +12,7 @@ from proof.bridge.in_lockstep import HiddenRobot, Link, Port
 from tvist_controller.api.line import body, modal_estimator
 from tvist_controller.api.robot import OwnPlant
 from tvist_lab.identification.modal_plan import ModalPlan
-from tvist_lab.identification.positioned import JOG, Positioned, identify_positioned, plan_moves
+from tvist_lab.identification.positioned import JOG, Positioned, identify_moved, make_moves, plan_moves
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import identified, ranges
@@ -141,9 +141,10 @@ async def identified_in_lockstep(description: RobotDescription, hidden: int, eve
     async with robot_in_process(whole) as robot, robot.control("identify") as control:
         await robot.advance(BEGINS)
         moves = await plan_moves(robot, description, ModalPlan(seed=hidden, jog=JOG))
-        return await identify_positioned(
-            robot, control, moves, name="found", command="proof bridge identify", progress=lambda _: None
-        )
+        moved = await make_moves(robot, control, moves, lambda _: None)
+    return identify_moved(
+        moves, moved, name="found", command="proof bridge identify", progress=lambda _: None
+    )
 
 
 def unseen(

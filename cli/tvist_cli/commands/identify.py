@@ -107,13 +107,7 @@ def identify(
     """
     if min(configurations, repeats, ring_downs, poses) < 1:
         raise Failure("configurations, repeats, ring-downs and poses must be at least 1", code=2)
-    if model == "polynomial" and payloads is not None:
-        raise Failure("payloads is for the modal model: give --model modal too, or leave it out", code=2)
-    if model == "modal" and (at or figures is not None):
-        which = "at" if at else "figures"
-        raise Failure(
-            f"{which} is for the polynomial model: leave it out, or give --model polynomial", code=2
-        )
+    _check_model(model, payloads, at, figures)
     look.check(figures)
     if not output.absolute().parent.is_dir():  # said before half an hour of jogs
         raise Failure(f"output is {output}: its folder does not exist", code=2)
@@ -148,6 +142,16 @@ def identify(
     else:
         anchors = place.anchors(at)
         _polynomial(place, arm, anchors, configurations, repeats, output, called, figures, look, json=json)
+
+
+def _check_model(model: str, payloads: str | None, at: list[str] | None, figures: Path | None) -> None:
+    if model == "polynomial" and payloads is not None:
+        raise Failure("payloads is for the modal model: give --model modal too, or leave it out", code=2)
+    if model == "modal" and (at or figures is not None):
+        which = "at" if at else "figures"
+        raise Failure(
+            f"{which} is for the polynomial model: leave it out, or give --model polynomial", code=2
+        )
 
 
 def _at_robot(

@@ -4,6 +4,7 @@ Such a robot follows with a servo's lag, so that its set-points still come to re
 found first, from a turn of the last joint, which hardly bends. The ring-downs then hold that motion with known poles.
 """
 
+import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
@@ -29,29 +30,30 @@ from tvist_lab.metrics import motions
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
+from tvist_protocol.info import Info
 
 CANDIDATES = 60
 """Number of configurations to choose from."""
-JOG = Jog(length=0.04, quickness=1.5)
+JOG = Jog(length=0.06, quickness=1.75)
 """The quickest jog: quicker than where no servo smooths it, so that the arm rings as after a program's motion."""
 TURN = 0.1
 """Angle by which the last joint turns there and back to show the lag [rad]."""
+TURNS = 2
+"""How often it does so."""
 GENTLE = 1.0
 """Acceleration of the ways [rad/s²]."""
 AFTER = 0.6
 """Time recorded after a move [s]."""
-FIRST = 0.7
+FIRST = 0.55
 """Quickness of the first jog over that of `JOG`, since nobody knows how loud the arm rings [-]."""
-GENTLEST = 0.5
+GENTLEST = 0.4
 """Smallest quickness of a jog over that of `JOG` [-]."""
 LOUD, LATER = 0.15, 0.1
 """Rms of the acceleration per axis to aim at, as after a program's motion [m/s^2], so much later than the stop [s]."""
-INEXACT = 0.05
+INEXACT = 0.03
 """Share of a ring-down that no model explains [-]."""
-SKIPPED = 0.01
-"""Time after the stop, on top of the delay, that a ring-down leaves out [s]."""
 UNKNOWN = 0.15
-"""The same where the lag is not known [s]."""
+"""Time after the stop that a ring-down leaves out where the lag is not known [s]."""
 LISTENED = 0.4
 """Length of a ring-down [s]."""
 
@@ -123,7 +125,11 @@ async def plan_moves(robot: Robot, description: RobotDescription, plan: ModalPla
         raise IdentificationError(
             f"the robot is a {info.model}, its description of a {description.robot.model}: name its file"
         )
-    speed, at = min(info.limits.velocity), np.array(state.target_q)
+    return await asyncio.to_thread(_planned, description, info, np.array(state.target_q), plan)
+
+
+def _planned(description: RobotDescription, info: Info, at: Floats, plan: ModalPlan) -> MovePlan:
+    speed = min(info.limits.velocity)
     arm = ArmModes(description, (info.payload,), unknowns_near(description))
     candidates = free_configurations(description, arm.payloads, CANDIDATES, plan, at)
     turned = at + TURN * np.eye(len(at))[-1] * (-1.0 if at[-1] > 0.0 else 1.0)
@@ -142,30 +148,36 @@ async def plan_moves(robot: Robot, description: RobotDescription, plan: ModalPla
     return MovePlan(arm, at, turned, slower, ways, plan.seed)
 
 
-async def identify_positioned(
-    robot: Robot, control: Arm, plan: MovePlan, *, name: str, command: str, progress: Callable[[str], None]
-) -> Positioned:
-    """Make the moves, and fit servo, springs and drives.
+@dataclass(frozen=True)
+class Moved:
+    """What was recorded of the moves."""
+
+    info: Info
+    """The robot in front."""
+    jogs: tuple[Recording, ...]
+    """One for each jog."""
+    servo: ServoResponse | None
+    """The lag with which the robot follows; None if it follows in another way."""
+    seconds: float
+    """Time of the robot that it took [s]."""
+
+
+async def make_moves(robot: Robot, control: Arm, plan: MovePlan, progress: Callable[[str], None]) -> Moved:
+    """Make the moves, each as gentle as makes the arm ring loudly enough.
 
     Args:
         robot: The robot in front.
         control: The arm under control.
         plan: The moves.
-        name: Name of the calibration.
-        command: Command line that the user typed.
         progress: Called before each step with what it does.
-
-    Raises:
-        IdentificationError: Too few ring-downs can be used, or they contradict each other.
     """
     info, began = await robot.info(), (await robot.state()).tick
     await control.set_shaper("none")
     quick = plan.jogs[0].limits
-    turns = []
-    for q in (plan.turned, plan.at, plan.turned, plan.at):
-        progress("turning the last joint")
-        turns.append(await _recorded(robot, control, q, quick))
-    servo, jogs, share = servo_response(turns), [], FIRST
+    progress("turning the last joint")
+    ways = (plan.turned, plan.at) * TURNS
+    turns = [await _recorded(robot, control, q, quick) for q in ways]
+    servo, jogs, share = servo_response(turns), list[Recording](), FIRST
     for number, jog in enumerate(plan.jogs, 1):
         progress(f"ring-down {number} of {len(plan.jogs)}")
         for posture in jog.way:
@@ -174,13 +186,30 @@ async def identify_positioned(
         heard = _stop(number, jogs[-1], servo).ringing
         loud = 0.0 if heard is None else _rms_after(heard, LATER)
         share = float(np.clip(share * np.sqrt(LOUD / max(loud, 1e-3)), GENTLEST, 1.0))
-    took = PERIOD * ((await robot.state()).tick - began)
-    origin = Origin(name, command, info.model, plan.seed, info.arm)
-    found = told(plan.arm, jogs, servo, origin, progress)
+    return Moved(info, tuple(jogs), servo, PERIOD * ((await robot.state()).tick - began))
+
+
+def identify_moved(
+    plan: MovePlan, moved: Moved, *, name: str, command: str, progress: Callable[[str], None]
+) -> Positioned:
+    """Fit springs and drives to what was recorded.
+
+    Args:
+        plan: The moves.
+        moved: What was recorded of them.
+        name: Name of the calibration.
+        command: Command line that the user typed.
+        progress: Called before each step with what it does.
+
+    Raises:
+        IdentificationError: Too few ring-downs can be used, or they contradict each other.
+    """
+    origin, servo = Origin(name, command, moved.info.model, plan.seed, moved.info.arm), moved.servo
+    found = told(plan.arm, moved.jogs, servo, origin, progress)
     if servo is not None:
         calibration = with_fields(found.calibration, servo_lag_s=servo.lag, servo_gain=servo.gain)
         found = replace(found, calibration=calibration)
-    return Positioned(found, servo, took)
+    return Positioned(found, servo, moved.seconds)
 
 
 def _slower(limits: MotionLimits, share: float) -> MotionLimits:
@@ -251,8 +280,7 @@ def _softened(arm: ArmModes, stops: Sequence[Stop]) -> tuple[list[Stop], list[Ri
 def _stop(number: int, jog: Recording, servo: ServoResponse | None) -> Stop:
     """Return the ring-down after a jog."""
     name, motion = "the robot", motions(jog)[-1]
-    delay, skipped = (0.0, UNKNOWN) if servo is None else (servo.delay, SKIPPED)
-    begin = jog.time[motion.shaped_stop] + delay + skipped
+    begin = jog.time[motion.shaped_stop] + (UNKNOWN if servo is None else servo.delay)
     seen = fresh(jog)
     rows = seen[(jog.time[seen] >= begin) & (jog.time[seen] < begin + LISTENED)]
     if len(rows) < 2 or jog.time[rows[-1]] - jog.time[rows[0]] < 0.5 * LISTENED:
