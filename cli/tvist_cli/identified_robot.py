@@ -123,11 +123,11 @@ async def _moves(
     if not sure and not await asyncio.to_thread(_agreed):
         raise Failure("nothing was moved")
     async with client.control("identify") as control:
-        await _ready(client, control)
+        await _ready(client, control, plan)
         return plan, await make_moves(client, control, plan, say)
 
 
-async def _ready(client: "Robot", control: "Arm") -> None:
+async def _ready(client: "Robot", control: "Arm", plan: "MovePlan") -> None:
     """Wait until the program on the robot follows, which shows by a move to where the arm stands."""
     from tvist_protocol.errors import RefusedError
     from tvist_protocol.modes import RobotMode
@@ -138,12 +138,12 @@ async def _ready(client: "Robot", control: "Arm") -> None:
         state = await client.state()
         try:
             if state.robot_mode == RobotMode.RUNNING:
-                await control.move_j(state.target_q)
+                await control.move_j(state.target_q, velocity=plan.ways.velocity)
                 return
             await control.power_on()
         except RefusedError as error:
-            if asyncio.get_running_loop().time() > deadline:
-                raise Failure(f"the robot does not follow within {READY:g} s: {error}") from error
+            if error.reply.code != "wrong_mode" or asyncio.get_running_loop().time() > deadline:
+                raise Failure(f"the robot does not follow: {error}") from error
         await client.advance(50)
 
 
