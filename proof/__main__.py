@@ -164,6 +164,19 @@ def _add_bridge(parts: Any, part: Callable[..., argparse.ArgumentParser]) -> Non
     figure = part(_figure, "figure", "Draw the end of a motion that is shaped in front of a robot.", among)
     figure.add_argument("--seed", type=_up_to(2**31 - 1), default=1, help="Seed of the robot [1].")
     figure.add_argument("--output", type=Path, default=Path("bridge.png"), help="File to write [bridge.png].")
+    identify = part(
+        _identify, "identify", "Identify hidden robots that take positions alone, and judge it.", among
+    )
+    identify.add_argument("--robots", type=_up_to(1000), default=3, help="Number of hidden robots [3].")
+    identify.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one [0].")
+    identify.add_argument(
+        "--rates",
+        nargs="+",
+        type=int,
+        choices=(500, 125),
+        default=[500, 125],
+        help="Rows a second [500 125].",
+    )
 
 
 def _up_to(most: int) -> Callable[[str], int]:
@@ -324,6 +337,14 @@ def _motions(given: argparse.Namespace) -> int:
     except ShapingError as error:
         given.refuse(str(error))
     result = report(given.robots, given.seed, given.shapers, given.random, _tell)
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _identify(given: argparse.Namespace) -> int:
+    from proof.bridge.identify import report, tables
+
+    result = report(max(given.robots, 1), given.seed, [500 // rate for rate in given.rates], _tell)
     _print(result, given.json, tables(result))
     return 0
 

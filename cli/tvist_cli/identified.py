@@ -1,16 +1,17 @@
 """Print the results of `tvist identify` as tables or as JSON."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tvist_cli.output import out, print_json, table
 
 if TYPE_CHECKING:
-    from tvist_lab.identification.from_logs import FromLogs, Proposal
+    from tvist_lab.identification.from_logs import FromLogs
     from tvist_lab.identification.identify import Identification
     from tvist_lab.identification.modal import ModalIdentification
     from tvist_lab.identification.payload import PayloadFound
+    from tvist_lab.identification.proposals import Proposal
     from tvist_lab.recordings import Floats
     from tvist_protocol.calibration import ModalParameter, Spread
 
@@ -138,8 +139,18 @@ def report_modal(done: "ModalIdentification", output: Path, options: str, *, jso
     out.print(f"written to {output}; use it with: tvist serve --calibration {output}{options}")
 
 
-def report_from_logs(done: "FromLogs", output: Path, options: str, *, json: bool) -> None:
-    """Print what logs tell of springs and drives, and the moves that would tell more; see `report_polynomial`."""
+def report_from_logs(
+    done: "FromLogs", output: Path, options: str, *, json: bool, more: Mapping[str, Any] | None = None
+) -> None:
+    """Print what stops tell of springs and drives, and the moves that would tell more; see `report_polynomial`.
+
+    Args:
+        done: What was found.
+        output: File of the calibration.
+        options: Options of `tvist serve` for the robot that was identified.
+        json: Whether to print one JSON object.
+        more: What else that object contains.
+    """
     model, how = done.calibration.modal, done.calibration.provenance
     if model is None:
         raise TypeError("an identification from logs has a modal model")
@@ -167,6 +178,7 @@ def report_from_logs(done: "FromLogs", output: Path, options: str, *, json: bool
                     {"way": [at.tolist() for at in one.way], "q": one.q.tolist(), "commands": _moves(one)}
                     for one in done.proposals
                 ],
+                **(more or {}),
             }
         )
         return
@@ -181,7 +193,7 @@ def report_from_logs(done: "FromLogs", output: Path, options: str, *, json: bool
     )
     out.print(
         f"f_d of the lowest mode is known within 5 % in {done.known_percent:.0f} % of the workspace. It is known least "
-        f"at {_angles(q)}: {known.f_d[0]:.1f} Hz ± {known.f_d_percent[0]:.0f} %",
+        f"at {angles(q)}: {known.f_d[0]:.1f} Hz ± {known.f_d_percent[0]:.0f} %",
         markup=False,
     )
     out.print(
@@ -199,15 +211,16 @@ def report_from_logs(done: "FromLogs", output: Path, options: str, *, json: bool
 
 def _moves(one: "Proposal") -> list[str]:
     """Commands that make a proposed move: to its start, and the jog."""
-    there = [f"tvist move {_angles(at)} --shaper none" for at in one.way]
+    there = [f"tvist move {angles(at)} --shaper none" for at in one.way]
     limits = one.limits
     jog = (
         f"--velocity {limits.velocity:.4g} --acceleration {limits.acceleration:.4g} --jerk {limits.jerk:.4g}"
     )
-    return [*there, f"tvist move {_angles(one.q)} --shaper none {jog}"]
+    return [*there, f"tvist move {angles(one.q)} --shaper none {jog}"]
 
 
-def _angles(q: "Floats") -> str:
+def angles(q: "Floats") -> str:
+    """Return angles as commands take them."""
     return ",".join(f"{angle:.3f}" for angle in q.tolist())
 
 

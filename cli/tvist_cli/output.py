@@ -121,22 +121,28 @@ def progress(
             raise interrupted(f"{done} of {total} {what} were done; {kept}") from None
 
 
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], on: Console = out) -> None:
     """Print a table with text aligned left and numbers aligned right.
 
     A table wider than the screen is printed in parts, one below the other, each with the first column.
+
+    Args:
+        title: Heading.
+        columns: Headings of the columns.
+        rows: Cells.
+        on: Where to print it.
     """
     from rich.table import Table
 
-    out.print(Text(title, style="bold"))
+    on.print(Text(title, style="bold"))
     for part in _parts(columns, rows):
         drawn = Table(show_edge=False, pad_edge=False)
         for number in part:
             drawn.add_column(columns[number], no_wrap=number == 0, justify="left" if number == 0 else "right")
         for row in rows:
             drawn.add_row(*(row[number] for number in part))
-        out.print(drawn)
-        out.print()
+        on.print(drawn)
+        on.print()
 
 
 def _parts(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[list[int]]:

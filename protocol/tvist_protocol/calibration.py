@@ -153,7 +153,7 @@ class Calibration(_Part, frozen=True, kw_only=True):
     """A calibration: robot, payload, models and origin.
 
     Raises:
-        ValueError: The calibration contains no model.
+        ValueError: The calibration contains no model, or half of a servo's lag.
     """
 
     name: Name
@@ -166,12 +166,18 @@ class Calibration(_Part, frozen=True, kw_only=True):
     """The lowest mode with that payload, for the estimator `polynomial`."""
     modal: ModalModel | None = None
     """Any mode with any payload, for the estimator `modal`."""
+    servo_lag_s: Annotated[float, Meta(gt=0, le=1)] | None = None
+    """T of a robot that follows set-points p as q̈ = k (p - q - T q̇), from set-points to angles [s]; null: unknown."""
+    servo_gain: Annotated[float, Meta(gt=0, le=1e6)] | None = None
+    """k of the same [1/s²]; null: unknown."""
     provenance: Provenance
     """Origin of the calibration."""
 
     def __post_init__(self) -> None:
         if self.polynomial is None and self.modal is None:
             raise ValueError("polynomial and modal are both missing")
+        if (self.servo_lag_s is None) != (self.servo_gain is None):
+            raise ValueError("servo_lag_s and servo_gain belong together: give both or none")
 
 
 class CalibrationError(ValueError):

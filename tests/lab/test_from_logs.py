@@ -11,7 +11,7 @@ from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.identification.design import predicted
 from tvist_lab.identification.everyday_stops import CONTRADICTS, Log, stops_of
 from tvist_lab.identification.forecast import Forecast
-from tvist_lab.identification.from_logs import identify_from_logs, propose, usable
+from tvist_lab.identification.from_logs import identify_from_logs, more_moves, usable
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.modal_fit import describe, fit_modal, of_masses
 from tvist_lab.identification.modal_plan import ModalPlan, free_configurations
@@ -119,7 +119,7 @@ def test_intervals_hold_the_true_modes_of_the_arm_that_was_fitted(forecast):
 
 def test_proposals_are_jogs_that_no_body_is_in_the_way_of(forecast):
     known, rings = forecast
-    found = propose(ROBOT, known, rings[-1])
+    found = more_moves(known, rings[-1])
     assert len(found) == 3
     collisions, at = CollisionModel(ROBOT, body(PAYLOADS[1])), rings[-1].q
     for one in found:
@@ -135,7 +135,7 @@ def test_the_proposed_ring_downs_leave_less_of_what_is_uncertain(forecast):
     known, rings = forecast
     arm, more = known.arm, list(rings)
     rng = np.random.default_rng(5)
-    for one in propose(ROBOT, known, rings[-1]):
+    for one in more_moves(known, rings[-1]):
         ring = predicted(arm, one.q, rings[-1].payload, Jog())
         more.append(replace(ring, force=ring.force + rng.normal(0.0, ring.noise, ring.force.shape)))
     before, after = (np.linalg.slogdet(fit_modal(arm, some).covariance)[1] for some in (rings, more))

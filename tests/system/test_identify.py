@@ -121,3 +121,25 @@ def test_a_twin_of_a_recording_can_be_served(day, tmp_path):
 )
 def test_logs_and_robots_are_not_mixed(arguments, named, tmp_path):
     tvist(*arguments, cwd=tmp_path).assert_failed(2, named)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("--plant", "ur://127.0.0.1:1"), "give --yes"),
+        (("--plant", "nowhere", "--yes"), "must be ur://ADDRESS"),
+        (("--plant", "ur://127.0.0.1:1", "--yes", "--from", "x.mcap"), "leave out endpoint"),
+        (("--plant", "ur://127.0.0.1:1", "--yes", "--robot", "none-such"), "none-such"),
+        (("--yes",), "yes is for --plant"),
+    ],
+)
+def test_a_robot_is_not_moved_without_a_word_or_from_elsewhere(arguments, named, tmp_path):
+    tvist("identify", *arguments, cwd=tmp_path).assert_failed(2, named)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_robot_that_is_not_there_is_a_sentence(tmp_path):
+    ended = tvist("identify", "--plant", "ur://127.0.0.1:1", "--yes", cwd=tmp_path)
+    assert ended.code == 1
+    assert "no robot answers at ur://127.0.0.1:1" in ended.err
+    assert list(tmp_path.iterdir()) == []

@@ -33,6 +33,8 @@ Doing = Callable[["Robot", "Arm"], Awaitable[Any]]
 def identify(
     endpoint: str | None = None,
     *,
+    plant: str | None = None,
+    yes: bool = False,
     output: Path = Path("calibration.json"),
     name: str | None = None,
     from_: Annotated[list[Path] | None, Parameter(name="--from")] = None,
@@ -66,10 +68,17 @@ def identify(
     one where they cover the workspace. It says how much of the workspace they tell, and which three moves would tell
     most.
 
+    --plant ur://ADDRESS moves a robot of UR's, which takes positions and tells its angles and the accelerometer of its
+    tool. It starts tvist serve --enable-motion for it, shows a plan of small moves as a table and a picture, and asks
+    before anything moves. Both models are made, the polynomial one only if the moves cover the workspace, and the lag
+    of the robot's servo is in the file, too.
+
     Without an endpoint, a robot is simulated in this process as fast as possible.
 
     Args:
         endpoint: Zenoh endpoint of a served robot.
+        plant: Address of a robot of UR's to move and identify, ur://ADDRESS[:PORT].
+        yes: With --plant: move without asking.
         output: Calibration file to write.
         name: Name of the calibration; default: the name of the file.
         from_: Recording or log of the robot to identify it from without moving it, repeatable.
@@ -98,17 +107,15 @@ def identify(
     """
     if min(configurations, repeats, ring_downs, poses) < 1:
         raise Failure("configurations, repeats, ring-downs and poses must be at least 1", code=2)
-    if model == "polynomial" and payloads is not None:
-        raise Failure("payloads is for the modal model: give --model modal too, or leave it out", code=2)
-    if model == "modal" and (at or figures is not None):
-        which = "at" if at else "figures"
-        raise Failure(
-            f"{which} is for the polynomial model: leave it out, or give --model polynomial", code=2
-        )
+    _check_model(model, payloads, at, figures)
     look.check(figures)
     if not output.absolute().parent.is_dir():  # said before half an hour of jogs
         raise Failure(f"output is {output}: its folder does not exist", code=2)
     endpoint, mass = _endpoint_and_mass(endpoint, payload)
+    if plant is not None or yes:
+        others = endpoint, from_, description, columns
+        _at_robot(plant, robot, mass, ring_downs, seed, output, name, others, sure=yes, json=json)
+        return
     if from_:
         if endpoint is not None or description is not None or (payload is not None and mass is None):
             raise Failure(
@@ -135,6 +142,41 @@ def identify(
     else:
         anchors = place.anchors(at)
         _polynomial(place, arm, anchors, configurations, repeats, output, called, figures, look, json=json)
+
+
+def _check_model(model: str, payloads: str | None, at: list[str] | None, figures: Path | None) -> None:
+    if model == "polynomial" and payloads is not None:
+        raise Failure("payloads is for the modal model: give --model modal too, or leave it out", code=2)
+    if model == "modal" and (at or figures is not None):
+        which = "at" if at else "figures"
+        raise Failure(
+            f"{which} is for the polynomial model: leave it out, or give --model polynomial", code=2
+        )
+
+
+def _at_robot(
+    plant: str | None,
+    robot: str | None,
+    mass: float | None,
+    ring_downs: int,
+    seed: int,
+    output: Path,
+    name: str | None,
+    others: tuple[object, ...],
+    *,
+    sure: bool,
+    json: bool,
+) -> None:
+    if plant is None:
+        raise Failure("yes is for --plant: give that too, or leave it out", code=2)
+    if any(others):
+        raise Failure(
+            "--plant starts its own server: leave out endpoint, --from, --columns and --description", code=2
+        )
+    from tvist_cli.identified_robot import identify_robot
+
+    called = name or output.stem
+    identify_robot(plant, robot or ROBOT, mass, ring_downs, seed, output, called, sure=sure, json=json)
 
 
 class _Place:

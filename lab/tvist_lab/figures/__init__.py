@@ -7,6 +7,7 @@ from tvist_lab.figures.delay_filter import figure_8
 from tvist_lab.figures.discretisation import figure_7
 from tvist_lab.figures.files import FORMATS, FigureFiles, save
 from tvist_lab.figures.flexibility import figure_1
+from tvist_lab.figures.move_plan import move_plan_figure
 from tvist_lab.figures.one_joint import figure_2
 from tvist_lab.figures.paper_metrics import figure_15, figure_16
 from tvist_lab.figures.pareto import pareto_figure, settling_figure
@@ -43,6 +44,7 @@ __all__ = [
     "identified_figure",
     "mean_delay_figure",
     "motion_figure",
+    "move_plan_figure",
     "observed_figure",
     "pareto_figure",
     "path_shaping_figure",

@@ -3,19 +3,17 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from msgspec.structs import replace as with_fields
 
-from tvist_controller.api.line import CollisionModel, MotionLimits, body
-from tvist_lab.identification.design import choose
 from tvist_lab.identification.everyday_stops import CONTRADICTS, Log, Stop, stops_of
 from tvist_lab.identification.fit import FitError, check_count, fit_polynomials
 from tvist_lab.identification.forecast import Forecast, Known
 from tvist_lab.identification.identify import DEGREES, IdentificationError
 from tvist_lab.identification.modal_calibration import Origin, calibrated, contradicting
 from tvist_lab.identification.modal_plan import LEAST, ModalPlan, free_configurations, jog_of
+from tvist_lab.identification.proposals import Proposal, propose
 from tvist_lab.identification.ring_downs import MODES, SHARE, Ringing
 from tvist_lab.identification.unknowns import ArmModes, unknowns_near
 from tvist_lab.metrics import SLOW_POLE, fit_ring_down
@@ -24,7 +22,6 @@ from tvist_lab.workspace import identified, ranges
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.calibration import Calibration
-from tvist_protocol.values import Payload
 
 PLACES = 100
 """Number of configurations of the workspace at which the calibration's accuracy is determined."""
@@ -33,25 +30,10 @@ KNOWN = 5.0
 PROPOSED = 3
 CANDIDATES = 40
 """Number of configurations among which moves are proposed."""
-SPARE = 3
-"""Number of candidates that are ordered for each proposal, since the way to some is not free."""
-STEP = 0.03
-"""Angle of the fastest joint between two postures in which a way is checked [rad]."""
 ROUGH = 10.0
 """A polynomial is kept if it misses at most this in nine of ten stops that it did not see [%]."""
 
 Progress = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """A move that would tell much: a jog to a configuration, after free ways to its start."""
-
-    way: tuple[Floats, ...]
-    """Postures to go to one after the other, the last of which is the jog's start, each of shape (n,) [rad]."""
-    q: Floats
-    """End of the jog, where the arm rings, shape (n,) [rad]."""
-    limits: MotionLimits
 
 
 @dataclass(frozen=True)
@@ -104,13 +86,35 @@ def identify_from_logs(
     """
     check_logs(description, logs)
     stops, arm, ringings, agreeing = usable(description, logs, progress)
-    progress("fitting springs and drives")
     fingerprints = {getattr(log.recording.info, "arm", None) for log in logs}
     origin = Origin(
         name, command, description.robot.model, None, fingerprints.pop() if len(fingerprints) == 1 else None
     )
-    calibration, forecast = calibrated(arm, agreeing, origin, len(stops) - len(agreeing))
-    calibration, no_polynomial = _with_polynomials(calibration, arm, agreeing)
+    return told_by(arm, stops, ringings[-1], agreeing, origin, progress)
+
+
+def told_by(
+    arm: ArmModes,
+    stops: Sequence[Stop],
+    last: Ringing,
+    ringings: Sequence[Ringing],
+    origin: Origin,
+    progress: Progress,
+) -> FromLogs:
+    """Return the calibration that ring-downs tell, how far it goes, and the moves that would tell more.
+
+    Args:
+        arm: The arm with its payloads.
+        stops: All stops.
+        last: The last ring-down: the arm stands there, with its payload.
+        ringings: The ring-downs that do not contradict each other.
+        origin: What the calibration says of its making.
+        progress: Called before each step with what it does.
+    """
+    progress("fitting springs and drives")
+    description = arm.description
+    calibration, forecast = calibrated(arm, ringings, origin, len(stops) - len(ringings))
+    calibration, no_polynomial = _with_polynomials(calibration, arm, ringings)
     progress("looking for moves that would tell more")
     places = identified(ranges(description)).spread(PLACES, description.joints, 1)
     heaviest = max(range(len(arm.payloads)), key=lambda number: arm.payloads[number].mass)
@@ -123,7 +127,7 @@ def identify_from_logs(
         forecast=forecast,
         known_percent=100.0 * float(np.mean(half <= KNOWN)),
         least_known=(places[worst], known[worst]),
-        proposals=propose(description, forecast, ringings[-1]),
+        proposals=more_moves(forecast, last),
         no_polynomial=no_polynomial,
     )
 
@@ -211,41 +215,9 @@ def _with_polynomials(
     return with_fields(calibration, polynomial=fit.model, payload=held, provenance=provenance), ""
 
 
-def propose(description: RobotDescription, forecast: Forecast, last: Ringing) -> tuple[Proposal, ...]:
-    """Choose the jogs that would tell most of springs and drives, with free ways to them from the last stop.
-
-    Args:
-        description: The robot.
-        forecast: What is known of it.
-        last: The last ring-down: the arm stands there, with its payload.
-    """
-    arm, plan = forecast.arm, ModalPlan(jog=jog_of(description))
-    payload: Payload = arm.payloads[last.payload]
-    candidates = free_configurations(description, (payload,), CANDIDATES, plan)
-    counts = [SPARE * PROPOSED if number == last.payload else 0 for number in range(len(arm.payloads))]
-    order = choose(arm, candidates, plan.jog, counts, (forecast.fit.logarithms, forecast.covariance))
-    collisions, jog = CollisionModel(description, body(payload)), plan.jog.of(description.joints)
-    upright = np.zeros(description.joints)
-    upright[[joint for joint in (1, 3) if joint < description.joints]] = -np.pi / 2
-
-    def free(*postures: Floats) -> bool:
-        """Whether the straight ways from posture to posture, in the space of the joints, are clear."""
-        for before, after in pairwise(postures):
-            steps = max(int(np.ceil(np.max(np.abs(after - before)) / STEP)), 1)
-            if any(
-                collisions.meeting(before + (after - before) * k / steps) is not None
-                for k in range(steps + 1)
-            ):
-                return False
-        return True
-
-    found: list[Proposal] = []
-    at = last.q
-    for number, _ in order:
-        q = candidates[number]
-        ways = ((q - jog,), (upright, q - jog))
-        way = next((way for way in ways if free(at, *way, q)), None)
-        if way is not None and len(found) < PROPOSED:
-            found.append(Proposal(way, q, plan.jog.limits))
-            at = q
-    return tuple(found)
+def more_moves(forecast: Forecast, last: Ringing) -> tuple[Proposal, ...]:
+    """Propose jogs that would tell more than is known, from where the last ring-down was listened to."""
+    arm, plan = forecast.arm, ModalPlan(jog=jog_of(forecast.arm.description))
+    candidates = free_configurations(arm.description, (arm.payloads[last.payload],), CANDIDATES, plan)
+    known = forecast.fit.logarithms, forecast.covariance
+    return propose(arm, candidates, plan.jog, (last.q, last.payload), PROPOSED, known)

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from tvist_controller.api.line import CollisionModel, body
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.ring_downs import Jog
@@ -52,15 +54,23 @@ def check(plan: ModalPlan, payloads: int) -> None:
 
 
 def free_configurations(
-    description: RobotDescription, payloads: Sequence[Payload], count: int, plan: ModalPlan
+    description: RobotDescription,
+    payloads: Sequence[Payload],
+    count: int,
+    plan: ModalPlan,
+    like: Floats | None = None,
 ) -> list[Floats]:
-    """Return configurations in which the arm is clear at both ends of the jog, with every payload."""
+    """Return configurations in which the arm is clear at both ends of the jog, with every payload.
+
+    Base and outer wrist joints, on which the modes hardly depend, are as in the configuration `like`, or else zero.
+    """
     joints = description.joints
     models = [CollisionModel(description, body(payload)) for payload in payloads]
     jog = plan.jog.of(joints)
     found: list[Floats] = []
     region = identified(ranges(description), plan.jog.length)
-    for q in region.spread(20 * count, joints, plan.seed):
+    aside = np.zeros(joints) if like is None else like * [joint not in (1, 2, 3) for joint in range(joints)]
+    for q in region.spread(20 * count, joints, plan.seed) + aside:
         if len(found) == count:
             break
         if all(model.meeting(end) is None for model in models for end in (q, q - jog)):

@@ -75,6 +75,10 @@ class Ringing:
     """Times of the samples from the first on, shape (T,) [s]; None for one in each control period."""
     inexact: float = 0.0
     """What a linear model may leave of it beside the noise, rms per axis [m/s^2]."""
+    driven: tuple[complex, ...] = ()
+    """Poles with which the set-point still comes to rest, one of each pair [1/s]; empty if it rests."""
+    softening: float = 0.0
+    """Share by which the gears' hysteresis softens the springs, over the tool's amplitude [1/m]."""
 
     @property
     def rms(self) -> float:

@@ -1,0 +1,104 @@
+"""Moves of a robot that takes positions alone: where they go, and what ring-downs with hysteresis and a servo tell."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tvist_controller.api.line import CollisionModel, body, paper_payload
+from tvist_lab.identification.design import predicted
+from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.modal_fit import RAYLEIGH, describe, fit_modal, softened
+from tvist_lab.identification.modal_plan import ModalPlan, free_configurations
+from tvist_lab.identification.positioned import JOG, plan_moves
+from tvist_lab.identification.ring_downs import Jog
+from tvist_lab.identification.unknowns import ArmModes, unknowns_near
+from tvist_lab.in_process import free_setup, robot_in_process
+from tvist_plant.description import load
+from tvist_plant.plant import PERIOD
+
+ROBOT = load("ur5e")
+STANDS = (0.2, -1.3, 1.4, -1.7, -1.5, 0.1)
+
+
+async def planned(q=STANDS, ring_downs=6, description=ROBOT):
+    setup = replace(free_setup(calibration="none"), q=q)
+    async with robot_in_process(setup) as robot:
+        return await plan_moves(robot, description, ModalPlan(ring_downs, seed=3, jog=JOG))
+
+
+async def test_every_way_is_clear_and_leaves_base_and_outer_wrist_as_they_are():
+    plan = await planned()
+    collisions, at = CollisionModel(ROBOT, body(plan.arm.payloads[0])), plan.at
+    assert len(plan.jogs) == 6
+    assert plan.seconds < 150.0
+    for jog in plan.jogs:
+        for after in (*jog.way, jog.q):
+            between = (at + share * (after - at) for share in np.linspace(0.0, 1.0, 200))
+            assert all(collisions.meeting(q) is None for q in between)
+            assert after[4:] == pytest.approx(STANDS[4:])
+            at = after
+        assert jog.q - jog.way[-1] == pytest.approx(JOG.of(6))
+
+
+async def test_no_joint_is_faster_than_the_robot_in_front_allows():
+    plan = await planned()
+    assert plan.ways.velocity <= min(ROBOT.limits.velocity)
+    assert plan.speed <= min(ROBOT.limits.velocity)
+
+
+async def test_too_few_ring_downs_and_the_file_of_another_robot_are_refused():
+    with pytest.raises(IdentificationError, match="at least 4 are needed"):
+        await planned(ring_downs=3)
+    with pytest.raises(IdentificationError, match="is a UR5e"):
+        await planned(description=load("ur10e"))
+
+
+def rings(driven=(), softening=0.0):
+    """Ring-downs of the arm of the file, whose poles change with the amplitude, after a servo's coming to rest."""
+    arm = ArmModes(ROBOT, (paper_payload(ROBOT, 5.0),), unknowns_near(ROBOT))
+    random, found = np.random.default_rng(2), []
+    for q in free_configurations(ROBOT, arm.payloads, 8, ModalPlan(8)):
+        ring = predicted(arm, q, 0, Jog(quickness=2.0))
+        time = PERIOD * np.arange(len(ring.force))
+        poles = arm.drivetrain(arm.guess).poles(arm.mass(q, 0))[0][:1]
+        amplitude = 3.0 * np.exp(poles[0].real * time)
+        lost = softening * np.cumsum(amplitude) * PERIOD * RAYLEIGH / abs(poles[0])
+        force = np.outer((3.0 * np.exp(poles[0] * time - lost)).real, [0.3, 0.5, 0.8])
+        for pole in driven:
+            force += np.outer(np.exp(pole * time).real, [2.0, 1.0, -1.0])
+        noisy = force + random.normal(0.0, 0.03, force.shape)
+        found.append(replace(ring, force=noisy, noise=0.03, time=time, driven=driven))
+    return arm, found
+
+
+def errors(arm, ringings):
+    fit, apart = fit_modal(arm, ringings), []
+    for ring in ringings:
+        mass = arm.mass(ring.q, 0)
+        own, true = (describe(arm.drivetrain(p).poles(mass)[0][:1]) for p in (fit.logarithms, arm.guess))
+        apart.append([abs(np.log(a[0] / b[0])) for a, b in zip(own, true, strict=True)])
+    return np.median(apart, axis=0)
+
+
+def test_a_servo_that_comes_to_rest_does_not_count_as_vibration():
+    arm, found = rings(driven=(-45.0 + 26.0j,))
+    f_d, zeta = errors(arm, found)
+    assert f_d < 0.01
+    assert zeta < 0.05
+    assert errors(arm, [replace(ring, driven=()) for ring in found])[1] > 2.0 * zeta
+
+
+def test_hysteresis_is_found_and_the_poles_are_those_of_small_vibrations():
+    arm, found = rings(softening=200.0)
+    known = softened(arm, found)
+    assert known[0].softening in (100.0, 200.0, 300.0)
+    assert errors(arm, known)[1] < errors(arm, found)[1]
+    assert errors(arm, known)[1] < 0.1
+
+
+def test_an_arm_without_hysteresis_gets_none_that_matters():
+    arm, found = rings()
+    f_d, zeta = errors(arm, softened(arm, found))
+    assert f_d < 0.01
+    assert zeta < 0.05
