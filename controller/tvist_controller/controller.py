@@ -47,7 +47,7 @@ from tvist_controller.safety.safety_control import SafetyControl
 from tvist_controller.safety.watching import REFUSED, Watching
 from tvist_controller.setup import Setup, body
 from tvist_plant.fingerprint import fingerprint
-from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError, Watched
+from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError, Supervised, Watched
 from tvist_protocol import commands as c
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Refused, Reply
@@ -71,7 +71,7 @@ class Controller(WholeRobot):
     def __init__(self, setup: Setup, plant: Plant | None = None, order: Order | None = None) -> None:
         plant = setup.made_plant() if plant is None else plant
         setup = setup.standing(plant)
-        setup.check(placed=not isinstance(plant, Watched))
+        setup.check(placed=not isinstance(plant, Watched | Supervised))
         self.setup = setup
         """Initial setup; of an arm that cannot be placed, with the posture in which it stood."""
         self.tick_number = 0

@@ -17,7 +17,7 @@ from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
 from tvist_plant.model import carries_weight
-from tvist_plant.plant import Placeable, Plant
+from tvist_plant.plant import Placeable, Plant, Supervised
 from tvist_plant.plant_checks import measured_standing
 from tvist_plant.variants import hidden_variant
 from tvist_protocol.calibration import Calibration, calibration_of
@@ -152,7 +152,10 @@ class Setup:
         """
         if plant is None or isinstance(plant, Placeable):
             return self
-        return replace(self, q=tuple(measured_standing(plant, len(self.q)).q.tolist()))
+        description = plant.described() if isinstance(plant, Supervised) else self.description
+        return replace(
+            self, q=tuple(measured_standing(plant, len(self.q)).q.tolist()), description=description
+        )
 
     def to_builtins(self) -> dict[str, Any]:
         """Convert the setup to maps and lists for a recording."""

@@ -11,7 +11,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from tvist_plant.description import Payload
+from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.model import Floats
 from tvist_plant.modes import Modes
@@ -158,6 +158,16 @@ class Truthful(Protocol):
 
 
 @dataclass(frozen=True)
+class Halt:
+    """Why an arm's own controller does not follow us any more."""
+
+    why: str
+    """The reason, and what to do before the arm can be powered on or unlocked here, in words."""
+    safety_mode: int
+    """Its safety mode, with RTDE's number."""
+
+
+@dataclass(frozen=True)
 class Condition:
     """What a plant says of its own power."""
 
@@ -165,6 +175,8 @@ class Condition:
     """Whether the drives hold the arm: they have power, and the brakes are released."""
     fault: str | None = None
     """What is wrong with it, in words; None if nothing is."""
+    halt: Halt | None = None
+    """Why its own controller has stopped it; None if it has not."""
 
 
 @runtime_checkable
@@ -245,6 +257,17 @@ class Watched(Pacing, Standing, Protocol):
 
     def interval(self) -> float:
         """Return the time between two of its cycles as they arrive [s]."""
+
+
+@runtime_checkable
+class Supervised(Pacing, Standing, Powered, Stoppable, Protocol):
+    """A robot that we move through its own controller, which follows our positions and may stop it."""
+
+    def seen(self) -> Sight:
+        """Return what it said last; its `told` are those since the last call."""
+
+    def described(self) -> RobotDescription:
+        """Return the robot file with limits no wider than the robot's own."""
 
 
 @runtime_checkable

@@ -21,6 +21,7 @@ from tvist_server.cell_file import read_cell
 from tvist_server.durations import ticks_of
 from tvist_server.fleet import MOST, members
 from tvist_server.initial import calibration_for, posture, read_state, shaped_by
+from tvist_server.moving.moved_robot import MovedRobot
 from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.temporary import temporary_folder
@@ -93,7 +94,15 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     not know, such as stribeck, hysteresis, torsion, base, backlash, combined, springs-30 or springs+30; FILE.py:NAME,
     which runs that file; or an installed plant, such as mujoco. NAME takes a RobotDescription and a Payload, and makes
     a plant. ur://ADDRESS[:PORT] only watches a robot of UR's through its RTDE interface: its state becomes ours, and
-    nothing moves it from here."""
+    nothing moves it from here without --enable-motion."""
+    enable_motion: bool = False
+    """Move the robot at ur://ADDRESS: a program on its controller follows this robot's set-points. Read docs first."""
+    speed_cap: Annotated[float, Meta(ge=0.05, le=3.2)] = 0.5
+    """With --enable-motion: largest speed of every joint in rad/s, for moves, streams and programs alike. The limits of
+    the robot file and of the robot itself hold as well."""
+    tcp: tuple[float, float, float, float, float, float] | None = None
+    """With --enable-motion: tool centre point that the robot has to have, x,y,z in m and rotation vector rx,ry,rz in
+    rad in the flange frame; another one is refused [any: the robot's is taken over]."""
     hidden: Seed | None = None
     """Simulate an arm that is not quite its file: springs, dampers, loops, rotors, friction and payload are drawn from
     this seed and told to nobody. With several robots, each further one uses the next."""
@@ -300,7 +309,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             if self.ur:
                 self.ur_ports.check_joints(description.robot.name, description.joints)
             profile = PLAIN if chosen is None else PROFILES[chosen]
-            watched = self.plant is not None and is_place(self.plant)
+            real = self.plant is not None and is_place(self.plant)
+            watched = real and not self.enable_motion
             if watched:
                 self._check_watched()
             calibration = calibration_for(self.calibration, description)
@@ -319,13 +329,13 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
                 shape_servo=self.shape_servo,
                 adapt=self.adapt,
-                plant=None if self.plant is None else _plant(self.plant),
+                plant=None if self.plant is None else self._plant(self.plant, description),
                 hidden=self.hidden,
             )
             setup = shaped_by(setup, "none" if watched else _either(self.shaper, profile.shaper))
             if self.state is not None:
                 setup = read_state(self.state).on(setup)
-            setup.check(placed=not watched)
+            setup.check(placed=not real)
         except user_file.UserFileError:
             raise
         except ValueError as error:
@@ -354,6 +364,25 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                     f"{name} is {value}, but the robot at {self.plant} is only watched: leave {name} out"
                 )
 
+    def _plant(self, place: str, description: RobotDescription) -> OwnPlant:
+        """Find a plant: the robot at an address, or what `load_plant` finds.
+
+        Raises:
+            ValueError: There is none.
+            UserFileError: See `load_plant`.
+        """
+        if not is_place(place):
+            return load_plant(place)
+        where = place_of(place)
+        if self.enable_motion:
+            start = None if self.start is None else posture(self.start, description)
+            return OwnPlant(
+                str(where),
+                "",
+                partial(MovedRobot, where, speed_cap=self.speed_cap, tool=self.tcp, start=start),
+            )
+        return OwnPlant(str(where), "", partial(WatchedRobot, where))
+
     @property
     def profile_in_force(self) -> ProfileName | None:
         """Profile that gives the defaults; None for those of a robot without a profile."""
@@ -370,19 +399,6 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         if self.payload is None and cell is not None and cell.tools:
             return as_declared(cell.tools[0])
         return paper_payload(description, _either(self.payload, profile.payload))
-
-
-def _plant(place: str) -> OwnPlant:
-    """Find a plant: the robot at an address, or what `load_plant` finds.
-
-    Raises:
-        ValueError: There is none.
-        UserFileError: See `load_plant`.
-    """
-    if not is_place(place):
-        return load_plant(place)
-    where = place_of(place)
-    return OwnPlant(str(where), "", partial(WatchedRobot, where))
 
 
 def _either(given: T | None, default: T) -> T:

@@ -75,9 +75,11 @@ class ServedRobot:
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
         self._realtime = not lockstep
+        plant = setup.made_plant()
+        setup = setup.standing(plant)  # with the limits of a robot that has its own
         # When a client advances time, nothing is late, and plans are made when they are needed.
         self._plans = None if lockstep else PlansOfPrograms(_planner(setup))
-        self.controller = Controller(setup, order=None if self._plans is None else self._plans.order)
+        self.controller = Controller(setup, plant, None if self._plans is None else self._plans.order)
         self.setup = setup = self.controller.setup
         if self._realtime:
             rehearse(self.controller)
@@ -116,7 +118,7 @@ class ServedRobot:
         )
         if learnt is not None:
             learnt.recall(self._host)
-        plant = self.controller.cycle.line.plant
+        plant = self.controller.cycle.line.plant  # also where the setup has none
         knows = isinstance(plant, Truthful) and plant.truth() is not None
         self.want_truth = self.publisher.want_truth if knows and not setup.truth else None
         """To be told whether a client on this machine wants the truth; None if it is published anyway, or unknown."""

@@ -13,7 +13,7 @@ from tvist_controller.line.line_filter import LineFilter
 from tvist_controller.line.line_tick import SIGNALS, to_drives
 from tvist_controller.line.shaped_reference import ShapedReference
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.plant import PERIOD, Plant
+from tvist_plant.plant import PERIOD, Plant, Supervised
 from tvist_shaping.base import Filter, Posture
 
 
@@ -46,7 +46,9 @@ class Boxes(Struct, frozen=True, eq=False):
     ) -> Self:
         """Return the boxes of a robot; see `ControlCycle` for the arguments."""
         dynamics = InverseDynamics(description, declared)
-        drives = DriveFeedForward(description, PERIOD, compensate_sag=compensate_sag)
+        drives = DriveFeedForward(
+            description, PERIOD, compensate_sag=compensate_sag, positions=isinstance(plant, Supervised)
+        )
         return cls(
             LineFilter(tvist, arm_limits(description)),
             ShapedReference(q, PERIOD),

@@ -46,10 +46,20 @@ class DriveFeedForward:
         description: The robot.
         period: Tick [s].
         compensate_sag: Whether the motors lead by the twist of the gears under gravity.
+        positions: See `JointControllers`.
     """
 
-    def __init__(self, description: RobotDescription, period: float, *, compensate_sag: bool = False) -> None:
-        self._joints = JointControllers(description, period, compensate_sag=compensate_sag)
+    def __init__(
+        self,
+        description: RobotDescription,
+        period: float,
+        *,
+        compensate_sag: bool = False,
+        positions: bool = False,
+    ) -> None:
+        self._joints = JointControllers(
+            description, period, compensate_sag=compensate_sag, positions=positions
+        )
         self._law: Floats | None = None
         self.rows = self._joints.rows
         """Parameters and state of the paper's joint controllers, see `joint_controllers`."""

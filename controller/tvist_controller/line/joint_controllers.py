@@ -63,23 +63,33 @@ class JointControllers:
         description: The robot.
         period: Tick [s].
         compensate_sag: Whether the motors lead by the twist of the gears under gravity.
+        positions: Whether the command is the reference, without wind-up and sag, since the arm's own controller adds
+            these.
     """
 
-    def __init__(self, description: RobotDescription, period: float, *, compensate_sag: bool = False) -> None:
+    def __init__(
+        self,
+        description: RobotDescription,
+        period: float,
+        *,
+        compensate_sag: bool = False,
+        positions: bool = False,
+    ) -> None:
         drives, n = description.drives, description.joints
         friction, stiffness = np.array(drives.coulomb_friction), np.array(drives.gear_stiffness)
         self.rows = rows = np.zeros((ROWS, n))
         """Parameters of each joint and its wind-up, in the order of `ROTOR` and so on, shape (13, n)."""
         rows[ROTOR] = drives.rotor_inertia
-        rows[COMPLIANCE] = np.array(drives.windup_feedforward) / stiffness
-        if compensate_sag:
+        if not positions:
+            rows[COMPLIANCE] = np.array(drives.windup_feedforward) / stiffness
+        if compensate_sag and not positions:
             rows[YIELDING] = 1.0 / stiffness
         if drives.linear_friction:
             rows[VISCOUS] = friction / drives.friction_width
         else:
             rows[COULOMB] = drives.friction_feedforward * friction
         rows[WIDTH], rows[PER_SECOND] = drives.friction_feedforward_width, 1.0 / period
-        self._sags = compensate_sag
+        self._sags = compensate_sag and not positions
 
     def compensate(self, law: Floats | None) -> None:
         """Feed identified friction forward, see `friction_law`; None for a share of the description's friction."""

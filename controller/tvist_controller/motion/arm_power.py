@@ -5,7 +5,17 @@ from typing import Self
 
 import numpy as np
 
-from tvist_plant.plant import PERIOD, Condition, Measurement, Placeable, Plant, PlantError, Powered, Stoppable
+from tvist_plant.plant import (
+    PERIOD,
+    Condition,
+    Halt,
+    Measurement,
+    Placeable,
+    Plant,
+    PlantError,
+    Powered,
+    Stoppable,
+)
 from tvist_protocol.modes import RobotMode
 
 STALE = 10
@@ -22,6 +32,8 @@ class ArmPower:
     def __init__(self, plant: Plant) -> None:
         self._powered = plant if isinstance(plant, Powered) else None
         self._stoppable = plant if isinstance(plant, Stoppable) else None
+        self.halted: Halt | None = None
+        """Why the arm's own controller has taken it, until it is to be held again."""
         self._told: RobotMode | None = None
         self._was_ready = False
         self.begun = False
@@ -46,7 +58,9 @@ class ArmPower:
             return Condition(ready=False, fault=str(error))
 
     def follow(self, mode: RobotMode) -> None:
-        """Switch power and brakes as the robot mode asks, if that has changed."""
+        """Switch power and brakes as the robot mode asks, if that has changed; none while others have the arm."""
+        if self.halted is not None:
+            mode = RobotMode.POWER_OFF
         if mode is self._told:
             return
         self._told, self._was_ready = mode, False
@@ -83,6 +97,9 @@ class ArmPower:
         if self._same >= STALE:
             return f"the arm has not measured anything for {1e3 * STALE * PERIOD:g} ms"
         condition = self.condition
+        if condition.halt is not None and mode is RobotMode.RUNNING:
+            self.halted, self._was_ready = self.halted or condition.halt, False
+            return None
         if condition.fault is not None:
             return f"the arm reports: {condition.fault}"
         ready = condition.ready and mode is RobotMode.RUNNING

@@ -12,8 +12,8 @@ from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.safety_system import Emergency, Latched
 from tvist_controller.safety.brakes import brake
 from tvist_controller.safety.protection import Protection
-from tvist_plant.plant import PERIOD, Placeable, PlantError
-from tvist_protocol.modes import RobotMode
+from tvist_plant.plant import PERIOD, Halt, Placeable, PlantError
+from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
 
@@ -110,11 +110,21 @@ class SafetyControl:
         trigger, held = "power_on" if release_brakes else "power", motion.robot_mode is RobotMode.RUNNING
         motion.check(trigger)
         if not held:
-            try:
-                self._begin_where_it_stands()
-            except ValueError as error:
-                raise RefusalError("wrong_mode", "", str(error)) from error
+            self._hold()
         motion.go(trigger)
+
+    def _hold(self) -> None:
+        """Let the line begin where the arm stands, which is about to be held.
+
+        Raises:
+            RefusalError: It does not tell where that is, or may not be held.
+        """
+        try:
+            self._begin_where_it_stands()
+        except ValueError as error:
+            raise RefusalError("wrong_mode", "", str(error)) from error
+        if self._motion.power is not None:
+            self._motion.power.halted = None
 
     def _begin_where_it_stands(self) -> None:
         """Let the line begin where an arm stands that cannot be placed.
@@ -157,6 +167,10 @@ class SafetyControl:
         Raises:
             RefusalError: There is no protective stop, or the arm is still stopping.
         """
+        power = self._motion.power
+        if power is not None and power.halted is not None:
+            self._motion.check("unlock_protective_stop")
+            self._hold()
         self._motion.go("unlock_protective_stop")
         self._protection.forget()
 
@@ -167,14 +181,26 @@ class SafetyControl:
             for danger in self._protection.dangers(sample):
                 motion.protect(danger.why, danger.code)
         if motion.power is not None:
+            held = motion.power.halted is None
             trouble = motion.power.trouble(motion.robot_mode, sample.measured)
-            if trouble is not None and motion.safety.latched is None:
+            if held and motion.power.halted is not None:
+                self._let_go(motion.power.halted, sample)
+            elif trouble is not None and motion.safety.latched is None:
                 self.cut_power(trouble, "fault")
             elif motion.power.begun and motion.cycle.mode.at_rest:
                 try:
                     self._begin_where_it_stands()
                 except ValueError as error:
                     self.cut_power(str(error), "fault")
+
+    def _let_go(self, halt: Halt, sample: Sample) -> None:
+        """End all motion at once, since the arm's own controller has stopped it."""
+        motion = self._motion
+        motion.abandon(halt.why)
+        motion.cycle.reset(sample.measured.q, measured=sample.measured)
+        protective = halt.safety_mode == SafetyMode.PROTECTIVE_STOP
+        motion.activity = Activity.PROTECTIVE_STOP if protective else Activity.POWER_OFF
+        self._emit("protective_stop" if protective else "safety_stop", why=halt.why)
 
     def recover(self, error: PlantError, seed: int) -> Sample:
         """Go on after the arm has failed: a simulated one is placed at rest at its reference, in a protective stop.

@@ -118,6 +118,10 @@ class RtdeClient:
                 raise RtdeError(f"{name} is of type {word[:20]}, and should be {self._types[name].name}")
         self._recipe = payload[0]
         self._row = Struct(">" + "".join(self._types[name].value for name in self._names))
+        return self._begin_rows()
+
+    def _begin_rows(self) -> bytes:
+        """Return what to send once the outputs are set up."""
         return package(PackageKind.START)
 
     def _rows(self, payload: bytes) -> Sequence[Row]:

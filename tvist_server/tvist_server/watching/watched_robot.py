@@ -46,6 +46,9 @@ class WatchedRobot:
         PlantError: There is none, or it is none that can be watched.
     """
 
+    done = "watched"
+    """What is done to it, in a word."""
+
     def __init__(self, place: Place, description: RobotDescription, payload: Payload) -> None:
         model = description.robot.model
         if description.joints != JOINTS:
@@ -58,6 +61,8 @@ class WatchedRobot:
         self._constants = [rating.torque_constant for rating in joint_ratings(description)]
         self._sights: deque[Sight] = deque()
         self._connection: Connection | None = None
+        self.looked_at: list[Row] = []
+        """Rows that were read before the first tick."""
         self._checked = False
         """Whether the present connection has sent a row of the right robot."""
         self._lost = 0.0, ""
@@ -79,6 +84,10 @@ class WatchedRobot:
         """Return the latest measurements: the command goes nowhere."""
         del command
         return self._last.measured
+
+    def first(self) -> Sight:
+        """Return what it said before the first tick."""
+        return self._last
 
     def interval(self) -> float:
         """Return the time between two of its rows [s]."""
@@ -119,7 +128,7 @@ class WatchedRobot:
     def _look(self) -> None:
         """Read some rows before the server ticks: what the robot is, and how fast."""
         self._connect()
-        rows: list[Row] = []
+        rows = self.looked_at
         try:
             while len(rows) < LOOKED_AT:
                 rows += self._rows(1.0)
@@ -138,11 +147,11 @@ class WatchedRobot:
                 "be watched"
             )
         self._count = RowCount(self._interval)
-        self._last = self._sight(rows[-1], 0)
+        self._last, self.newest = self._sight(rows[-1], 0), rows[-1]
         software = ".".join(map(str, version[:3]))
         rate = INTERVALS[self._interval]
         self._notes.append(
-            f"the robot at {self._place} (software {software}, {rate} rows a second) is watched"
+            f"the robot at {self._place} (software {software}, {rate} rows a second) is {self.done}"
         )
         if self._interval > 1:
             self._notes.append(
@@ -152,8 +161,11 @@ class WatchedRobot:
             self._notes.append(f"its software does not tell {', '.join(lacking)}")
 
     def _connect(self) -> None:
-        self._client = RtdeClient(NEEDED, OPTIONAL)
-        self._connection, self._checked = Connection(self._place, self._address, self._client), False
+        self._connection, self._checked = self._new_connection(), False
+        self._client = self._connection.client
+
+    def _new_connection(self) -> Connection:
+        return Connection(self._place, self._address, RtdeClient(NEEDED, OPTIONAL))
 
     def _rows(self, timeout: float) -> list[Row]:
         """Return the rows that have come; those of the wrong robot or without numbers end the connection."""
@@ -209,6 +221,7 @@ class WatchedRobot:
             )
             self._told_at, self._untold = now, 0
         self._sights.append(self._sight(row, counted.tick))
+        self.newest = row
 
     def _sight(self, row: Row, tick: int) -> Sight:
         sight = sight_of(row, self._constants, tick, self._count.missing, self._notes)

@@ -8,8 +8,8 @@ from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Refused
 from tvist_server.gateways.ur import messages, power, version
 from tvist_server.gateways.ur.base import ControllerAccess
-from tvist_server.gateways.ur.model import series
 from tvist_server.gateways.ur.robot import NO_MODE, UrRobot
+from tvist_server.ur_model import series
 
 UNNAMED: Final = "<unnamed>"
 """Name of the program while none is loaded."""

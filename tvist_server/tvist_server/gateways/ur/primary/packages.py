@@ -11,7 +11,7 @@ from tvist_controller.instruments.snapshot import Snapshot
 from tvist_plant.description import RobotDescription
 from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_server.gateways.ur import messages
-from tvist_server.gateways.ur.model import series
+from tvist_server.ur_model import series
 from tvist_server.ur_ports import MOST_JOINTS
 
 ROBOT_STATE: Final = 16

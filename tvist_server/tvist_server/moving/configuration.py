@@ -1,0 +1,102 @@
+"""A robot's own limits and dimensions, from the configuration data of its primary interface."""
+
+from struct import Struct, error
+from typing import NamedTuple
+
+import numpy as np
+from msgspec.structs import replace
+
+from tvist_plant.description import RobotDescription
+from tvist_server.moving.dialogue import NoAnswerError, ask
+from tvist_server.watching.place import Place
+
+_PACKAGE, _PART, _DATA = Struct(">iB"), Struct(">IB"), Struct(">53d4i")
+STATE, CONFIGURATION = 16, 6
+"""Type of the packages with a robot's state, and number of the part with its configuration."""
+FAR, TURNED = 5e-3, 0.01
+"""Differences of its dimensions from the robot file, from which on it is another model [m, rad]."""
+
+
+class Configuration(NamedTuple):
+    """What a robot is, and may do; all arrays have shape (6,)."""
+
+    least: np.ndarray
+    """Smallest joint angles [rad]."""
+    most: np.ndarray
+    """Largest joint angles [rad]."""
+    velocity: np.ndarray
+    """Largest velocities [rad/s]."""
+    acceleration: np.ndarray
+    """Largest accelerations [rad/s²]."""
+    a: np.ndarray
+    """Denavit and Hartenberg's lengths [m], as the next [m] and angles [rad]."""
+    d: np.ndarray
+    alpha: np.ndarray
+
+    def is_of(self, description: RobotDescription) -> bool:
+        """Return whether its dimensions are those of a robot file."""
+        file = description.kinematics
+        pairs = (self.a, file.a, FAR), (self.d, file.d, FAR), (self.alpha, file.alpha, TURNED)
+        return all(np.abs(own - np.array(there)).max() <= apart for own, there, apart in pairs)
+
+
+def configuration_of(place: Place) -> Configuration | None:
+    """Ask a robot for its configuration; None if it does not tell any."""
+    try:
+        return ask(place, b"", found)
+    except NoAnswerError:
+        return None
+
+
+def found(heard: bytes) -> Configuration | None:
+    """Return the configuration in what a primary interface has sent so far; None if it has not come yet."""
+    try:
+        for package in _split(heard, _PACKAGE, STATE):
+            for part in _split(package, _PART, CONFIGURATION):
+                return _read(part)
+    except error:  # the rest is still to come
+        pass
+    return None
+
+
+def _split(data: bytes, head: Struct, wanted: int) -> list[bytes]:
+    """Return the bodies of the packages of a type; each begins with its length and its type."""
+    at, bodies = 0, list[bytes]()
+    while len(data) - at >= head.size:
+        length, kind = head.unpack_from(data, at)
+        if length < head.size or len(data) - at < length:
+            break
+        if kind == wanted:
+            bodies.append(data[at + head.size : at + length])
+        at += length
+    return bodies
+
+
+def _read(part: bytes) -> Configuration:
+    numbers = np.array(_DATA.unpack_from(part)[:53])
+    position, motion = numbers[:12].reshape(6, 2), numbers[12:24].reshape(6, 2)
+    a, d, alpha, _ = numbers[29:].reshape(4, 6)
+    return Configuration(position[:, 0], position[:, 1], motion[:, 0], motion[:, 1], a, d, alpha)
+
+
+def narrowed(
+    description: RobotDescription, configuration: Configuration | None, speed_cap: float
+) -> RobotDescription:
+    """Return a robot file with limits no wider than the robot's own, nor than the speed cap.
+
+    Args:
+        description: The robot file.
+        configuration: What the robot says; None if it says nothing.
+        speed_cap: Largest velocity of every joint [rad/s].
+    """
+    limits = description.limits
+    position, velocity, acceleration = map(np.array, (limits.position, limits.velocity, limits.acceleration))
+    velocity = np.minimum(velocity, speed_cap)
+    if configuration is not None:
+        position = np.minimum(position, np.minimum(-configuration.least, configuration.most))
+        velocity = np.minimum(velocity, configuration.velocity)
+        acceleration = np.minimum(acceleration, configuration.acceleration)
+    own = {"position": position, "velocity": velocity, "acceleration": acceleration}
+    return replace(
+        description, limits=replace(limits, **{name: tuple(most.tolist()) for name, most in own.items()})
+    )

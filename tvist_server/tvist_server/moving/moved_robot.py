@@ -1,0 +1,182 @@
+"""A robot that is moved: a plant whose drives are another controller's."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.drives import DriveCommand
+from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, PlantError, Sight
+from tvist_server.moving.commanded_robot import CommandedRobot
+from tvist_server.moving.configuration import configuration_of, narrowed
+from tvist_server.moving.dashboard import asked
+from tvist_server.moving.halts import SILENT
+from tvist_server.moving.pace import Pace
+from tvist_server.moving.ports import ports_of
+from tvist_server.moving.run import Run
+from tvist_server.moving.start_checks import (
+    QUESTIONS,
+    Wanted,
+    answers_trouble,
+    mounting_trouble,
+    state_trouble,
+    tells_gravity,
+)
+from tvist_server.watching.place import Place
+
+NUMBERS = 1_000_000_000
+"""Numbers of runs begin with our time in seconds, so that those of two processes differ."""
+
+
+class MovedRobot:
+    """Moves one robot.
+
+    Args:
+        place: Where it is.
+        description: The robot file.
+        payload: Payload that it should have been told.
+        speed_cap: Largest speed of every joint [rad/s].
+        tool: Tool centre point that it should have been told; None for any.
+        start: Where it should stand [rad]; None for anywhere.
+
+    Raises:
+        PlantError: It may not be moved; the message says why, and what to do.
+    """
+
+    def __init__(
+        self,
+        place: Place,
+        description: RobotDescription,
+        payload: Payload,
+        *,
+        speed_cap: float,
+        tool: tuple[float, ...] | None = None,
+        start: tuple[float, ...] | None = None,
+    ) -> None:
+        self._robot = CommandedRobot(place, description, payload)
+        self._place, self._ports = place, ports_of(place)
+        self._sight, self._told = self._robot.first(), list[str]()
+        own = configuration_of(self._ports.primary)
+        answers = asked(self._ports.dashboard, QUESTIONS)
+        file = Wanted(description, payload, tool, start)
+        self._refuse_if(answers_trouble(file, answers, own))
+        self._wanted = file._replace(description=narrowed(description, own, speed_cap))
+        self._refuse_if(state_trouble(self._wanted, self._sight))
+        felt = np.mean([row["actual_tool_accelerometer"] for row in self._robot.looked_at], axis=0)
+        if tells_gravity(felt):
+            self._refuse_if(mounting_trouble(description, self._sight.measured.q, felt))
+        else:
+            self._told.append("its accelerometer does not tell gravity: nobody has checked how it is mounted")
+        if own is None:
+            port = self._ports.primary.port
+            self._told.append(f"its port {port} tells no limits: those of the robot file hold alone")
+        if not answers:
+            port = self._ports.dashboard.port
+            self._told.append(f"its port {port} answers nothing: model and remote control were not checked")
+        self._pace, self._number = Pace(), int(time.time()) % NUMBERS
+        self._held = False
+        self._run: Run | None = None
+        self._halt: Halt | None = None
+
+    def _refuse_if(self, trouble: str | None) -> None:
+        if trouble is not None:
+            raise PlantError(f"the robot at {self._place} is not moved: {trouble}")
+
+    # ------------------------------------------------------------------ a plant
+
+    @property
+    def payload(self) -> Payload:
+        """Payload that it was told."""
+        return self._robot.payload
+
+    def described(self) -> RobotDescription:
+        """Return the robot file with limits no wider than the robot's own and the speed cap."""
+        return self._wanted.description
+
+    def measure(self) -> Measurement:
+        """Return where its own controller holds it, if it may be moved from there."""
+        run = self._run
+        if run is None or not run.ready:
+            self._refuse_if(state_trouble(self._wanted, self._sight, may_play=run is not None))
+        last = None if run is None else run.last
+        return self._measured(last or self._robot.newest["target_q"])
+
+    def step(self, command: DriveCommand) -> Measurement:
+        """Write a set-point, and return the latest measurements; of several periods at once only the last writes."""
+        if self._run is not None:
+            self._run.add(command.q)
+            if not self._pace.owed:
+                self._run.write()
+        return self._measured(self._sight.measured.q)
+
+    def _measured(self, q: np.ndarray | tuple[float, ...]) -> Measurement:
+        """Return the latest measurements at a posture, with the time of the present period."""
+        felt = self._sight.measured
+        return Measurement(
+            np.array(q), felt.qd, felt.moment, felt.accelerometer, timestamp=self._pace.tick * PERIOD
+        )
+
+    def seen(self) -> Sight:
+        """Return what it said last, with what people should know since the last call."""
+        told, self._told = (*self._told,), []
+        return replace(self._sight, told=told)
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until the next period begins, by the robot's clock, or by ours while it is silent."""
+        until = time.monotonic() + timeout
+        while (now := time.monotonic()) < until:
+            if self._pace.next(now):
+                return True
+            if self._robot.wait(min(self._pace.until(now), until - now)):
+                if self._take(self._robot.sight()):
+                    return True
+            elif self._run is not None and self._pace.silent(time.monotonic()):
+                self._let_go(SILENT)
+        return self._pace.next(time.monotonic())
+
+    def _take(self, sight: Sight) -> bool:
+        """Take a row; return whether it begins a period."""
+        self._sight = sight
+        self._told += sight.told
+        if not self._robot.connected:
+            if self._held:
+                self._let_go(SILENT)
+            return False
+        if self._held and self._run is None:
+            self._number += 1
+            speed = max(self._wanted.description.limits.velocity)
+            self._run = Run(self._robot, self._ports, self._number, speed)
+        if self._run is not None:
+            told = self._run.take(sight)
+            self._told += [] if told is None else [told]
+            if self._run.halt is not None:
+                self._let_go(self._run.halt)
+        return self._pace.row(sight.tick, time.monotonic())
+
+    # ------------------------------------------------------------------ its program
+
+    @property
+    def condition(self) -> Condition:
+        """Whether its program follows."""
+        return Condition(self._run is not None and self._run.ready, halt=self._halt)
+
+    def switch(self, *, power: bool, brakes: bool) -> None:
+        """Let our program run on it, or end; its power and brakes are switched by people at the robot."""
+        self.stop()
+        self._held = power and not brakes
+
+    def stop(self) -> None:
+        """Let our program brake and end."""
+        if self._run is not None:
+            self._run.end()
+        self._run, self._held, self._halt = None, False, None
+
+    def close(self) -> None:
+        """Let it go."""
+        self.stop()
+        self._robot.close()
+
+    def _let_go(self, halt: Halt) -> None:
+        self.stop()
+        self._halt = Halt(f"the robot at {self._place} does not follow: {halt.why}", halt.safety_mode)

@@ -1,0 +1,204 @@
+"""The program in URScript that follows set-points on a robot, and brakes by itself when they stop."""
+
+from string import Template
+
+from tvist_server.moving import registers
+from tvist_server.moving.registers import JOINTS, MOST, Ended, Order, State
+
+NAME = "tvist_follow"
+"""Name of the program, which robots show."""
+SILENCE = 0.04
+"""Longest time from the arrival of the last set-point until the arm begins to brake [s]."""
+FIRST = 10.0
+"""Time to wait for the first set-point [s]."""
+AWAY = 0.01
+"""Largest distance of a joint from the first set-point [rad]."""
+FADE = 0.05
+"""Time constant with which a distance from the set-points fades [s]."""
+MARGIN = 1.05
+"""Speed of the arm over that of the fastest set-points, at most."""
+_REGISTERS = ("NUMBER", "ORDER", "SETPOINTS", "STATE", "PLAYED", "ENDED", "ALONE", "LEFT_OUT", "RUN")
+
+
+def program(run: int, *, speed: float, deceleration: float, lookahead: float, gain: float) -> str:
+    """Return the text of the program, which uses only functions of e-Series (5.9 or later) and CB3 (3.14 or later).
+
+    Args:
+        run: Number of this run, 1 to `registers.MOST`, which the program says in its registers.
+        speed: Fastest set-points; faster ones end the program [rad/s].
+        deceleration: Deceleration of the fastest joint when it ends [rad/s^2].
+        lookahead: `lookahead_time` of `servoj`, 0.03 to 0.2 [s].
+        gain: `gain` of `servoj`, 100 to 2000.
+
+    Raises:
+        ValueError: An argument is outside its range.
+    """
+    for name, value, least, most in (
+        ("run", run, 1, MOST),
+        ("speed", speed, 0.01, 10.0),
+        ("deceleration", deceleration, 0.1, 100.0),
+        ("lookahead", lookahead, 0.03, 0.2),
+        ("gain", gain, 100.0, 2000.0),
+    ):
+        if not least <= value <= most:
+            raise ValueError(f"{name} is {value:g}: must be {least:g} to {most:g}")
+    return _TEXT.substitute(
+        {name: getattr(registers, name) for name in _REGISTERS}
+        | {f"ended_{one.name.lower()}": int(one) for one in Ended}
+        | {f"state_{one.name.lower()}": int(one) for one in State}
+        | {"name": NAME, "run": run, "follow": int(Order.FOLLOW), "speed": float(MARGIN * speed)}
+        | {"deceleration": float(deceleration), "lookahead": float(lookahead), "gain": float(gain)}
+        | {"silence": SILENCE, "first": FIRST, "away": AWAY, "fade": FADE}
+        | {"angles": ", ".join(f"read_input_float_register(at + {joint})" for joint in range(JOINTS))}
+    )
+
+
+_TEXT = Template("""\
+def $name():
+  # Follows joint positions that a computer sends through RTDE, one in each control period, and stops the arm by itself
+  # when they stop. It moves nothing before the first has come, and after a stop it has ended.
+  #
+  # Input registers, which one package writes:
+  #   integer $NUMBER: number of the newest set-point, 1 more in each period; integer $ORDER: $follow to follow
+  #   float $SETPOINTS to 47: the newest set-point and the three before it, six joint angles each [rad]
+  # Output registers:
+  #   integer $STATE: $state_waiting waiting, $state_following following, $state_braking braking, $state_ended ended
+  #   integer $PLAYED: number of the set-point whose turn it is; integer $RUN: number of this run
+  #   integer $ENDED: why it ended: $ended_ordered ordered, $ended_silence no set-point came,
+  #     $ended_away the first is too far from the arm, $ended_too_fast one is too far from the one before,
+  #     $ended_lost paused, or out of step
+  #   integer $ALONE: periods without a set-point; integer $LEFT_OUT: set-points left out
+
+  def setpoint(at):
+    return [$angles]
+  end
+
+  write_output_integer_register($PLAYED, 0)
+  write_output_integer_register($ENDED, $ended_not)
+  write_output_integer_register($ALONE, 0)
+  write_output_integer_register($LEFT_OUT, 0)
+  write_output_integer_register($STATE, $state_waiting)
+  write_output_integer_register($RUN, $run) # the others are of this run from here on
+
+  step = get_steptime()
+  most = $speed * step # largest way of a joint in a period [rad]
+  near = $away + 4.0 * $speed * ($lookahead + 4.0 * step) # largest distance of the arm from where servoj leads it [rad]
+  keep = pow($fade / ($fade + step), 2) # a distance from the set-points fades as if damped critically:
+  pull = pow(step / ($fade + step), 2) # what a period keeps of its velocity, and how it pulls
+
+  # What the registers hold may be from before: only a number that changes has a sender.
+  old = read_input_integer_register($NUMBER)
+  newest = old
+  waited = 0.0
+  while waited < $first and (newest == old or read_input_integer_register($ORDER) != $follow):
+    sync()
+    waited = waited + step
+    newest = read_input_integer_register($NUMBER)
+  end
+
+  q = get_target_joint_positions() # where servoj leads the arm
+  change = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # of q in the last period
+  extra = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # what of that was not the change of the set-points
+  last = setpoint($SETPOINTS + 12) # last set-point that was there
+  number = newest - 2 # of the present one, which becomes the last but one, so that the newest may be late by a period
+  last_number = number
+  start = number
+  played = 0
+  alone = 0
+  silence = 0.0
+  blind = True # whether the last period was without a set-point
+
+  why = $ended_not
+  i = 0
+  while i < 6:
+    if not (norm(last[i] - q[i]) <= $away):
+      why = $ended_away
+    end
+    i = i + 1
+  end
+  if waited >= $first:
+    why = $ended_silence
+  end
+  if why == $ended_not:
+    write_output_integer_register($STATE, $state_following)
+  end
+
+  while why == $ended_not:
+    now = read_input_integer_register($NUMBER)
+    silence = silence + step
+    if now > newest:
+      silence = 0.0
+    end
+    number = number + 1
+    if now - number > 2: # this program has missed a period: leave a set-point out
+      number = number + 1
+    elif now == number and blind: # they come late: give them a period more
+      number = number - 1
+    end
+
+    if read_input_integer_register($ORDER) != $follow:
+      why = $ended_ordered
+    elif now < newest or now - number > 2: # another sender, or a pause: the arm must not catch up
+      why = $ended_lost
+    elif silence > $silence - 2.5 * step: # earlier by what reading and telling may take
+      why = $ended_silence
+    end
+    newest = now
+
+    there = now >= number
+    if there:
+      new = setpoint($SETPOINTS + 6 * (now - number))
+      there = read_input_integer_register($NUMBER) == now # else the next package has come meanwhile
+    end
+    way = change # without a set-point, the arm goes on as before
+    if there:
+      own = new - last
+      joined = number - last_number == 1 # else there is no velocity of the set-points yet
+      if joined:
+        if blind:
+          extra = change - own
+        elif norm(q - get_target_joint_positions()) > near:
+          why = $ended_lost
+        end
+        way = own + extra * keep - (q - last) * pull
+      end
+      far = most * (number - last_number)
+      i = 0
+      while i < 6:
+        if not (norm(own[i]) <= far): # nor is what is no number
+          why = $ended_too_fast
+        elif norm(way[i]) > most:
+          way[i] = change[i]
+        end
+        i = i + 1
+      end
+      extra = way - own
+      last = new
+      last_number = number
+      blind = not joined
+    else:
+      blind = True
+    end
+    if blind:
+      alone = alone + 1
+    else:
+      played = played + 1
+    end
+    q = q + way
+    change = way
+
+    if why == $ended_not:
+      write_output_integer_register($PLAYED, number)
+      write_output_integer_register($ALONE, alone)
+      write_output_integer_register($LEFT_OUT, number - start - played)
+      servoj(q, t=step, lookahead_time=$lookahead, gain=$gain)
+    end
+  end
+
+  write_output_integer_register($ENDED, why)
+  write_output_integer_register($STATE, $state_braking)
+  stopj($deceleration)
+  write_output_integer_register($STATE, $state_ended)
+  textmsg("$name has ended, reason ", why)
+end
+""")

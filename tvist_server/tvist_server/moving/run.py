@@ -1,0 +1,100 @@
+"""One run of the program on a robot, from its upload to its end."""
+
+import time
+
+from tvist_plant.model import Floats
+from tvist_plant.plant import Halt, Sight
+from tvist_protocol.modes import RuntimeState
+from tvist_server.moving.commanded_robot import CommandedRobot
+from tvist_server.moving.halts import halt_by_modes, halt_by_program
+from tvist_server.moving.ports import Ports
+from tvist_server.moving.program import program
+from tvist_server.moving.registers import ALONE, ENDED, INPUTS, LEFT_OUT, RUN, STATE, Order, State
+from tvist_server.moving.upload import Upload
+from tvist_server.moving.window import Window
+
+LOOKAHEAD, GAIN = 0.03, 2000.0
+"""Parameters of `servoj` with which the arm follows most closely [s, -]."""
+DECELERATION = 5.0
+"""Deceleration of the fastest joint when the program brakes [rad/s²]."""
+BEGINS = 5.0
+"""Longest time in which the program has to begin [s]."""
+TELL_EVERY = 1.0
+"""Shortest time between two sentences about set-points that did not come in time [s]."""
+
+
+class Run:
+    """Follows a run.
+
+    Args:
+        robot: The robot, which is connected.
+        ports: Its interfaces.
+        number: Number of the run.
+        speed: Fastest set-points [rad/s].
+    """
+
+    def __init__(self, robot: CommandedRobot, ports: Ports, number: int, speed: float) -> None:
+        self._robot, self._number, self._window = robot, number, Window()
+        self._begun, self._plays = time.monotonic(), False
+        self.ready = False
+        """Whether the program follows."""
+        self.halt: Halt | None = None
+        """Why it does not, and will not any more."""
+        self._told, self._told_at = (0, 0), 0.0
+        robot.write((0,) * len(INPUTS))  # what an earlier run has left there is not played
+        text = program(number, speed=speed, deceleration=DECELERATION, lookahead=LOOKAHEAD, gain=GAIN)
+        self._upload = Upload(ports, text)
+
+    @property
+    def last(self) -> tuple[float, ...] | None:
+        """The newest set-point [rad]; None before the first."""
+        return self._window.values(Order.FOLLOW)[2:8] if self._window.number else None
+
+    def add(self, q: Floats) -> None:
+        """Add the next set-point, shape (6,) [rad], once the program follows."""
+        if self.ready:
+            self._window.add(q.tolist())
+
+    def write(self, order: Order = Order.FOLLOW) -> None:
+        """Write the newest set-points."""
+        if self._window.number:
+            self._robot.write(self._window.values(order))
+
+    def end(self) -> None:
+        """Let the program brake and end."""
+        self.write(Order.END)
+        self._upload.close()
+        self.ready = False
+
+    def take(self, sight: Sight) -> str | None:
+        """See by a row what has become of the program; return what people should know."""
+        state, ended, number, *missed = (
+            int(self._robot.newest[f"output_int_register_{place}"][0])
+            for place in (STATE, ENDED, RUN, ALONE, LEFT_OUT)
+        )
+        self.halt = self.halt or halt_by_modes(sight.modes)
+        if number != self._number or not self._plays:
+            self._plays = number == self._number and sight.modes[2] == RuntimeState.PLAYING
+            if self.halt is None and self._upload.trouble is not None:
+                self.halt = Halt(self._upload.trouble, sight.modes[1])
+            elif self.halt is None and time.monotonic() - self._begun > BEGINS:
+                why = (
+                    f"our program has not begun within {BEGINS:g} s: look at its teach pendant for a message"
+                )
+                self.halt = Halt(f"{why}, then power on here", sight.modes[1])
+            return None
+        self.halt = self.halt or halt_by_program(ended, sight.modes)
+        if state == State.WAITING:
+            self._window.add(self.last or self._robot.newest["target_q"])
+        self.ready = state == State.FOLLOWING and self.halt is None
+        return self._tell_missed((missed[0], missed[1]))
+
+    def _tell_missed(self, missed: tuple[int, int]) -> str | None:
+        now = time.monotonic()
+        if missed == self._told or now - self._told_at < TELL_EVERY:
+            return None
+        self._told, self._told_at = missed, now
+        return (
+            f"since the program began, the robot had no set-point in {missed[0]} periods and went on by itself, and "
+            f"{missed[1]} set-points came too late to be played: look at the network and at the load of this machine"
+        )

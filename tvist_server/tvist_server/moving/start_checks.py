@@ -1,0 +1,168 @@
+"""Whether a robot may be moved: each reason why not is one sentence that says what to do."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_controller.line.kinematics import ForwardKinematics
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.model import Floats
+from tvist_plant.plant import GRAVITY, Sight
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_server.moving.configuration import Configuration
+from tvist_server.ur_model import series
+
+MODEL, REMOTE = "get robot model", "is in remote control"
+QUESTIONS = MODEL, REMOTE
+"""What the dashboard is asked."""
+NEAR = 0.01
+"""Largest angle by which joints may differ from where they should be [rad]."""
+SAME_MASS = 0.05
+"""Largest difference of two masses that count as equal [kg]."""
+SAME_PLACE, SAME_TURN = 1e-3, 0.01
+"""Largest difference of two tools that count as equal [m, rad]."""
+STILL = 1e-3
+"""Speed below which a joint stands [rad/s]."""
+LEANING = 0.15
+"""Largest angle between the measured and the expected direction of gravity [rad]."""
+PLAUSIBLE = 2.0
+"""Largest difference of the measured gravity from the real one, of an accelerometer that tells something [m/s²]."""
+
+
+class Wanted(NamedTuple):
+    """What is said here about the robot."""
+
+    description: RobotDescription
+    """The robot file."""
+    payload: Payload
+    """Payload that it should have been told."""
+    tool: tuple[float, ...] | None = None
+    """Tool centre point that it should have been told; None for any."""
+    q: tuple[float, ...] | None = None
+    """Where it should stand [rad]; None for anywhere."""
+
+
+def answers_trouble(wanted: Wanted, answers: Mapping[str, str], own: Configuration | None) -> str | None:
+    """Return why a robot may not be moved by what its interfaces have answered; None if it may."""
+    model = wanted.description.robot.model
+    told = answers.get(MODEL)
+    if told is not None and series(told) != series(model):
+        return f"it is a {told}, and the robot file is that of a {model}: give --robot its model"
+    if own is not None and not own.is_of(wanted.description):
+        return (
+            f"its dimensions are not those of a {model}: give --robot its model, or a robot file of your own"
+        )
+    return remote_trouble(answers)
+
+
+def remote_trouble(answers: Mapping[str, str]) -> str | None:
+    """Return why it takes no program; None if it does."""
+    if answers.get(REMOTE) == "false":
+        return (
+            "it is in local control, or another client controls it: switch it to remote control at its teach pendant, "
+            "and end other clients"
+        )
+    return None
+
+
+def state_trouble(wanted: Wanted, sight: Sight, *, may_play: bool = False) -> str | None:
+    """Return why a robot may not be moved as it is now; None if it may.
+
+    Args:
+        wanted: What is said of it here.
+        sight: What it says.
+        may_play: Whether the program that runs on it is ours.
+    """
+    mode, safety, runtime = sight.modes
+    if mode == RobotMode.DISCONNECTED:
+        return "it is not connected: look at the network, and at the robot"
+    if safety != SafetyMode.NORMAL:
+        return f"its safety mode is {_name(SafetyMode, safety)}: clear that at the robot, until it is NORMAL"
+    if mode != RobotMode.RUNNING:
+        return f"its mode is {_name(RobotMode, mode)}: switch it on and release its brakes at the robot"
+    if runtime != RuntimeState.STOPPED and not may_play:
+        return "a program runs on it, or is paused: stop that at the robot or at its client"
+    return _posture_trouble(wanted, sight) or _load_trouble(wanted, sight)
+
+
+def _posture_trouble(wanted: Wanted, sight: Sight) -> str | None:
+    target, measured = sight.target[0], sight.measured.q
+    if np.abs(sight.target[1]).max() > STILL:
+        return "it moves: wait until it stands"
+    if (joint := _apart(target, measured)) is not None:
+        by = abs(target[joint] - measured[joint])
+        return (
+            f"joint {joint} is {by:.3f} rad from where its controller has it, more than {NEAR:g}: see what holds it, "
+            "or switch its power off and on"
+        )
+    if wanted.q is not None and (joint := _apart(np.array(wanted.q), target)) is not None:
+        return (
+            f"joint {joint} stands at {target[joint]:.3f} rad, and --start says {wanted.q[joint]:.3f}: move the arm "
+            "there, or leave --start out"
+        )
+    most = np.array(wanted.description.limits.position)
+    beyond = int(np.argmax(np.abs(target) - most))
+    if abs(target[beyond]) > most[beyond]:
+        return (
+            f"joint {beyond} stands at {target[beyond]:.3f} rad, beyond ±{most[beyond]:.3f}, the narrower of its own "
+            "limit and that of the robot file: move it back at the robot"
+        )
+    return None
+
+
+def _load_trouble(wanted: Wanted, sight: Sight) -> str | None:
+    told, tool = sight.payload, sight.tool
+    if told is not None and abs(told.mass - wanted.payload.mass) > SAME_MASS:
+        return (
+            f"it was told a payload of {told.mass:.3g} kg, and here it is {wanted.payload.mass:.3g} kg: give --payload "
+            "what the arm carries, and tell the robot the same"
+        )
+    if tool is not None and wanted.tool is not None:
+        apart = np.abs(np.array(tool) - np.array(wanted.tool))
+        if apart[:3].max() > SAME_PLACE or apart[3:].max() > SAME_TURN:
+            return (
+                f"its tool centre point is {_listed(tool)}, and --tcp says {_listed(wanted.tool)}: set the right one "
+                "at the robot, or leave --tcp out to take over its own"
+            )
+    return None
+
+
+def mounting_trouble(description: RobotDescription, q: Floats, felt: Floats) -> str | None:
+    """Return why the robot may not be mounted as the robot file says; None if it is.
+
+    Args:
+        description: The robot file.
+        q: Joint angles at rest, shape (6,) [rad].
+        felt: Mean specific force in the flange frame, shape (3,) [m/s²].
+    """
+    kinematics = ForwardKinematics(description)
+    pose, _ = kinematics.tool(q, np.zeros_like(q))
+    up = pin.exp3(np.array(pose[3:])) @ felt / np.linalg.norm(felt)
+    leans = float(np.arccos(np.clip(up[2], -1.0, 1.0)))
+    if leans <= LEANING:
+        return None
+    return (
+        f"its accelerometer feels gravity {np.degrees(leans):.0f}° away from where an upright base has it: the robot "
+        "file is for an upright robot, and this one hangs, leans, or is another model"
+    )
+
+
+def tells_gravity(felt: Floats) -> bool:
+    """Return whether an accelerometer at rest, shape (3,) [m/s²], tells where gravity is."""
+    return bool(abs(np.linalg.norm(felt) - GRAVITY) <= PLAUSIBLE)
+
+
+def _apart(one: Floats, other: Floats) -> int | None:
+    """Return the joint that differs most, if that is too much."""
+    joint = int(np.argmax(np.abs(one - other)))
+    return joint if abs(one[joint] - other[joint]) > NEAR else None
+
+
+def _listed(numbers: Sequence[float]) -> str:
+    return ",".join(f"{number:.4g}" for number in numbers)
+
+
+def _name(kind: type[RobotMode | SafetyMode], number: int) -> str:
+    return kind(number).name if number in {member.value for member in kind} else str(number)

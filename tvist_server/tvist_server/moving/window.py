@@ -1,0 +1,29 @@
+"""The newest set-points, as they go to the robot: each package repeats those before, in case their own comes late."""
+
+from collections import deque
+from collections.abc import Sequence
+
+from tvist_server.moving.registers import KEPT, MOST, Order
+
+
+class Window:
+    """Numbers set-points from 1 on, one for each control period of the robot, and keeps those of the next package."""
+
+    def __init__(self) -> None:
+        self.number = 0
+        """Number of the newest set-point; 0 before the first."""
+        self._newest = deque[Sequence[float]](maxlen=KEPT)
+
+    def add(self, setpoint: Sequence[float]) -> None:
+        """Add the next set-point, joint angles of shape (6,) [rad]. Before the first one, the arm counts as there."""
+        self.number = self.number % MOST + 1
+        self._newest.extendleft([setpoint] * (1 if self._newest else KEPT))
+
+    def values(self, order: Order) -> tuple[float, ...]:
+        """Return the values of an input package, in the order of `registers.INPUTS`.
+
+        Args:
+            order: What the program is to do.
+        """
+        assert self.number, "a package has a set-point"
+        return self.number, order, *(angle for one in self._newest for angle in one)
