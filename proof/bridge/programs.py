@@ -184,7 +184,17 @@ async def _run(
         to, name = robot, ways.robot
         if shaper and not inside:
             name, bridge = "bridge", _address(2)
-            plant = ["--plant", f"ur://{at}", "--enable-motion", "--speed-cap", CAP, "--robot", ways.robot]
+            plant = [
+                "--plant",
+                f"ur://{at}",
+                "--enable-motion",
+                "--speed-cap",
+                CAP,
+                "--robot",
+                ways.robot,
+                "--profile",
+                "real",
+            ]
             to = await stack.enter_async_context(
                 served([*plant, *shaping, "--ur", "--ur-address", bridge], name)
             )

@@ -134,3 +134,5 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     watched: str | None = None
     """Address of the robot if it is only watched: its own controller moves it, and commands that concern the arm are
     refused; null if this server moves it."""
+    moved: str | None = None
+    """Address of the robot's own controller, through which this server moves it; null if there is none."""
