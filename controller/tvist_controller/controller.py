@@ -44,6 +44,7 @@ from tvist_controller.safety.declared_payload import DeclaredPayload
 from tvist_controller.safety.faults import Faults
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
+from tvist_controller.safety.supervision import Supervision
 from tvist_controller.safety.watching import REFUSED, Watching
 from tvist_controller.setup import Setup, body
 from tvist_plant.fingerprint import fingerprint
@@ -109,12 +110,8 @@ class Controller(WholeRobot):
         self._safety = safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
         self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
-        self.watching = (
-            Watching(plant, self.cycle, self.modes, self.peripherals, self._reporter.set_tcp, self._emit)
-            if isinstance(plant, Watched)
-            else None
-        )
-        """The robot that is only watched; None if this controller moves it."""
+        self.watching, self.supervision = self._own_controller(plant)
+        """The robot's own controller, which is only watched, or through which the robot is moved; None for neither."""
         self.forces = ToolForces(setup.description, self.peripherals, lambda: self.latest)
         """Forces and torques on the arm."""
         self.cell = (
@@ -214,6 +211,8 @@ class Controller(WholeRobot):
         """Carry out a command of a client, or of a program; see `CommandTable.carry_out`."""
         if self.watching is not None and type(command) not in HARMLESS:
             raise RefusalError("wrong_mode", "", REFUSED)
+        if self.supervision is not None:
+            self.supervision.check(command)
         self._look_again()
         planned = partial(self.plans.found, command, plan)
         reply = self._commands.carry_out(
@@ -268,7 +267,13 @@ class Controller(WholeRobot):
             tick = self.watching.look()
             self.tick_number = max(self.tick_number, 0 if tick is None else tick - 1)
             self.counters.missed_ticks = self.watching.missed
-            self.watching.tell()
+            self.watching.tell_cycle()
+        if self.supervision is not None:
+            try:
+                self.supervision.look()
+            except PlantError as error:
+                self._failed = error
+            self.counters.missed_ticks = self.supervision.missed
         if self.now >= self._next_timeout:
             try:
                 self._watch_time()
@@ -331,16 +336,17 @@ class Controller(WholeRobot):
         Args:
             wrench: Whether to compute the wrench at the tool, which takes a third of a tick.
         """
-        estimated, watching = wrench and self.watching is None, self.watching
+        said = self.watching or self.supervision
+        estimated = wrench and said is None
         io = self.peripherals.io(
             self.tick_number + 1,
             self._payload.payload,
-            self.motion.motions.wanted_speed,
+            self.motion.motions.asked_speed,
             self.programs,
             self.forces.wrench() if estimated else None,
             None if self._payload.assumed == self._payload.payload else self._payload.assumed,
         )
-        return io if watching is None else watching.io(io, force=wrench)
+        return io if said is None else said.io(io, force=wrench)
 
     def changed_io(self) -> Io | None:
         """Return inputs, outputs and registers before a tick, if they changed since the last call; else None."""
@@ -388,6 +394,15 @@ class Controller(WholeRobot):
         """End the activities that need control, when no client has control any more."""
         self.programs.end(why)
         self.motion.interrupt(why)
+
+    def _own_controller(self, plant: Plant | None) -> tuple[Watching | None, Supervision | None]:
+        """Return what follows a robot's own controller; see `watching` and `supervision`."""
+        tools, set_tcp = self.peripherals, self._reporter.set_tcp
+        if isinstance(plant, Watched):
+            return Watching(plant, self.cycle, self.modes, tools, set_tcp, self._emit), None
+        if isinstance(plant, Supervised):
+            return None, Supervision(plant, self.motion, self._safety, tools, tools.set_tcp, self._emit)
+        return None, None
 
     def _access(self, guidance: Guidance) -> Access:
         """What programs may use of the robot."""

@@ -72,6 +72,8 @@ class Setup:
     """What stands around the robot; None for nothing."""
     adapt: Adapt | None = None
     """What follows the arm's own motions: its payload; None for nothing."""
+    positions: bool = False
+    """Whether the arm's own controller takes positions only, so that no torque can be fed forward."""
     instance: str = ""
     """Part of every lease's token that tells this run from earlier ones; empty where equal runs must be equal."""
 
@@ -152,10 +154,12 @@ class Setup:
         """
         if plant is None or isinstance(plant, Placeable):
             return self
-        description = plant.described() if isinstance(plant, Supervised) else self.description
-        return replace(
-            self, q=tuple(measured_standing(plant, len(self.q)).q.tolist()), description=description
-        )
+        stands = replace(self, q=tuple(measured_standing(plant, len(self.q)).q.tolist()))
+        if not isinstance(plant, Supervised):
+            return stands
+        told = plant.payload
+        payload = Payload(mass=told.mass, com=told.com, inertia=told.inertia)
+        return replace(stands, description=plant.described(), payload=payload, carried=None, positions=True)
 
     def to_builtins(self) -> dict[str, Any]:
         """Convert the setup to maps and lists for a recording."""

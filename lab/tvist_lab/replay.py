@@ -152,6 +152,11 @@ def _same_plant(start: dict[str, Any], given: OwnPlant | None) -> tuple[OwnPlant
         return None, []
     if given is None and recorded.place in VARIANTS:
         return load_plant(recorded.place), []
+    if recorded.place.lower().startswith("ur://"):
+        raise ReplayError(
+            f"the robot was the one at {recorded.place}: what a real arm did is not determined by what the controller "
+            "received, so that it cannot be replayed. Next: tvist log replay --publish shows the recording"
+        )
     if given is None:
         raise ReplayError(
             f"the robot was served with the plant {recorded.place}, which the recording does not contain: give "

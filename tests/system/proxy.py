@@ -19,9 +19,10 @@ class Proxy:
 
     Args:
         target: The robot's endpoint, `tcp/<host>:<port>`.
+        address: Where it listens: IP address and port; None for a free port of 127.0.0.1.
     """
 
-    def __init__(self, target):
+    def __init__(self, target, address=None):
         host, port = target.partition("/")[2].split(":")
         self._target = (host, int(port))
         self._flowing = threading.Event()
@@ -29,7 +30,7 @@ class Proxy:
         self._lock = threading.Lock()
         self._sockets = set()
         self._interface = None
-        self._port = free_port()
+        self._address = address or ("127.0.0.1", free_port())
         self.delay = 0.0
         """How long a byte takes each way [s]."""
         self.rate = None
@@ -40,7 +41,7 @@ class Proxy:
 
     @property
     def endpoint(self):
-        return f"tcp/127.0.0.1:{self._port}"
+        return "tcp/{}:{}".format(*self._address)
 
     def __enter__(self):
         return self
@@ -65,7 +66,7 @@ class Proxy:
         """Take connections again, at the same place."""
         interface = socket.socket()
         interface.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        interface.bind(("127.0.0.1", self._port))
+        interface.bind(self._address)
         interface.listen()
         self._interface = interface
         threading.Thread(target=self._accept, args=(interface,), daemon=True).start()

@@ -16,15 +16,16 @@ class RtdeLink(Proxy):
     Args:
         target: The robot's endpoint.
         seed: Seed of what is lost and repeated.
+        address: See `Proxy`.
     """
 
-    def __init__(self, target, seed=0):
+    def __init__(self, target, seed=0, address=None):
         self._random = random.Random(seed)
         self.sent, self.passed = [], []
         """Kinds of the packages that the reader has sent; timestamps of the rows of each connection that has passed."""
         self.slow, self.lost, self.repeated = False, 0.0, 0.0
         """Whether the robot is of 125 Hz, and the shares of the rows that are lost and repeated."""
-        super().__init__(target)
+        super().__init__(target, address)
 
     @property
     def delay(self):

@@ -43,8 +43,8 @@ class Mailbox:
         patience: Returns how long a step may wait for a socket that a program reads [s].
         pace: Waits until the arm begins its next tick, at most the time that it is given [s], and returns whether it
             has; None if a clock gives the tick.
-        interval: Time between two ticks of a robot that is watched, which counts those that it misses [s]; None if this
-            server moves it.
+        interval: Time between two ticks of an arm that counts by its own clock those that are missing [s]; None if it
+            has none.
     """
 
     def __init__(

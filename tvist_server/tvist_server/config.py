@@ -31,6 +31,9 @@ from tvist_server.watching.watched_robot import WatchedRobot
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_NAME = "ur5e"
+SPEED_CAP = 0.5
+"""Largest speed of a robot that is moved, unless another is given [rad/s]."""
+_REAL = ("enable_motion", "speed_cap", "tcp")
 T = TypeVar("T")
 
 
@@ -96,10 +99,11 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     a plant. ur://ADDRESS[:PORT] only watches a robot of UR's through its RTDE interface: its state becomes ours, and
     nothing moves it from here without --enable-motion."""
     enable_motion: bool = False
-    """Move the robot at ur://ADDRESS: a program on its controller follows this robot's set-points. Read docs first."""
-    speed_cap: Annotated[float, Meta(ge=0.05, le=3.2)] = 0.5
-    """With --enable-motion: largest speed of every joint in rad/s, for moves, streams and programs alike. The limits of
-    the robot file and of the robot itself hold as well."""
+    """Move the robot at ur://ADDRESS, which is in remote control: a program on its controller follows the set-points of
+    this one. Read docs/how-to/move-a-real-arm.md before: whoever gives this option answers for what moves."""
+    speed_cap: Annotated[float, Meta(ge=0.05, le=3.2)] | None = None
+    """With --enable-motion: largest speed of every joint in rad/s, for moves, streams and programs alike; the limits of
+    the robot file and of the robot itself hold as well [0.5]."""
     tcp: tuple[float, float, float, float, float, float] | None = None
     """With --enable-motion: tool centre point that the robot has to have, x,y,z in m and rotation vector rx,ry,rz in
     rad in the flange frame; another one is refused [any: the robot's is taken over]."""
@@ -311,8 +315,10 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             profile = PLAIN if chosen is None else PROFILES[chosen]
             real = self.plant is not None and is_place(self.plant)
             watched = real and not self.enable_motion
-            if watched:
-                self._check_watched()
+            if real:
+                self._check_real()
+            elif given := [name for name in _REAL if getattr(self, name)]:
+                raise ValueError(f"{given[0]} is for a robot of UR's: give --plant ur://ADDRESS, too")
             calibration = calibration_for(self.calibration, description)
             cell = None if self.cell is None else read_cell(self.cell)
             setup = Setup(
@@ -347,22 +353,26 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 raise ConfigError(f"{error}: give --overload to insist") from error
         return setup
 
-    def _check_watched(self) -> None:
-        """Check that nothing is asked of a robot that is only watched.
+    def _check_real(self) -> None:
+        """Check that nothing is asked of a robot of UR's that it cannot do.
 
         Raises:
             ValueError: It is.
         """
         given = {
-            "shaper": self.shaper, "adapt": self.adapt, "learn": self.learn, "cell": self.cell, "state": self.state,
-            "start": self.start, "shape_servo": self.shape_servo or None, "truth": self.truth or None,
+            "adapt": self.adapt, "cell": self.cell, "state": self.state, "truth": self.truth or None,
             "robots": self.robots,
         }  # fmt: skip
+        what = "only knows what its own controller tells"
+        if not self.enable_motion:
+            given |= {
+                "shaper": self.shaper, "learn": self.learn, "start": self.start, "speed_cap": self.speed_cap,
+                "tcp": self.tcp, "shape_servo": self.shape_servo or None,
+            }  # fmt: skip
+            what = "is only watched"
         for name, value in given.items():
             if value is not None:
-                raise ValueError(
-                    f"{name} is {value}, but the robot at {self.plant} is only watched: leave {name} out"
-                )
+                raise ValueError(f"{name} is {value}, but the robot at {self.plant} {what}: leave {name} out")
 
     def _plant(self, place: str, description: RobotDescription) -> OwnPlant:
         """Find a plant: the robot at an address, or what `load_plant` finds.
@@ -379,7 +389,13 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             return OwnPlant(
                 str(where),
                 "",
-                partial(MovedRobot, where, speed_cap=self.speed_cap, tool=self.tcp, start=start),
+                partial(
+                    MovedRobot,
+                    where,
+                    speed_cap=_either(self.speed_cap, SPEED_CAP),
+                    tool=self.tcp,
+                    start=start,
+                ),
             )
         return OwnPlant(str(where), "", partial(WatchedRobot, where))
 

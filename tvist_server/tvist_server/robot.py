@@ -14,7 +14,7 @@ from tvist_controller.host import Host
 from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.reporting.sink import Sink
 from tvist_controller.setup import Setup
-from tvist_plant.plant import Pacing, Truthful, Watched
+from tvist_plant.plant import PERIOD, Pacing, Supervised, Truthful, Watched
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Refused, Reply
@@ -126,7 +126,11 @@ class ServedRobot:
             self._host,
             self.sockets.patience,
             plant.wait if isinstance(plant, Pacing) else None,
-            plant.interval() if isinstance(plant, Watched) else None,
+            plant.interval()
+            if isinstance(plant, Watched)
+            else PERIOD
+            if isinstance(plant, Supervised)
+            else None,
         )
         """The robot as seen by the clock."""
         self._plan_ahead = (
@@ -262,7 +266,7 @@ class ServedRobot:
         refused = reception.setpoints_refused + sum(gateway.setpoints_refused for gateway in gateways)
         on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0, 0.0)
         overload = self.driven.overload
-        left_out = 0 if self.driven.interval is None else counters.missed_ticks  # of a robot that is watched
+        left_out = 0 if controller.watching is None else counters.missed_ticks
         return Telemetry(
             tick=controller.tick_number,
             ticks_per_second=on_time.ticks / on_time.seconds,

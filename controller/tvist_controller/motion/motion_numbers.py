@@ -27,13 +27,19 @@ class Motions:
         self._reduced_velocity = REDUCED_SHARE * min(cycle.description.limits.velocity)
         self._started = 0
         self._running: RunningMotion | None = None
-        self.wanted_speed = 1.0
+        self.asked_speed = 1.0
         """Speed that was set [-]."""
+        self._scale = 1.0
 
     @property
     def running(self) -> bool:
         """Whether a motion is running."""
         return self._running is not None
+
+    @property
+    def wanted_speed(self) -> float:
+        """Speed that was set, as far as the robot's own slider lets it [-]."""
+        return self.asked_speed * self._scale
 
     @property
     def speed(self) -> float:
@@ -108,7 +114,12 @@ class Motions:
 
     def set_speed(self, fraction: float) -> None:
         """Scale the time of the running motion and of later ones."""
-        self.wanted_speed = fraction
+        self.asked_speed = fraction
+        self.keep_rate()
+
+    def scale(self, share: float) -> None:
+        """Scale that speed, too, by the slider of a robot that is moved through its own controller [-]."""
+        self._scale = share
         self.keep_rate()
 
     def keep_rate(self) -> None:

@@ -64,6 +64,7 @@ class FilterPlanner:
             raise ValueError(str(error)) from error
         if (
             self._modal is not None
+            and not setup.positions
             and wanted_modes("elastic-auto", 1, "shaper", self._known) <= self._modal.most
         ):
             ready = self.choose("elastic-auto", 1, self._modal, setup.payload)
@@ -153,6 +154,12 @@ class FilterPlanner:
             raise RefusalError("out_of_range", where, str(error)) from error
         if tvist.feed_forward == "rigid":
             return PlannedFilter(source, tvist, None, law)
+        if tvist.feed_forward == "elastic" and self._setup.positions:
+            why = (
+                f"{tvist.name} feeds torques forward, and this robot's controller takes positions only: choose one "
+                "that shapes positions, such as auto, auto-target, zv or elastic-position"
+            )
+            raise RefusalError("out_of_range", where, why)
         if known is None or known.calibration is None:
             why = f"{tvist.name} needs the arm's springs: identify them with tvist identify --model modal"
             raise RefusalError("out_of_range", where, why)

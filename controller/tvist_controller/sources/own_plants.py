@@ -98,6 +98,11 @@ def load_plant(place: str) -> OwnPlant:
     """
     if place in VARIANTS:
         return OwnPlant(place, "", VARIANTS[place])
+    if place.lower().startswith("ur://"):
+        raise OwnPlantError(
+            f"plant {place}: it is a real arm, which only tvist serve takes: it does not do the same again, so that "
+            "nothing can be replayed or compared with it"
+        )
     if is_file(place):
         own = run_file(place, "plant", OwnPlantError, _may_be_one)
         found, sha256 = own.found, own.sha256

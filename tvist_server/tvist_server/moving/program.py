@@ -132,7 +132,7 @@ def $name():
     number = number + 1
     if now - number > 2: # this program has missed a period: leave a set-point out
       number = number + 1
-    elif now == number and blind: # they come late: give them a period more
+    elif now == number and now > newest and blind: # they come late: give them a period more
       number = number - 1
     end
 
@@ -145,7 +145,7 @@ def $name():
     end
     newest = now
 
-    there = now >= number
+    there = why == $ended_not and now >= number
     if there:
       new = setpoint($SETPOINTS + 6 * (now - number))
       there = read_input_integer_register($NUMBER) == now # else the next package has come meanwhile

@@ -19,7 +19,7 @@ DECELERATION = 5.0
 """Deceleration of the fastest joint when the program brakes [rad/s²]."""
 BEGINS = 5.0
 """Longest time in which the program has to begin [s]."""
-TELL_EVERY = 1.0
+TELL_EVERY = 10.0
 """Shortest time between two sentences about set-points that did not come in time [s]."""
 
 

@@ -85,7 +85,16 @@ def _payload(row: Row) -> Payload | None:
     mass, com = row.get("payload"), row.get("payload_cog")
     if mass is None or com is None:
         return None
-    xx, yy, zz, xy, xz, yz = row.get("payload_inertia", (0.0,) * 6)
-    inertia = xx, xy, xz, yy, yz, zz
     x, y, z = com
+    inertia = _inertia(row)
     return Payload(mass=mass[0], com=(x, y, z), inertia=inertia if is_real_body(inertia) else (0.0,) * 6)
+
+
+def has_real_payload(row: Row) -> bool:
+    """Return whether a body may have the inertia that the robot was told; one that it does not say is none."""
+    return is_real_body(_inertia(row))
+
+
+def _inertia(row: Row) -> tuple[float, float, float, float, float, float]:
+    xx, yy, zz, xy, xz, yz = row.get("payload_inertia", (0.0,) * 6)
+    return xx, xy, xz, yy, yz, zz

@@ -19,7 +19,7 @@ from tvist_server.rtde.client import Row, RtdeClient
 from tvist_server.watching.connection import Connection, LostError, resolved
 from tvist_server.watching.place import Place
 from tvist_server.watching.row_count import RowCount
-from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, is_finite, sight_of
+from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, has_real_payload, is_finite, sight_of
 
 LOOKED_AT = 25
 """Number of rows from which the time between two is found."""
@@ -156,6 +156,11 @@ class WatchedRobot:
         if self._interval > 1:
             self._notes.append(
                 "125 rows a second show vibration up to 62.5 Hz: take what is above that from a sensor of your own"
+            )
+        if not has_real_payload(rows[-1]):
+            told = list(rows[-1]["payload_inertia"])
+            self._notes.append(
+                f"no body has the payload inertia {told} that it was told: it counts as 0; correct it at the robot"
             )
         if lacking:
             self._notes.append(f"its software does not tell {', '.join(lacking)}")
