@@ -53,6 +53,7 @@ def info_of(controller: Controller) -> Info:
             seed=calibration.provenance.seed,
             f_d_range=calibration.provenance.measured_f_d_range,
             zeta_range=calibration.provenance.measured_zeta_range,
+            shipped=calibration.name in available(),
         ),
         shaper=tvist.name,
         modes=tvist.estimator.modes,

@@ -71,6 +71,8 @@ class CalibrationInfo(Struct, frozen=True, kw_only=True, gc=False):
     """Smallest and largest damped frequency measured over the workspace [Hz]."""
     zeta_range: tuple[float, float]
     """Smallest and largest damping ratio measured over the workspace [-]."""
+    shipped: bool | None = None
+    """Whether it came with the server's package, measured on the simulated arm; null from older servers."""
 
 
 class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=False):

@@ -166,7 +166,8 @@ class Pilot:
 
     async def make_ready(self, arm: Arm) -> None:
         """Release what a client can release, and switch the power on; say what remains."""
-        await arm.inject("normal")
+        if (await self._robot.info()).moved is None:  # what a robot's own controller says is released there
+            await arm.inject("normal")
         await make_ready(self._robot, arm, power_on=True)
         found = await look(self._robot)
         if not found.ready:
