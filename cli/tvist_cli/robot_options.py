@@ -21,7 +21,7 @@ _BOXES = {
         "plant hidden cell payload overload adapt learn calibration shaper shape_servo quiet floor compensate_sag seed "
         "truth"
     ),
-    "Real arm": "enable_motion speed_cap tcp",
+    "Real arm": "enable_motion speed_cap tcp servo_lag",
     "Clock": "clock speed realtime_priority processor lock_memory",
     "Recording": "record keep dump",
     "Network": "listen connect namespace metrics security insecure",

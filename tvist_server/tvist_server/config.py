@@ -20,8 +20,9 @@ from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.cell_file import read_cell
 from tvist_server.durations import ticks_of
 from tvist_server.fleet import MOST, members
-from tvist_server.initial import calibration_for, posture, read_state, shaped_by
+from tvist_server.initial import calibration_for, numbers_of, posture, read_state, shaped_by
 from tvist_server.moving.moved_robot import MovedRobot
+from tvist_server.moving.servo_lag import ServoLag
 from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.temporary import temporary_folder
@@ -33,7 +34,9 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_NAME = "ur5e"
 SPEED_CAP = 0.5
 """Largest speed of a robot that is moved, unless another is given [rad/s]."""
-_REAL = ("enable_motion", "speed_cap", "tcp")
+_REAL = ("enable_motion", "speed_cap", "tcp", "servo_lag")
+MOST_LAG, LEAST_GAIN = 0.3, 50.0
+"""Largest time and smallest gain of a `servoj` that can be compensated [s, 1/s²]."""
 T = TypeVar("T")
 
 
@@ -104,9 +107,12 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     speed_cap: Annotated[float, Meta(ge=0.05, le=3.2)] | None = None
     """With --enable-motion: largest speed of every joint in rad/s, for moves, streams and programs alike; the limits of
     the robot file and of the robot itself hold as well [0.5]."""
-    tcp: tuple[float, float, float, float, float, float] | None = None
+    tcp: str | tuple[float, ...] | None = None
     """With --enable-motion: tool centre point that the robot has to have, x,y,z in m and rotation vector rx,ry,rz in
     rad in the flange frame; another one is refused [any: the robot's is taken over]."""
+    servo_lag: str | tuple[float, ...] | None = None
+    """With --enable-motion: lag of the robot's servoj, which set-points then make up for: T,k in s and 1/s², as
+    tvist identify --plant finds it, or simulated for a robot of tvist serve --ur [none]."""
     hidden: Seed | None = None
     """Simulate an arm that is not quite its file: springs, dampers, loops, rotors, friction and payload are drawn from
     this seed and told to nobody. With several robots, each further one uses the next."""
@@ -315,10 +321,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             profile = PLAIN if chosen is None else PROFILES[chosen]
             real = self.plant is not None and is_place(self.plant)
             watched = real and not self.enable_motion
-            if real:
-                self._check_real()
-            elif given := [name for name in _REAL if getattr(self, name)]:
-                raise ValueError(f"{given[0]} is for a robot of UR's: give --plant ur://ADDRESS, too")
+            self._check_real(real=real)
             calibration = calibration_for(self.calibration, description)
             cell = None if self.cell is None else read_cell(self.cell)
             setup = Setup(
@@ -353,24 +356,29 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 raise ConfigError(f"{error}: give --overload to insist") from error
         return setup
 
-    def _check_real(self) -> None:
-        """Check that nothing is asked of a robot of UR's that it cannot do.
+    def _check_real(self, *, real: bool) -> None:
+        """Check that nothing is asked of a robot of UR's that it cannot do, and that what is for one has one.
 
         Raises:
-            ValueError: It is.
+            ValueError: It is, or has none.
         """
-        given = {
+        if not real:
+            given = [name for name in _REAL if getattr(self, name)]
+            if given:
+                raise ValueError(f"{given[0]} is for a robot of UR's: give --plant ur://ADDRESS, too")
+            return
+        asked: dict[str, object] = {
             "adapt": self.adapt, "cell": self.cell, "state": self.state, "truth": self.truth or None,
             "robots": self.robots,
         }  # fmt: skip
         what = "only knows what its own controller tells"
         if not self.enable_motion:
-            given |= {
+            asked |= {
                 "shaper": self.shaper, "learn": self.learn, "start": self.start, "speed_cap": self.speed_cap,
-                "tcp": self.tcp, "shape_servo": self.shape_servo or None,
+                "tcp": self.tcp, "servo_lag": self.servo_lag, "shape_servo": self.shape_servo or None,
             }  # fmt: skip
             what = "is only watched"
-        for name, value in given.items():
+        for name, value in asked.items():
             if value is not None:
                 raise ValueError(f"{name} is {value}, but the robot at {self.plant} {what}: leave {name} out")
 
@@ -393,11 +401,28 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                     MovedRobot,
                     where,
                     speed_cap=_either(self.speed_cap, SPEED_CAP),
-                    tool=self.tcp,
+                    tool=None if self.tcp is None else numbers_of("tcp", self.tcp, 6),
+                    lag=self._lag(),
                     start=start,
                 ),
             )
         return OwnPlant(str(where), "", partial(WatchedRobot, where))
+
+    def _lag(self) -> ServoLag | None:
+        """Return the lag of a robot that is moved.
+
+        Raises:
+            ValueError: It is none.
+        """
+        if self.servo_lag is None or self.servo_lag == "simulated":
+            return None if self.servo_lag is None else ServoLag.simulated()
+        time, gain = numbers_of("servo_lag", self.servo_lag, 2)
+        if not (0.0 <= time <= MOST_LAG and gain >= LEAST_GAIN):
+            raise ValueError(
+                f"servo_lag is {time:g},{gain:g}: must be a time from 0 to {MOST_LAG:g} s and a gain of {LEAST_GAIN:g} "
+                "1/s² or more"
+            )
+        return ServoLag(time, gain)
 
     @property
     def profile_in_force(self) -> ProfileName | None:

@@ -1,5 +1,6 @@
 """The initial state of a robot, read from a file with the fields of `simulation.reset`."""
 
+import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -144,3 +145,18 @@ def posture(start: str | tuple[float, ...], description: RobotDescription) -> tu
         raise ValueError(
             f"start is {start.strip()!r}: must be one of {known}, or angles separated by commas"
         ) from None
+
+
+def numbers_of(name: str, given: str | tuple[float, ...], count: int) -> tuple[float, ...]:
+    """Return the numbers of an option, given as such or separated by commas.
+
+    Raises:
+        ValueError: They are not as many, or not finite.
+    """
+    try:
+        numbers = tuple(map(float, given.split(",") if isinstance(given, str) else given))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{name} is {given!r}: must be {count} numbers, separated by commas")
+    return numbers

@@ -8,6 +8,7 @@ import numpy as np
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, PlantError, Sight
+from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_server.moving.commanded_robot import CommandedRobot
 from tvist_server.moving.configuration import configuration_of, narrowed
 from tvist_server.moving.dashboard import asked
@@ -15,6 +16,7 @@ from tvist_server.moving.halts import SILENT
 from tvist_server.moving.pace import Pace
 from tvist_server.moving.ports import ports_of
 from tvist_server.moving.run import Run
+from tvist_server.moving.servo_lag import ServoLag
 from tvist_server.moving.start_checks import (
     QUESTIONS,
     Wanted,
@@ -39,6 +41,7 @@ class MovedRobot:
         speed_cap: Largest speed of every joint [rad/s].
         tool: Tool centre point that it should have been told; None for any.
         start: Where it should stand [rad]; None for anywhere.
+        lag: Lag of its `servoj`, to be compensated; None if it is not known.
 
     Raises:
         PlantError: It may not be moved; the message says why, and what to do.
@@ -53,6 +56,7 @@ class MovedRobot:
         speed_cap: float,
         tool: tuple[float, ...] | None = None,
         start: tuple[float, ...] | None = None,
+        lag: ServoLag | None = None,
     ) -> None:
         self._robot = CommandedRobot(place, description, payload)
         self._place, self._ports = place, ports_of(place)
@@ -75,9 +79,11 @@ class MovedRobot:
             port = self._ports.dashboard.port
             self._told.append(f"its port {port} answers nothing: model and remote control were not checked")
         self._pace, self._number = Pace(), int(time.time()) % NUMBERS
-        self._held = False
+        self._held, self._lag = False, lag
         self._run: Run | None = None
         self._halt: Halt | None = None
+        self._left_paused = False
+        """Whether our program is paused there by a safety stop, so that it may be replaced."""
 
     def _refuse_if(self, trouble: str | None) -> None:
         if trouble is not None:
@@ -98,14 +104,15 @@ class MovedRobot:
         """Return where its own controller holds it, if it may be moved from there."""
         run = self._run
         if run is None or not run.ready:
-            self._refuse_if(state_trouble(self._wanted, self._sight, may_play=run is not None))
+            may_play = run is not None or self._left_paused
+            self._refuse_if(state_trouble(self._wanted, self._sight, may_play=may_play))
         last = None if run is None else run.last
         return self._measured(last or self._robot.newest["target_q"])
 
     def step(self, command: DriveCommand) -> Measurement:
         """Write a set-point, and return the latest measurements; of several periods at once only the last writes."""
         if self._run is not None:
-            self._run.add(command.q)
+            self._run.add(command)
             if not self._pace.owed:
                 self._run.write()
         return self._measured(self._sight.measured.q)
@@ -145,8 +152,9 @@ class MovedRobot:
             return False
         if self._held and self._run is None:
             self._number += 1
-            speed = max(self._wanted.description.limits.velocity)
-            self._run = Run(self._robot, self._ports, self._number, speed)
+            limits = self._wanted.description.limits
+            self._run = Run(self._robot, self._ports, self._number, limits, self._lag)
+        self._left_paused &= sight.modes[2] in {RuntimeState.PAUSING, RuntimeState.PAUSED}
         if self._run is not None:
             told = self._run.take(sight)
             self._told += [] if told is None else [told]
@@ -179,4 +187,5 @@ class MovedRobot:
 
     def _let_go(self, halt: Halt) -> None:
         self.stop()
+        self._left_paused = halt.safety_mode not in {SafetyMode.NORMAL, SafetyMode.UNDEFINED}
         self._halt = Halt(f"the robot at {self._place} does not follow: {halt.why}", halt.safety_mode)

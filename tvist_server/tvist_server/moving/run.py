@@ -2,21 +2,26 @@
 
 import time
 
-from tvist_plant.model import Floats
+import numpy as np
+
+from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import Halt, Sight
+from tvist_plant.robot_tables import ArmLimits
 from tvist_protocol.modes import RuntimeState
 from tvist_server.moving.commanded_robot import CommandedRobot
 from tvist_server.moving.halts import halt_by_modes, halt_by_program
 from tvist_server.moving.ports import Ports
 from tvist_server.moving.program import program
 from tvist_server.moving.registers import ALONE, ENDED, INPUTS, LEFT_OUT, RUN, STATE, Order, State
+from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
 from tvist_server.moving.upload import Upload
 from tvist_server.moving.window import Window
 
-LOOKAHEAD, GAIN = 0.03, 2000.0
-"""Parameters of `servoj` with which the arm follows most closely [s, -]."""
 DECELERATION = 5.0
 """Deceleration of the fastest joint when the program brakes [rad/s²]."""
+SETTLES = 25
+"""Number of rows of the waiting program after which it gets the first set-point: what its start has delayed has come
+by then, since it ends when numbers come faster than it counts."""
 BEGINS = 5.0
 """Longest time in which the program has to begin [s]."""
 TELL_EVERY = 10.0
@@ -30,12 +35,18 @@ class Run:
         robot: The robot, which is connected.
         ports: Its interfaces.
         number: Number of the run.
-        speed: Fastest set-points [rad/s].
+        limits: Limits of the robot.
+        lag: Lag of its `servoj`; None if it is not known.
     """
 
-    def __init__(self, robot: CommandedRobot, ports: Ports, number: int, speed: float) -> None:
+    def __init__(
+        self, robot: CommandedRobot, ports: Ports, number: int, limits: ArmLimits, lag: ServoLag | None
+    ) -> None:
         self._robot, self._number, self._window = robot, number, Window()
+        stands, speed = np.array(robot.newest["target_q"]), max(limits.velocity)
+        self._setpoints = Setpoints(stands, lag, fastest=speed, reach=np.array(limits.position))
         self._begun, self._plays = time.monotonic(), False
+        self._waiting, self._settled = False, 0
         self.ready = False
         """Whether the program follows."""
         self.halt: Halt | None = None
@@ -50,10 +61,14 @@ class Run:
         """The newest set-point [rad]; None before the first."""
         return self._window.values(Order.FOLLOW)[2:8] if self._window.number else None
 
-    def add(self, q: Floats) -> None:
-        """Add the next set-point, shape (6,) [rad], once the program follows."""
+    def add(self, command: DriveCommand) -> None:
+        """Add the next set-point; until the program follows, where the robot stands."""
         if self.ready:
-            self._window.add(q.tolist())
+            self._window.add(self._setpoints.next(command).tolist())
+        elif self._waiting and self._settled > SETTLES:
+            stands = self._robot.newest["target_q"] if self.last is None else self.last
+            self._setpoints.begin(np.array(stands))
+            self._window.add(stands)
 
     def write(self, order: Order = Order.FOLLOW) -> None:
         """Write the newest set-points."""
@@ -64,7 +79,7 @@ class Run:
         """Let the program brake and end."""
         self.write(Order.END)
         self._upload.close()
-        self.ready = False
+        self._waiting = self.ready = False
 
     def take(self, sight: Sight) -> str | None:
         """See by a row what has become of the program; return what people should know."""
@@ -84,9 +99,9 @@ class Run:
                 self.halt = Halt(f"{why}, then power on here", sight.modes[1])
             return None
         self.halt = self.halt or halt_by_program(ended, sight.modes)
-        if state == State.WAITING:
-            self._window.add(self.last or self._robot.newest["target_q"])
         self.ready = state == State.FOLLOWING and self.halt is None
+        self._waiting = state == State.WAITING and self.halt is None
+        self._settled += state == State.WAITING
         return self._tell_missed((missed[0], missed[1]))
 
     def _tell_missed(self, missed: tuple[int, int]) -> str | None:
