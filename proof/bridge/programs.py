@@ -4,14 +4,18 @@ import asyncio
 import os
 import sys
 import tempfile
+from asyncio.subprocess import DEVNULL, PIPE, STDOUT
 from collections.abc import Callable, Sequence
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from proof.bridge.ring import CLOSE, WINDOW_S, Stop, apart, compared, noise_of, stops
+from tvist_client.errors import ClientError
+from tvist_client.readiness import look
 from tvist_client.robot import Robot
+from tvist_client.unlock import make_ready
 from tvist_lab.identification.modal import identify_modal
 from tvist_lab.identification.modal_plan import ModalPlan, jog_of
 from tvist_lab.in_process import free_setup, robot_in_process
@@ -19,6 +23,8 @@ from tvist_lab.recordings.mcap_file import read
 from tvist_lab.served import served
 from tvist_plant.description import load
 from tvist_protocol.calibration import calibration_to_json
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.stream import Event
 
 OURS = {
     **{
@@ -33,6 +39,10 @@ PATIENCE_S = 120.0
 """Longest time of a program [s]."""
 CAP = "3.2"
 """Speed cap of the bridge [rad/s]: a lower one would slow the programs down, and make less ring by that alone."""
+TRIES = 5
+"""How often the bridge tries to hold the robot before a program."""
+TOLD = {"protective_stop", "safety_stop", "stream_stopped", "warning"}
+"""Events of whom a program talks to that are reported if it does not run through."""
 REST_S = 1.0
 """Rest before the first program, which shows the sensor's noise [s]."""
 HEARD = 2.0
@@ -164,52 +174,41 @@ async def _run(
 ) -> dict[str, Ran]:
     """Run all programs, on the robot itself if there is no shaper."""
     shaping = ["--shaper", shaper, "--shape-servo", "--calibration", str(calibration)] if shaper else []
+    robot_is = f"--robot {ways.robot} --profile real --ur"
+    hidden = f"{robot_is} --ur-address {_address(1)} --hidden {ways.hidden} --seed {ways.seed} --record {file}"
+    own = shaping if inside and shaper else ["--shaper", "none"]
     async with AsyncExitStack() as stack:
-        at = _address(1)
-        hidden = [
-            "--robot",
-            ways.robot,
-            "--hidden",
-            str(ways.hidden),
-            "--seed",
-            str(ways.seed),
-            "--profile",
-            "real",
-        ]
-        own = shaping if inside and shaper else ["--shaper", "none"]
-        told = ["--record", str(file)]
-        robot = await stack.enter_async_context(
-            served([*hidden, *own, *told, "--ur", "--ur-address", at], ways.robot)
-        )
-        to, name = robot, ways.robot
+        robot = await stack.enter_async_context(served([*hidden.split(), *own], ways.robot))
+        to, name, address = robot, ways.robot, _address(1)
         if shaper and not inside:
-            name, bridge = "bridge", _address(2)
-            plant = [
-                "--plant",
-                f"ur://{at}",
-                "--enable-motion",
-                "--speed-cap",
-                CAP,
-                "--robot",
-                ways.robot,
-                "--profile",
-                "real",
-            ]
-            to = await stack.enter_async_context(
-                served([*plant, *shaping, "--ur", "--ur-address", bridge], name)
-            )
-            at = bridge
-        words = {"address": at, "endpoint": to.endpoint, "name": name, "seed": str(ways.seed)}
+            name, address = "bridge", _address(2)
+            bridge = f"{robot_is} --ur-address {address} --plant ur://{_address(1)} --enable-motion --speed-cap {CAP}"
+            to = await stack.enter_async_context(served([*bridge.split(), *shaping], name))
+        words = {"address": address, "endpoint": to.endpoint, "name": name, "seed": str(ways.seed)}
         await asyncio.sleep(REST_S)
         ran = {}
         for program in ways.programs:
             tell(f"  {program}")
-            ran[program] = await _ran(program, words, ways, robot.robot)
+            if to is not robot:
+                await _held(to.robot, tell)
+            ran[program] = await _ran(program, words, ways, robot.robot, to.robot)
         return ran
 
 
-async def _ran(program: str, words: dict[str, str], ways: Ways, robot: Robot) -> Ran:
-    """Run a program to its end."""
+async def _held(bridge: Robot, tell: Callable[[str], None]) -> None:
+    """See that the bridge holds the robot."""
+    for _ in range(TRIES):
+        if (found := await look(bridge)).ready:
+            return
+        tell(f"  {found.sentence}")
+        async with bridge.control("proof") as arm:
+            with suppress(RefusedError, ClientError):
+                await make_ready(bridge, arm, power_on=True)
+        await asyncio.sleep(REST_S)
+
+
+async def _ran(program: str, words: dict[str, str], ways: Ways, robot: Robot, to: Robot) -> Ran:
+    """Run a program to its end, and listen to whom it talks to."""
     folder = None
     if program == URCL:
         assert ways.urcl is not None
@@ -218,21 +217,22 @@ async def _ran(program: str, words: dict[str, str], ways: Ways, robot: Robot) ->
     else:
         module, *given = OURS[program]
         command = [sys.executable, "-m", module, *(one.format(**words) for one in given)]
+    events: list[Event] = []
+    forget = to.on_event(events.append)
     begun = (await robot.info()).tick
     process = await asyncio.create_subprocess_exec(
-        *command,
-        cwd=folder,
-        stdin=asyncio.subprocess.DEVNULL,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.STDOUT,
+        *command, cwd=folder, stdin=DEVNULL, stdout=PIPE, stderr=STDOUT
     )
     try:
-        said, _ = await asyncio.wait_for(process.communicate(), PATIENCE_S)
+        printed, _ = await asyncio.wait_for(process.communicate(), PATIENCE_S)
+        said, code = printed.decode(errors="replace")[-2000:], process.returncode
     except TimeoutError:
         process.kill()
-        return Ran(None, "", (begun, (await robot.info()).tick))
+        said, code = "", None
     await asyncio.sleep(WINDOW_S)
-    return Ran(process.returncode, said.decode(errors="replace")[-2000:], (begun, (await robot.info()).tick))
+    forget()
+    told = "".join(f"{event.kind}: {event.why}\n" for event in events if event.kind in TOLD)
+    return Ran(code, told + said, (begun, (await robot.info()).tick))
 
 
 def _address(last: int) -> str:
