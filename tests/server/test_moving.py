@@ -1,0 +1,226 @@
+"""What a robot is moved by, without a socket or a clock: inputs that are claimed, start checks, reasons and periods."""
+
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.controller.robots import UR5E, Robot
+
+from tvist_controller.instruments.snapshot import Instruments
+from tvist_controller.line.kinematics import ForwardKinematics
+from tvist_plant.description import Payload, load
+from tvist_plant.plant import Measurement, Sight
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_server.gateways.ur.primary.packages import robot_state
+from tvist_server.moving.configuration import Configuration, found, narrowed
+from tvist_server.moving.halts import halt_by_modes, halt_by_program
+from tvist_server.moving.pace import MOST, SILENT, Pace
+from tvist_server.moving.ports import ports_of
+from tvist_server.moving.registers import Ended
+from tvist_server.moving.start_checks import (
+    Wanted,
+    answers_trouble,
+    mounting_trouble,
+    state_trouble,
+    tells_gravity,
+)
+from tvist_server.rtde.client import RtdeError
+from tvist_server.rtde.codec import PackageKind, package
+from tvist_server.rtde.commanding import CommandingClient
+from tvist_server.rtde.wire import Wire
+from tvist_server.watching.place import place_of
+
+Q = np.array([0.3, -1.2, 1.5, -1.8, -1.5, 0.2])
+GOOD = Sight(
+    1, Measurement(Q, np.zeros(6), np.zeros(6), np.zeros(3)), np.array([Q, *np.zeros((3, 6))]),
+    (RobotMode.RUNNING, SafetyMode.NORMAL, RuntimeState.STOPPED), 1.0, 0,
+    payload=Payload(mass=5.0), tool=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0),
+)  # fmt: skip
+WANTED = Wanted(UR5E, Payload(mass=5.0))
+
+
+def client():
+    return CommandingClient({"timestamp": Wire.DOUBLE}, {}, {"n": Wire.INT32, "q": Wire.DOUBLE})
+
+
+def set_up(commanding, types):
+    answers = [
+        (PackageKind.REQUEST_PROTOCOL_VERSION, b"\x01"),
+        (PackageKind.GET_URCONTROL_VERSION, struct.pack(">4I", 5, 22, 0, 1)),
+        (PackageKind.SETUP_OUTPUTS, b"\x01DOUBLE"),
+        (PackageKind.SETUP_INPUTS, b"\x07" + types),
+    ]
+    return [commanding.receive(package(*answer)).send for answer in answers]
+
+
+def test_inputs_are_claimed_before_the_start_and_written_in_their_order():
+    commanding = client()
+    *_, claim, start = set_up(commanding, b"INT32,DOUBLE")
+    assert claim == package(PackageKind.SETUP_INPUTS, b"n,q")
+    assert start == package(PackageKind.START)
+    assert commanding.write((3, 0.5)) == package(PackageKind.DATA, b"\x07" + struct.pack(">id", 3, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("types", "words"),
+    [
+        (b"IN_USE,DOUBLE", "another client holds its inputs n to n"),
+        (b"NOT_FOUND,NOT_FOUND", "does not know its inputs n to q"),
+        (b"DOUBLE,DOUBLE", "input n is not of type INT32"),
+        (b"INT32", "1 types for 2 inputs"),
+    ],
+)
+def test_inputs_that_are_not_ours_are_told(types, words):
+    with pytest.raises(RtdeError, match=words):
+        set_up(client(), types)
+
+
+@pytest.fixture(scope="module")
+def sent():
+    """What our own robot sends on its primary interface."""
+    controller = Robot().controller
+    return robot_state(UR5E, Instruments(UR5E).snapshot(controller.latest, controller.io()))
+
+
+def test_the_configuration_of_our_own_robots_is_that_of_their_file(sent):
+    own = found(sent)
+    assert own.is_of(UR5E)
+    assert not own.is_of(load("ur10e"))
+    for name in ("velocity", "acceleration"):
+        assert getattr(own, name) == pytest.approx(getattr(UR5E.limits, name))
+    assert own.most == pytest.approx(UR5E.limits.position)
+    assert own.least == pytest.approx(-own.most)
+
+
+@given(st.integers(0, 1385), st.binary(max_size=40))
+def test_a_configuration_that_is_cut_or_comes_after_others_is_found_once_it_is_whole(sent, cut, other):
+    message = struct.pack(">iB", 5 + len(other), 20) + other
+    assert found(message + sent) is not None
+    assert found(message + sent[:cut]) is None
+
+
+@given(st.binary(max_size=200))
+def test_what_is_no_configuration_is_none(data):
+    assert found(data) is None
+
+
+@given(st.floats(0.05, 3.2), st.lists(st.floats(0.1, 6.0), min_size=24, max_size=24))
+def test_limits_are_no_wider_than_any_of_robot_file_robot_and_cap(cap, own):
+    least, most, velocity, acceleration = np.array(own).reshape(4, 6)
+    robot = Configuration(-least, most, velocity, acceleration, *np.zeros((3, 6)))
+    limits, file = narrowed(UR5E, robot, cap).limits, UR5E.limits
+    for j in range(6):
+        assert limits.position[j] == min(file.position[j], least[j], most[j])
+        assert limits.velocity[j] == min(file.velocity[j], velocity[j], cap)
+        assert limits.acceleration[j] == min(file.acceleration[j], acceleration[j])
+    assert narrowed(UR5E, None, cap).limits.position == file.position
+
+
+def turned(joint, by, target=Q):
+    q = target.copy()
+    q[joint] += by
+    return q
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"modes": (RobotMode.POWER_OFF, SafetyMode.NORMAL, 1)}, "mode is POWER_OFF: switch it on"),
+        ({"modes": (RobotMode.RUNNING, SafetyMode.REDUCED, 1)}, "safety mode is REDUCED"),
+        ({"modes": (RobotMode.RUNNING, 77, 1)}, "safety mode is 77"),
+        ({"modes": (RobotMode.RUNNING, SafetyMode.NORMAL, RuntimeState.PLAYING)}, "a program runs on it"),
+        ({"modes": (RobotMode.DISCONNECTED, SafetyMode.NORMAL, 1)}, "not connected"),
+        ({"target": np.array([Q, turned(2, 0.1, np.zeros(6)), *np.zeros((2, 6))])}, "it moves"),
+        ({"target": np.array([turned(3, 0.011), *np.zeros((3, 6))])}, "joint 3 is 0.011 rad from where"),
+        ({"payload": Payload(mass=4.9)}, "payload of 4.9 kg, and here it is 5 kg"),
+    ],
+)
+def test_a_robot_that_may_not_be_moved_says_why_and_what_to_do(changes, words):
+    assert state_trouble(WANTED, GOOD) is None
+    assert words in state_trouble(WANTED, replace(GOOD, **changes))
+
+
+def test_what_is_said_here_has_to_be_so_there():
+    assert "--start says" in state_trouble(WANTED._replace(q=tuple(turned(1, 0.02))), GOOD)
+    assert state_trouble(WANTED._replace(q=tuple(turned(1, 0.009))), GOOD) is None
+    assert "--tcp says 0,0,0.2" in state_trouble(WANTED._replace(tool=(0.0, 0.0, 0.2, 0.0, 0.0, 0.0)), GOOD)
+    assert state_trouble(WANTED._replace(tool=GOOD.tool), GOOD) is None
+    limited = WANTED._replace(description=narrowed(UR5E, Configuration(*np.full((7, 6), 1.0)), 0.5))
+    assert "beyond" in state_trouble(limited, GOOD)
+
+
+def test_interfaces_that_lack_a_question_leave_it_open(sent):
+    own = found(sent)
+    assert answers_trouble(WANTED, {}, None) is None
+    assert answers_trouble(WANTED, {"get robot model": "UR5", "is in remote control": "true"}, own) is None
+    assert "it is a UR10" in answers_trouble(WANTED, {"get robot model": "UR10"}, own)
+    assert "local control" in answers_trouble(WANTED, {"is in remote control": "false"}, own)
+    other = WANTED._replace(description=load("ur10e"))
+    assert "dimensions are not those of a UR10e" in answers_trouble(other, {}, own)
+
+
+@pytest.mark.parametrize(
+    ("leaning", "told"), [(0.0, False), (0.1, False), (0.2, True), (np.pi / 2, True), (np.pi, True)]
+)
+def test_a_robot_that_is_mounted_otherwise_is_told_by_its_accelerometer(leaning, told):
+    pose, _ = ForwardKinematics(UR5E).tool(Q, np.zeros(6))
+    up = 9.6 * np.array([np.sin(leaning), 0.0, np.cos(leaning)])
+    felt = pin.exp3(np.array(pose[3:])).T @ up
+    assert tells_gravity(felt)
+    assert (mounting_trouble(UR5E, Q, felt) is not None) == told
+    assert not tells_gravity(np.zeros(3))
+
+
+def test_each_stop_of_the_robot_has_a_reason_of_its_own():
+    playing = RobotMode.RUNNING, SafetyMode.NORMAL, RuntimeState.PLAYING
+    assert halt_by_modes(playing) is None
+    assert halt_by_program(Ended.NOT, playing) is None
+    reasons = {halt_by_program(ended, playing).why for ended in Ended if ended}
+    reasons |= {halt_by_program(Ended.NOT, (7, 1, runtime)).why for runtime in (1, 4)}
+    reasons |= {halt_by_modes((7, safety, 1)).why for safety in SafetyMode if safety not in {1, 2}}
+    reasons |= {halt_by_modes((mode, 1, 1)).why for mode in RobotMode if mode != 7}
+    assert len(reasons) == len(Ended) - 1 + 2 + len(SafetyMode) - 2 + len(RobotMode) - 1
+    assert all("here" in why for why in reasons)
+    assert halt_by_modes((7, 3, 4)).safety_mode == SafetyMode.PROTECTIVE_STOP
+
+
+@given(st.lists(st.tuples(st.integers(0, 6), st.floats(0.0, 0.3)), max_size=60), st.sampled_from([1, 4]))
+def test_periods_are_those_of_the_robot_s_clock_or_of_ours_while_it_is_silent(gaps, interval):
+    """Rows come late and in bunches; each of the robot's periods is computed once, and none twice."""
+    pace, now, tick = Pace(), 10.0, 5000
+    pace.row(tick, now)
+    first = pace.tick
+    while pace.next(now):
+        pass
+    for missed, wait in gaps:
+        own, until = 0, now + wait
+        while now < until:
+            now = min(until, now + max(pace.until(now), 1e-4))
+            own += pace.next(now)
+        assert own == 0 or wait > SILENT
+        assert own <= max(0.0, wait - SILENT) / 0.002 + 3
+        tick += interval * (1 + missed)
+        before, begun = pace.tick, pace.row(tick, now)
+        assert begun == (tick > before)
+        while pace.next(now):
+            pass
+        assert pace.tick == max(tick, before)
+        assert pace.owed == 0
+    assert pace.tick >= first
+
+
+def test_time_that_was_long_away_is_not_made_up_for():
+    pace = Pace()
+    pace.row(1000, 0.0)
+    assert pace.row(1000 + MOST + 1, 0.01)
+    assert pace.owed == 0
+
+
+def test_other_ports_are_as_far_away_as_that_of_rtde():
+    dashboard, primary = ports_of(place_of("ur://robot:31004"))
+    assert (dashboard.port, primary.port) == (30999, 31001)
+    assert ports_of(place_of("ur://robot")).dashboard.port == 29999
