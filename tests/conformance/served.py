@@ -78,7 +78,7 @@ class Served:
     def wait_until_said(self, words):
         """Wait until it says something on stderr."""
         with self._news:
-            assert self._news.wait_for(lambda: words in self.said, 25.0), self.said
+            assert self._news.wait_for(lambda: words in self.said, PATIENCE), self.said
 
     @property
     def said(self):
