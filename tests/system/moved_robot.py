@@ -6,6 +6,7 @@ import socket
 import numpy as np
 from tests.conformance.served import Served
 from tests.system.proxy import Proxy
+from tests.system.rtde_link import RtdeLink
 
 DASHBOARD, PRIMARY, SECONDARY, RTDE = 29999, 30001, 30002, 30004
 
@@ -21,10 +22,13 @@ def a_bridge(host, *options):
 
 
 class Link:
-    """Passes on what a bridge and the robot at `host` say to each other, at `near`."""
+    """Passes on what a bridge and the robot at `host` say to each other, at `near`; a slow robot is one of 125 Hz."""
 
-    def __init__(self, host, near):
-        self._ports = [Proxy(f"tcp/{host}:{port}", (near, port)) for port in (DASHBOARD, PRIMARY, RTDE)]
+    def __init__(self, host, near, *, slow=False):
+        self._ports = [Proxy(f"tcp/{host}:{port}", (near, port)) for port in (DASHBOARD, PRIMARY)]
+        rtde = RtdeLink(f"tcp/{host}:{RTDE}", address=(near, RTDE))
+        rtde.slow = slow
+        self._ports.append(rtde)
 
     def __enter__(self):
         return self

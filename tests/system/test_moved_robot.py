@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from tests.conformance.served import refused_to_start
+from tests.conformance.served import PATIENCE, refused_to_start
 from tests.places import own_address
 from tests.system.moved_robot import (
     Link,
@@ -22,7 +22,7 @@ from tvist_client.blocking import Robot
 
 pytestmark = pytest.mark.realtime
 
-HOST, NEAR, OTHER = own_address(51), own_address(52), own_address(53)
+HOST, NEAR, OTHER, NOBODY = (own_address(last) for last in (51, 52, 53, 54))
 STEP = 0.002
 """Largest step of the robot's target beside its motions [rad]."""
 
@@ -41,7 +41,7 @@ def bridge(arm):
 
 
 def eventually(true):
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + PATIENCE
     while not true():
         assert time.monotonic() < deadline, "it never was so"
 
@@ -223,13 +223,41 @@ def test_what_the_robot_cannot_carry_is_refused(bridge):
         control.set_shaper("zv")
 
 
+def test_a_program_for_the_robot_moves_it_through_the_bridge_s_own_interfaces(arm):
+    with a_bridge(HOST, "--ur", "--ur-address", OTHER, "--shaper", "zv") as bridge:
+        wait_until_it_follows(bridge)
+        with (
+            Client("rtde_control", "RTDEControlInterface", OTHER) as control,
+            Client("rtde_receive", "RTDEReceiveInterface", HOST) as seen,
+        ):
+            goal = list(seen.getTargetQ())
+            goal[0] += 0.2
+            assert control.moveJ(goal, 1.0, 1.5)
+            eventually(lambda: seen.getTargetQ() == pytest.approx(goal, abs=1e-3))
+
+
+@pytest.mark.parametrize("option", [(), ("--servo-lag", "simulated")])
+def test_a_robot_of_125_hz_is_moved_by_four_set_points_at_a_time(arm, option):
+    with Link(HOST, NEAR, slow=True), a_bridge(NEAR, *option) as bridge:
+        bridge.wait_until_said("125 rows a second")
+        wait_until_it_follows(bridge)
+        with Robot.connect(arm.endpoint) as there, Robot.connect(bridge.endpoint, "bridge") as robot:
+            with robot.control("me") as control, states_of(there) as states:
+                goal = beside(robot, 0.2)
+                control.move_j(goal, velocity=0.4)
+                there.advance(250)
+            assert largest_step(states) < STEP
+            assert there.state().target_q == pytest.approx(goal, abs=1e-3)
+            assert robot.state().missed_ticks < 50
+
+
 def test_bad_starts_are_one_sentence_and_nothing_moves(arm):
     with Robot.connect(arm.endpoint) as there:
         before = there.state().target_q
         motion = ("--plant", f"ur://{HOST}", "--enable-motion")
         for options, words in (
             (("--enable-motion",), ["--plant ur://"]),
-            (("--plant", f"ur://{OTHER}", "--enable-motion"), ["no robot answers", "Next:"]),
+            (("--plant", f"ur://{NOBODY}", "--enable-motion"), ["no robot answers", "Next:"]),
             ((*motion, "--robot", "ur10e"), ["is no UR10e"]),
             ((*motion, "--payload", "2"), ["payload of 5 kg", "--payload"]),
             ((*motion, "--tcp", "0,0,0.1,0,0,0"), ["tool centre point", "--tcp"]),

@@ -167,7 +167,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     a robot uses the folder of its name in it, if there is one."""
     ur: bool = False
     """Open UR's own interfaces as well: RTDE, real-time client, dashboard, primary and secondary, interpreter mode. The
-    profile is then ursim, if you give no other."""
+    profile is then ursim, if you give no other, and no --enable-motion."""
     ur_address: str = "127.0.0.1"
     """IP address on which UR's interfaces listen; each further robot uses the next address."""
     ur_ports: UrPorts = UrPorts()
@@ -427,7 +427,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     @property
     def profile_in_force(self) -> ProfileName | None:
         """Profile that gives the defaults; None for those of a robot without a profile."""
-        return self.profile or ("ursim" if self.ur else None)
+        return self.profile or ("ursim" if self.ur and not self.enable_motion else None)
 
     def _described(self, description: RobotDescription, profile: Profile) -> RobotDescription:
         """Return the robot with the sensors and the floor that it is to have."""

@@ -25,6 +25,10 @@ class LostError(Exception):
     """There is no connection, or no more; the message says why."""
 
 
+class UnreachableError(LostError):
+    """Nobody answers there."""
+
+
 class Connection:
     """One connection.
 
@@ -64,7 +68,7 @@ class Connection:
             raise LostError(f"{self._place}: {error}") from error
         except OSError as error:
             why = error.strerror or str(error)
-            raise LostError(f"no robot answers at {self._place}: {why}") from error
+            raise UnreachableError(f"no robot answers at {self._place}: {why}") from error
         self._check_silence()
         return ()
 
@@ -101,7 +105,7 @@ class Connection:
             if self._connected:
                 hint = "" if self._place.port == PORT else f", whose port is {PORT} on a robot of UR's"
                 raise LostError(f"{self._place} does not answer as RTDE does within {ANSWERS:g} s{hint}")
-            raise LostError(f"no robot answers at {self._place} within {ANSWERS:g} s")
+            raise UnreachableError(f"no robot answers at {self._place} within {ANSWERS:g} s")
 
 
 def resolved(place: Place) -> Address:

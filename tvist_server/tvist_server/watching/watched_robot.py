@@ -16,7 +16,7 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, Measurement, PlantError, Sight
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.rtde.client import Row, RtdeClient
-from tvist_server.watching.connection import Connection, LostError, resolved
+from tvist_server.watching.connection import Connection, LostError, UnreachableError, resolved
 from tvist_server.watching.place import Place
 from tvist_server.watching.row_count import RowCount
 from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, has_real_payload, is_finite, sight_of
@@ -114,7 +114,7 @@ class WatchedRobot:
             for row in self._rows(timeout):
                 self._take(row)
         except LostError as error:
-            self._lose(str(error))
+            self._lose(error)
         return bool(self._sights)
 
     def close(self) -> None:
@@ -234,13 +234,16 @@ class WatchedRobot:
         self.payload = sight.payload or self.payload
         return sight
 
-    def _lose(self, why: str) -> None:
-        """Give up the connection, and say so in a tick of its own; once for each reason."""
+    def _lose(self, error: LostError) -> None:
+        """Give up the connection, and say so in a tick of its own; once for each reason.
+
+        That nobody answers there is news only if it is the first.
+        """
         self.close()
-        now = time.monotonic()
+        now, why = time.monotonic(), str(error)
         self._retry_at = now + RETRY
         since, before = self._lost
-        if why == before:
+        if why == before or (before and isinstance(error, UnreachableError)):
             return
         self._lost = (since if before else now), why
         latest = self._sights[-1] if self._sights else self._last
