@@ -19,7 +19,7 @@ PAGE = (DOCS / "how-to" / "rehearse-a-real-arm.md").read_text(encoding="utf-8")
 ENDPOINTS = {"tcp/127.0.0.1:7447": free_endpoint(), "tcp/127.0.0.1:7448": free_endpoint()}
 PLACES = {"127.0.0.10": own_address(71), "127.0.0.20": own_address(72), **ENDPOINTS}
 ROBOT, ARM = ENDPOINTS.values()
-ATTEMPTS = 10
+ATTEMPTS = 20
 
 
 def placed(text):
