@@ -134,6 +134,15 @@ def _add_bridge(parts: Any, part: Callable[..., argparse.ArgumentParser]) -> Non
     """Add the parts about a robot at the end of the line."""
     bridge = parts.add_parser("bridge", help="Measure what stands between programs and a hidden robot.")
     among = bridge.add_subparsers(required=True, metavar="PART")
+    faults = part(
+        _faults,
+        "faults",
+        "Let a bridge to a robot fail at random moments, and see how the robot stops.",
+        among,
+    )
+    faults.add_argument("--moments", type=_up_to(100_000), default=200, help="Number of moments [200].")
+    faults.add_argument("--seed", type=_up_to(2**31 - 1), default=7, help="Seed of robot and moments [7].")
+    faults.add_argument("--speed", type=float, default=1.0, help="Speed of the robot's time [1].")
     written = part(
         _programs,
         "programs",
@@ -297,6 +306,17 @@ def _programs(given: argparse.Namespace) -> int:
     result = report(ways, given.shapers, given.calibration, _tell, inside=given.inside)
     _print(result, given.json, tables(result))
     return 0
+
+
+def _faults(given: argparse.Namespace) -> int:
+    from proof.bridge.faults import Faults, broken, report, tables
+
+    result = report(Faults(given.seed, given.speed).run(given.moments, _counted(given.moments)))
+    _print(result, given.json, tables(result))
+    found = broken(result)
+    for one in found:
+        _tell(one)
+    return 1 if found else 0
 
 
 def _print(result: dict[str, Any], json: bool, tables: Sequence[Table]) -> None:

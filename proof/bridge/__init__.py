@@ -1,1 +1,1 @@
-"""What a robot at the end of the line does that takes positions only."""
+"""What a robot at the end of the line does, which takes positions only, over a link that can fail."""

@@ -150,7 +150,21 @@ def test_a_program_that_is_ended_at_the_robot_is_begun_again_where_the_arm_stand
         control.move_j(beside(robot, -0.1), velocity=0.4)
 
 
-def test_a_link_that_holds_lets_the_robot_brake_and_nothing_old_is_played(arm):
+def test_an_arm_without_power_is_switched_on_at_the_robot_and_then_here(arm, bridge):
+    stopped(bridge, lambda: tell(HOST, "power off"), "its program was stopped at the robot", mode=1)
+    with Robot.connect(bridge.endpoint, "bridge") as robot, robot.control("me") as control:
+        with pytest.raises(RefusedError, match="switch it on and release its brakes at the robot"):
+            control.power_on()
+        tell(HOST, "power on", "brake release")
+        eventually(lambda: not refused(control.power_on, "is not moved"))
+        move_by_nothing(robot, control)
+        control.power_off()
+    tvist("unlock", bridge.endpoint, "--name", "bridge", "--power-on").assert_done()
+    wait_until_it_follows(bridge)
+
+
+@pytest.mark.parametrize("how", ["hold", "cut"])
+def test_a_link_that_fails_lets_the_robot_brake_and_nothing_old_is_played(arm, how):
     with Link(HOST, NEAR) as link, a_bridge(NEAR) as bridge:
         wait_until_it_follows(bridge)
         with (
@@ -161,11 +175,11 @@ def test_a_link_that_holds_lets_the_robot_brake_and_nothing_old_is_played(arm):
             control.move_j(beside(robot, 0.3), velocity=0.4, wait=False)
             robot.advance(150)
             with states_of(there) as states:
-                link.hold()
+                getattr(link, how)()
                 bridge.wait_until_said("it says nothing any more")
                 eventually(lambda: max(map(abs, there.state().target_qd)) < 1e-3)
                 stands = there.state().target_q
-                link.flow()
+                link.flow() if how == "hold" else link.restore()
                 eventually(lambda: not refused(control.power_on, "is not moved"))
                 move_by_nothing(robot, control)
             assert largest_step(states) < STEP

@@ -9,7 +9,7 @@ from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
-from tvist_plant.plant import PERIOD
+from tvist_plant.plant import PERIOD, Supervised
 from tvist_protocol.replies import Code
 
 ALLOWED = 0.01
@@ -78,6 +78,8 @@ class Protection:
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
+        self._own = isinstance(cycle.line.plant, Supervised)
+        """Whether the arm's own controller watches its torques, which may be guessed here from currents."""
         self._overload = Overload(cycle.description.limits.torque)
 
     def dangers(self, sample: Sample) -> Sequence[Danger]:
@@ -86,7 +88,8 @@ class Protection:
         Args:
             sample: Signals along the control line.
         """
-        joint, fault = self._overload.joint(sample.measured.moment), self._cycle.line.filter.fault
+        joint = None if self._own else self._overload.joint(sample.measured.moment)
+        fault = self._cycle.line.filter.fault
         if joint is None and fault is None:
             return ()
         found: list[Danger] = []

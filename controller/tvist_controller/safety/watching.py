@@ -14,7 +14,7 @@ from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 
 REFUSED = (
     "the robot is only watched: its own controller moves and stops it, and nothing is sent to it from here; command it "
-    "at its own interfaces or its teach pendant"
+    "at its own interfaces or its teach pendant, or serve it with --enable-motion"
 )
 """Why a command is refused that would concern the arm."""
 _NO_STOP = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.UNDEFINED})

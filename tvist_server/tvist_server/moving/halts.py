@@ -56,6 +56,6 @@ def halt_by_program(ended: int, modes: tuple[int, int, int]) -> Halt | None:
     if runtime in _PAUSED:
         return Halt(f"its program was paused: stop it at the robot, {_AGAIN}", safety)
     if runtime != RuntimeState.PLAYING:
-        why = "its program was stopped at the robot, or by its change to local control"
+        why = "its program was stopped at the robot, or by a change to local control or of its power"
         return Halt(f"{why}: see that it is in remote control, {_AGAIN}", safety)
     return None

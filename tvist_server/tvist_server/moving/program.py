@@ -126,19 +126,20 @@ def $name():
   while why == $ended_not:
     now = read_input_integer_register($NUMBER)
     silence = silence + step
-    if now > newest:
+    if now > newest and not blind: # set-points that come too late to be played are none
       silence = 0.0
     end
     number = number + 1
-    if now - number > 2: # this program has missed a period: leave a set-point out
-      number = number + 1
-    elif now == number and now > newest and blind: # they come late: give them a period more
+    behind = now - number
+    if behind > 2: # it began while they came late, or has missed a period: leave some out
+      number = now - 2
+    elif now <= number and now > newest and blind: # they come late: give them a period more
       number = number - 1
     end
 
     if read_input_integer_register($ORDER) != $follow:
       why = $ended_ordered
-    elif now < newest or now - number > 2: # another sender, or a pause: the arm must not catch up
+    elif now < newest or behind > 10: # another sender, or a pause, after which it must not catch up
       why = $ended_lost
     elif silence > $silence - 2.5 * step: # earlier by what reading and telling may take
       why = $ended_silence

@@ -22,6 +22,8 @@ DECELERATION = 5.0
 SETTLES = 25
 """Number of rows of the waiting program after which it gets the first set-point: what its start has delayed has come
 by then, since it ends when numbers come faster than it counts."""
+GRACE = 5
+"""Number of rows after the program's end in which modes may still tell why."""
 BEGINS = 5.0
 """Longest time in which the program has to begin [s]."""
 TELL_EVERY = 10.0
@@ -46,7 +48,7 @@ class Run:
         stands, speed = np.array(robot.newest["target_q"]), max(limits.velocity)
         self._setpoints = Setpoints(stands, lag, fastest=speed, reach=np.array(limits.position))
         self._begun, self._plays = time.monotonic(), False
-        self._waiting, self._settled = False, 0
+        self._waiting, self._settled, self._ending = False, 0, 0
         self.ready = False
         """Whether the program follows."""
         self.halt: Halt | None = None
@@ -98,8 +100,11 @@ class Run:
                 )
                 self.halt = Halt(f"{why}, then power on here", sight.modes[1])
             return None
-        self.halt = self.halt or halt_by_program(ended, sight.modes)
-        self.ready = state == State.FOLLOWING and self.halt is None
+        ends = halt_by_program(ended, sight.modes)
+        self._ending = 0 if ends is None else self._ending + 1
+        if self._ending > GRACE:
+            self.halt = self.halt or ends
+        self.ready = (state == State.FOLLOWING or self.ready) and self.halt is None
         self._waiting = state == State.WAITING and self.halt is None
         self._settled += state == State.WAITING
         return self._tell_missed((missed[0], missed[1]))

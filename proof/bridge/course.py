@@ -1,0 +1,144 @@
+"""What a robot says of itself while something goes wrong, row by row, from its own RTDE interface."""
+
+import selectors
+import socket
+import threading
+import time
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from tvist_plant.plant import PERIOD
+from tvist_server.moving.registers import ALONE, ENDED, LEFT_OUT, NUMBER, PLAYED, STATE, State
+from tvist_server.rtde.client import Row, RtdeClient
+from tvist_server.rtde.wire import Wire
+
+Floats = npt.NDArray[np.float64]
+_COUNTS = tuple(f"output_int_register_{place}" for place in (STATE, PLAYED, ENDED, ALONE, LEFT_OUT))
+_READ: dict[str, Wire] = {
+    "timestamp": Wire.DOUBLE,
+    "target_q": Wire.VECTOR6D,
+    "target_qd": Wire.VECTOR6D,
+    "safety_mode": Wire.INT32,
+    "runtime_state": Wire.UINT32,
+    f"input_int_register_{NUMBER}": Wire.INT32,
+    **dict.fromkeys(_COUNTS, Wire.INT32),
+}
+STILL = 1e-6
+"""Speed below which the target is at rest [rad/s]."""
+
+
+class Watch:
+    """Reads a robot's rows, without a link in between, from a thread of its own.
+
+    Args:
+        robot: Its IP address.
+    """
+
+    def __init__(self, robot: str) -> None:
+        self._client, self._socket = RtdeClient(_READ, {}), socket.create_connection((robot, 30004))
+        self._rows: list[Row] = []
+        self._ended = False
+        self._thread = threading.Thread(target=self._read, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._socket.sendall(self._client.begin())
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended = True
+        self._thread.join()
+        self._socket.close()
+
+    def _read(self) -> None:
+        with selectors.DefaultSelector() as ready:
+            ready.register(self._socket, selectors.EVENT_READ)
+            while not self._ended:
+                if ready.select(0.1):
+                    received = self._client.receive(self._socket.recv(1 << 16))
+                    self._rows += received.rows
+                    if received.send:
+                        self._socket.sendall(received.send)
+
+    @property
+    def count(self) -> int:
+        """Number of rows so far."""
+        return len(self._rows)
+
+    def now(self, name: str) -> int:
+        """Return the latest value of an integer."""
+        return int(self._rows[-1][name][0])
+
+    @property
+    def state(self) -> State:
+        """What the program does."""
+        return State(self.now(_COUNTS[0]))
+
+    @property
+    def speed(self) -> float:
+        """Present speed of the fastest joint's target [rad/s]."""
+        return max(map(abs, self._rows[-1]["target_qd"]))
+
+    def since(self, first: int) -> "Course":
+        """Return the rows from one on."""
+        return Course(self._rows[first:])
+
+
+class Course:
+    """A piece of the robot's time.
+
+    Args:
+        rows: Its rows.
+    """
+
+    def __init__(self, rows: list[Row]) -> None:
+        def column(name: str) -> npt.NDArray[Any]:
+            return np.array([row[name] for row in rows]).squeeze()
+
+        self.time: Floats = column("timestamp")
+        self.q, self.qd = column("target_q"), column("target_qd")
+        self.number = column(f"input_int_register_{NUMBER}")
+        self.state, self.ended = column(_COUNTS[0]), column(_COUNTS[2])
+        self.missing = round((self.time[-1] - self.time[0]) / PERIOD) + 1 - len(rows)
+
+    @property
+    def largest_step(self) -> float:
+        """Largest way of a joint's target in a period [rad]."""
+        ways = np.abs(np.diff(self.q, axis=0)).max(axis=1) / np.round(np.diff(self.time) / PERIOD)
+        return float(ways.max())
+
+    @property
+    def largest_acceleration(self) -> float:
+        """Largest acceleration of a joint's target [rad/s^2]."""
+        changes = np.abs(np.diff(self.qd, axis=0)).max(axis=1) / np.diff(self.time)
+        return float(changes.max())
+
+    @property
+    def silence(self) -> float:
+        """Time from the last new number before braking to the begin of braking [s].
+
+        Braking has begun at the last row before rest at which the fastest joint was not slower than a row before, or
+        where the program says so, whichever is later.
+        """
+        speed = np.abs(self.qd).max(axis=1)
+        said = int(np.argmax(self.state >= State.BRAKING)) if (self.state >= State.BRAKING).any() else 0
+        rest = int(np.argmax(speed[said:] < STILL)) + said
+        faster = np.flatnonzero(np.diff(speed[: rest + 1]) >= 0.0)
+        begun = max(said, int(faster[-1]) + 1 if len(faster) else 0)
+        came = np.flatnonzero(np.diff(self.number[: begun + 1]))
+        return float(self.time[begun] - self.time[came[-1] + 1 if len(came) else 0])
+
+
+def wait_for(true: Any, seconds: float, what: str) -> None:
+    """Wait until something is so.
+
+    Raises:
+        TimeoutError: It is not within some seconds.
+    """
+    deadline = time.monotonic() + seconds
+    while not true():
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"{what}: not within {seconds:g} s")
+        time.sleep(0.005)
