@@ -177,7 +177,7 @@ async def _run(
 ) -> dict[str, Ran]:
     """Run all programs, on the robot itself if there is no shaper."""
     shaping = ["--shaper", shaper, "--shape-servo", "--calibration", str(calibration)] if shaper else []
-    robot_is = f"--robot {ways.robot} --profile real --ur"
+    robot_is = f"--robot {ways.robot} --profile real --realtime-priority --ur"
     hidden = (
         f"{robot_is} --ur-address {_address(1)} --hidden {ways.hidden} --seed {ways.seed} --record {file}"
     )
