@@ -177,6 +177,32 @@ def _add_bridge(parts: Any, part: Callable[..., argparse.ArgumentParser]) -> Non
         default=[500, 125],
         help="Rows a second [500 125].",
     )
+    written = part(
+        _programs,
+        "programs",
+        "Run programs written for a hidden robot on it and by the bridge, and compare how its tool rings.",
+        among,
+    )
+    written.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of their motions [0].")
+    written.add_argument("--robot", default="ur5e", help="Model of the robot [ur5e].")
+    written.add_argument(
+        "--hidden", type=_up_to(2**31 - 1), help="Seed of the hidden robot [that of the motions]."
+    )
+    written.add_argument("--shapers", nargs="+", default=["auto"], help="Shapers of the bridge [auto].")
+    written.add_argument("--only", nargs="+", metavar="NAME", help="Programs to run [all].")
+    written.add_argument(
+        "--urcl",
+        nargs=2,
+        type=Path,
+        metavar=("SOURCES", "BUILD"),
+        help="Folders of UR's C++ client library, built with its examples, to run its trajectory example [left out].",
+    )
+    written.add_argument(
+        "--calibration", type=Path, help="Calibration of the robot [identified from twelve ring-downs]."
+    )
+    written.add_argument(
+        "--inside", action="store_true", help="Let the robot itself shape, instead of a bridge before it."
+    )
 
 
 def _up_to(most: int) -> Callable[[str], int]:
@@ -299,6 +325,19 @@ def _advice(given: argparse.Namespace) -> int:
     from proof.advice.hidden import report, tables
 
     result = report(given.robots, given.seed, _tell)
+    _print(result, given.json, tables(result))
+    return 0
+
+
+def _programs(given: argparse.Namespace) -> int:
+    from proof.bridge.programs import OURS, URCL, Ways, report, tables
+
+    all_of_them = [*OURS, *([URCL] if given.urcl else [])]
+    if unknown := set(given.only or ()) - set(all_of_them):
+        given.refuse(f"there is no program {min(unknown)}: there are {' '.join(all_of_them)}")
+    hidden = given.seed if given.hidden is None else given.hidden
+    ways = Ways(given.robot, hidden, given.seed, given.only or all_of_them, given.urcl)
+    result = report(ways, given.shapers, given.calibration, _tell, inside=given.inside)
     _print(result, given.json, tables(result))
     return 0
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from tools.one_mass import swing
 from tvist_controller.api.line import DrivenLine, respond
 from tvist_lab.compared import run_beside
 from tvist_lab.one_joint.closed_form import FlexibleShoulder
@@ -24,7 +25,6 @@ from tvist_shaping import Estimator, Fixed, TvistFilter, residual, shaper
 from tvist_shaping.catalogue import SHAPERS
 from tvist_view.lesson import largest_after_stop
 from tvist_view.look import Look
-from tvist_view.oscillator import swing
 from tvist_view.signals import moves
 from tvist_view.track import Shown, Track
 

@@ -23,6 +23,7 @@ def info_of(controller: Controller) -> Info:
     hold = controller.stepping.hold
     calibration = controller.filters.source.calibration
     watched = controller.watching is not None
+    place = None if setup.plant is None else setup.plant.place
     own = (setup.calibration.name,) if setup.calibration is not None else ()
     tvist = controller.cycle.line.filter.tvist
     return Info(
@@ -52,6 +53,7 @@ def info_of(controller: Controller) -> Info:
             seed=calibration.provenance.seed,
             f_d_range=calibration.provenance.measured_f_d_range,
             zeta_range=calibration.provenance.measured_zeta_range,
+            shipped=calibration.name in available(),
         ),
         shaper=tvist.name,
         modes=tvist.estimator.modes,
@@ -70,7 +72,8 @@ def info_of(controller: Controller) -> Info:
         programs=controller.programs.kept.names,
         poses=setup.description.poses,
         geometry=geometry_of(setup.description),
-        watched=setup.plant.place if watched and setup.plant is not None else None,
+        watched=place if watched else None,
+        moved=place if controller.supervision is not None else None,
     )
 
 

@@ -71,6 +71,8 @@ class CalibrationInfo(Struct, frozen=True, kw_only=True, gc=False):
     """Smallest and largest damped frequency measured over the workspace [Hz]."""
     zeta_range: tuple[float, float]
     """Smallest and largest damping ratio measured over the workspace [-]."""
+    shipped: bool | None = None
+    """Whether it came with the server's package, measured on the simulated arm; null from older servers."""
 
 
 class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=False):
@@ -134,3 +136,5 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     watched: str | None = None
     """Address of the robot if it is only watched: its own controller moves it, and commands that concern the arm are
     refused; null if this server moves it."""
+    moved: str | None = None
+    """Address of the robot's own controller, through which this server moves it; null if there is none."""

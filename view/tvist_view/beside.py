@@ -14,7 +14,7 @@ from tvist_client.robot import Robot
 from tvist_protocol.errors import ProtocolError, RefusedError
 from tvist_protocol.stream import Event, State, Truth
 from tvist_view.look import Look
-from tvist_view.pilot import Doing, motion
+from tvist_view.pilot import Doing, go, motion
 from tvist_view.signals import moves, signals_of
 
 REST = 500
@@ -83,7 +83,7 @@ def beside(
                 await arm.set_shaper(name, modes=info.modes)
                 tell(f"{words} …")
                 with _gathered(robot) as gathered:
-                    await arm.move_j(end)
+                    await go(arm, end)
                     await robot.advance(REST)
                 runs.append(gathered)
             verdict = await asyncio.to_thread(judge, *runs)

@@ -11,18 +11,20 @@ from tvist_view.look import Look
 from tvist_view.meshes import Meshes
 
 NO_TRUTH = "this robot does not tell how it bends; a simulated one tells pages on its own machine"
+REAL = "a real arm does not tell how it bends"
 USUAL = ("auto", "zv")
 """Shapers of which the first that the robot has is compared with none, while none is in use."""
 
 
 def described(info: Info, look: Look, robots: list[str], meshes: Meshes) -> dict[str, Any]:
     """What a tab needs to know of a robot before it can show it."""
-    faults = FAULTS if "simulation.inject" in info.commands else {}
+    real = info.watched is not None or info.moved is not None
+    faults = FAULTS if "simulation.inject" in info.commands and not real else {}
     return {
         "name": info.name,
         "robots": sorted({*robots, info.name}),
         "look": {**look.packed(), "meshes": meshes.offer(look.geometry)},
-        "why_stiff": NO_TRUTH,
+        "why_stiff": REAL if real else NO_TRUTH,
         "poses": info.poses,
         "motions": pairs(list(info.poses)),
         "joints": info.joints,

@@ -47,7 +47,7 @@ class Doer:
             case asked.Carry(mass):
                 pilot.do(tab, piloting.carry(mass))
             case asked.Setting():
-                if not isinstance(message, asked.Shape) or await pilot.take(tab):
+                if not isinstance(message, asked.Shape | asked.Ready) or await pilot.take(tab):
                     await pilot.set(tab, _setting(pilot, info, message))
             case asked.Jog(joint):
                 self.say(f"joint is {joint}: the robot has {len(info.joints)} joints, from 0")

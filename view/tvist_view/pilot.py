@@ -24,6 +24,9 @@ JOG_SPEED = 0.25
 JOG_ACCELERATION = 1.5
 """Acceleration at the beginning of a jog [rad/s²]."""
 
+SPEED = 1.5
+"""Velocity of motions between poses [rad/s]."""
+
 Say = Callable[[str], None]
 Doing = Callable[[Arm], Awaitable[Any]]
 
@@ -166,7 +169,8 @@ class Pilot:
 
     async def make_ready(self, arm: Arm) -> None:
         """Release what a client can release, and switch the power on; say what remains."""
-        await arm.inject("normal")
+        if (await self._robot.info()).moved is None:  # what a robot's own controller says is released there
+            await arm.inject("normal")
         await make_ready(self._robot, arm, power_on=True)
         found = await look(self._robot)
         if not found.ready:
@@ -225,6 +229,12 @@ async def _close(held: AsyncExitStack) -> None:
         await held.aclose()
 
 
+async def go(arm: Arm, q: Sequence[float]) -> None:
+    """Move to joint angles, no faster than the robot lets any joint turn: a real arm may have a low cap."""
+    limits = (await arm.robot.info()).limits
+    await arm.move_j(q, velocity=min(SPEED, *limits.velocity))
+
+
 def motion(poses: Sequence[Sequence[float]]) -> Doing:
     """A motion through poses: to the first one, if the arm is not there, and on to the last.
 
@@ -236,7 +246,7 @@ def motion(poses: Sequence[Sequence[float]]) -> Doing:
         for place, q in enumerate(poses):
             at = (await arm.robot.state()).target_q
             if place or max(abs(a - b) for a, b in zip(at, q, strict=True)) > 1e-6:
-                await arm.move_j(q)
+                await go(arm, q)
 
     return run
 

@@ -15,6 +15,7 @@ from tvist_client.transports.zenoh import robots_at
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io
+from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import Event
 from tvist_view import asked
 from tvist_view.beside import Judge
@@ -23,6 +24,7 @@ from tvist_view.doing import Doer
 from tvist_view.look import GeometryError, Look
 from tvist_view.meshes import Meshes
 from tvist_view.pilot import Pilot
+from tvist_view.real_arm import RealArm
 from tvist_view.signals import Running
 from tvist_view.watcher import Watcher
 
@@ -61,6 +63,7 @@ class ShownRobot:
     def __init__(self, place: Place, name: str, judge: Judge, meshes: Meshes) -> None:
         self._place, self._name, self._judge, self._meshes = place, name, judge, meshes
         self.running: Running | None = None
+        self._way = RealArm()
         self._watchers: set[Watcher] = set()
         self._ends: list[Callable[[], None]] = []
         self._robot: Robot | None = None
@@ -134,7 +137,7 @@ class ShownRobot:
         place = self._place
         robots = await robots_at(place.endpoint, place.security, place.namespace)
         self._robot, self._info, self._absent = robot, info, ""
-        self.running = Running(look)
+        self.running, self._way = Running(look), RealArm()
         pilot = Pilot(robot, f"view-{os.getpid()}", self._say)
         self._doer = Doer(robot, look, pilot, self._judge, self._say, self._result)
         self._described = described(info, look, robots, self._meshes)
@@ -192,9 +195,13 @@ class ShownRobot:
             "free": only is None and pilot.holder is None and info.control in (None, pilot.client),
             "truth": running.has_truth,
             "comparing": doer.comparing,
+            "only": "" if only is None else watched,
+            "held": info.moved is None or info.robot_mode == RobotMode.RUNNING,
+            "steps": self._way.steps(info, running.state, self._io),
         }
 
     def _on_event(self, event: Event) -> None:
+        self._way.hear(event)
         if event.kind in TOLD and event.why:
             self._say(event.why)
 
@@ -202,6 +209,7 @@ class ShownRobot:
         self._io = io
 
     def _result(self, result: dict[str, Any]) -> None:
+        self._way.compared()
         for watcher in self._watchers:
             watcher.put("result", result)
 

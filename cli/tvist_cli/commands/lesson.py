@@ -15,7 +15,7 @@ from tvist_cli.pages import Door, serve_page
 from tvist_cli.serving import compile_if_new
 
 if TYPE_CHECKING:
-    from tvist_view.lesson import Compared, OneMass
+    from tvist_view.lesson import Compared
 
 HERE = Door("127.0.0.1", 8080, insecure=False)
 """Where the page is served if nothing else is asked."""
@@ -65,7 +65,7 @@ def lesson(
             return
         from tvist_view.lesson import Lesson
 
-        shown = Lesson(_one_mass(), _moved)
+        shown = Lesson(_moved)
         serve_page(shown.page, shown.meet, door)
         return
     from tvist_lab.one_joint import lesson as run
@@ -107,27 +107,6 @@ def _open_page() -> None:
     )
     if graphical:  # elsewhere a browser in the terminal would open, which draws nothing
         webbrowser.open(page.as_uri())
-
-
-def _one_mass() -> "OneMass":
-    """The arm with one flexible joint, with the formula for its frequency."""
-    from tvist_controller.about import geometry_of
-    from tvist_controller.setup import paper_payload
-    from tvist_lab.one_joint.closed_form import FlexibleShoulder
-    from tvist_plant.description import load
-    from tvist_protocol.values import Payload
-    from tvist_view.lesson import OneMass, frequency_to_elbow
-    from tvist_view.look import Look
-
-    description = load("one-joint")
-    shoulder = FlexibleShoulder.of(description, description.payload)
-    low, high = (description.poses[name][1] for name in ("Q1", "Q3"))
-    carried: Payload = paper_payload(description)
-    return OneMass(
-        look=Look(geometry_of(description), carried),
-        f_d_range=(shoulder.mode(low)[0], shoulder.mode(high)[0]),
-        elbow=frequency_to_elbow(lambda angle: shoulder.mode(angle)[0], low, high),
-    )
 
 
 async def _moved(error: float, zeta: float) -> "Compared":

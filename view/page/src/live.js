@@ -40,8 +40,11 @@ export class Live {
     this.picker = h("select", { ariaLabel: "robot", onchange: () => this.send({ do: "robot", name: this.picker.value }) });
     this.state = h("span", { class: "state", role: "status" }, h("i"), h("span"));
     this.who = h("span", { class: "who" }, "Nobody has control.");
+    this.hold = button("Hold it", { title: "Check it, and power on here. Its own power and brakes are switched at the robot.", onclick: () => this.send({ do: "ready" }) });
+    this.way = h("details", { class: "way", hidden: true, open: innerWidth > 820 }, h("summary", {}), h("ol", {}), this.hold);
+    this.stage.main.append(this.way);
     this.take = button("Take control", { class: "take", onclick: () => this.send({ do: this.mine ? "give" : "take" }) });
-    this.stop = button("STOP", { class: "stop", title: "Stop the arm now; this needs no control.", onclick: () => this.send({ do: "stop" }) });
+    this.stop = button("STOP", { class: "stop", onclick: () => this.send({ do: "stop" }) });
     this.motions = h("span", { class: "motions", role: "group", ariaLabel: "motions" });
     this.shaper = h("select", { ariaLabel: "shaper", title: "none shapes nothing, zv is the paper's, auto suppresses several modes.",
       onchange: () => this.send({ do: "shape", shaper: this.shaper.value, modes: this.modes?.value() ?? null }) });
@@ -153,8 +156,21 @@ export class Live {
     this.program = status.program;
     this.stage.setTruth(status.truth);
     this.busy = status.comparing;
+    this.only = status.only;
+    this._lead(status.steps, status.held);
     write(this.ab, status.comparing ?? `A/B: without, with ${this._shaped()}`);
     this._enable();
+  }
+
+  /** The steps to a real arm: those that are done, and the next one with how. */
+  _lead(steps, held) {
+    const next = steps.findIndex(([done]) => !done);
+    this.way.hidden = !steps.length;
+    if (!steps.length) return;
+    write(this.way.firstChild, next < 0 ? "Real arm: all steps are done" : `Real arm, step ${next + 1} of ${steps.length}`);
+    this.hold.hidden = held;
+    this.way.children[1].replaceChildren(...steps.map(([done, what, how], i) =>
+      h("li", { class: done ? "done" : i === next ? "next" : "" }, what, i === next ? h("em", {}, how) : null)));
   }
 
   /** The shaper that A/B compares with none. */
@@ -173,6 +189,9 @@ export class Live {
     const may = this.mine || this.free;
     for (const one of [...this.motions.children, this.ab]) one.disabled = !may || !!this.busy;
     this.shaper.disabled = !may;
+    this.stop.disabled = this.take.disabled = !!this.only;
+    this.stop.title = this.only || "Stop the arm now; this needs no control.";
+    this.take.title = this.only || "";
     for (const one of this.controls?.querySelectorAll("button, input, select") ?? []) one.disabled = !this.mine;
   }
 
@@ -198,6 +217,7 @@ export class Live {
   on_gone({ text }) {
     this._state("gone", "no robot", "");
     this.free = this.mine = false;
+    this._lead([]);
     this._enable();
     this.stage.say(text, true);
   }

@@ -1,10 +1,10 @@
-"""One mass on a spring behind a shaper: what two impulses do to its vibration."""
+"""One mass on a spring behind a shaper, by which the same in the page for trying shaping is checked."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_shaping import residual, shaper
+from tvist_shaping import shaper
 from tvist_view.look import Floats
 
 STEP = 0.002
@@ -69,23 +69,6 @@ def swing(f_d: float, zeta: float, believed: tuple[float, float] | None) -> Swin
         state = free @ state - forced * a
     velocity = np.cumsum(acceleration) * STEP
     return Swing(time, np.cumsum(velocity) * STEP, deflection)
-
-
-def impulses_in_words(f_d: float, zeta: float) -> str:
-    """The impulses of ZV for a mode, as a sentence."""
-    impulses = shaper("zv").function(f_d, zeta)
-    parts = [f"{100 * a:.0f} % after {1e3 * t:.0f} ms" for a, t in zip(impulses.A, impulses.tau, strict=True)]
-    return f"Two impulses: {' and '.join(parts)}."
-
-
-def leftover(f_d: float, zeta: float, believed: tuple[float, float]) -> float:
-    """Vibration that ZV leaves, as a share of that without it [-]."""
-    return float(residual(f_d, zeta, shaper("zv").function(*believed)))
-
-
-def leftovers(f_d: float, zeta: float, errors: Floats) -> Floats:
-    """The same over errors of the believed frequency [-], shape of errors."""
-    return np.array([leftover(f_d, zeta, (f_d * (1.0 + error), zeta)) for error in errors])
 
 
 def _profile(time: Floats) -> Floats:

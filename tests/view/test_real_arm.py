@@ -1,0 +1,99 @@
+"""The steps to a real arm: each is ticked off by what the robot says, on the page, too."""
+
+import msgspec
+import pytest
+from tests.conformance.served import PATIENCE, Served
+from tests.places import free_endpoint, own_address
+from tests.view.browser import Page, browser
+
+from tvist_controller.api.robot import LoopbackHost, info_of
+from tvist_lab.in_process import free_setup
+from tvist_protocol.info import StopReason
+from tvist_protocol.modes import RobotMode, SafetyMode
+from tvist_protocol.stream import Event
+from tvist_view.real_arm import RealArm
+
+
+@pytest.fixture(scope="module")
+def info():
+    return info_of(LoopbackHost(free_setup()).controller)
+
+
+class Seen:
+    """A state as far as the steps look at it."""
+
+    def __init__(self, mode=RobotMode.RUNNING, safety=SafetyMode.NORMAL, speed=0.0):
+        self.robot_mode, self.safety_mode, self.target_qd = mode, safety, [speed] * 6
+
+
+def named(info, **changes):
+    return msgspec.structs.replace(info, **changes)
+
+
+def done(way, info, state, io=None):
+    return [step[0] for step in way.steps(info, state, io)]
+
+
+def event(kind):
+    return Event(tick=1, kind=kind)
+
+
+def test_a_simulated_robot_has_no_steps(info):
+    assert done(RealArm(), info, Seen()) == []
+
+
+def test_a_watched_robot_is_connected_released_moving_and_identified(info):
+    way, there = RealArm(), named(info, watched="ur://robot")
+    assert done(way, there, Seen(RobotMode.DISCONNECTED, SafetyMode.UNDEFINED)) == [False] * 5
+    assert done(way, there, Seen(RobotMode.POWER_OFF)) == [True, *[False] * 4]
+    assert done(way, there, Seen(speed=0.2)) == [True, True, True, False, False]
+    own = msgspec.structs.replace(info.calibration, shipped=False)
+    assert done(way, named(there, calibration=own), Seen()) == [True, True, True, True, False]
+
+
+def test_a_moved_robot_is_held_moved_stopped_and_stopped_by_others(info):
+    way, there = RealArm(), named(info, moved="ur://robot")
+    assert done(way, there, Seen(RobotMode.POWER_OFF)) == [False] * 7
+    assert done(way, there, Seen()) == [True, *[False] * 6]
+    for kind in ("motion_done", "motion_stopped", "safety_stop"):
+        way.hear(event(kind))
+    assert done(way, there, Seen(RobotMode.POWER_OFF)) == [False, False, True, True, False, False, False]
+    way.compared()
+    assert done(way, there, Seen()) == [True, False, True, True, True, True, False]
+
+
+def test_the_cap_and_why_it_is_not_held_are_said(info):
+    slow = msgspec.structs.replace(info.limits, velocity=[0.5] * 6)
+    stop = StopReason(tick=1, code=None, why="its program was paused")
+    there = named(info, moved="ur://robot", limits=slow, stop=stop)
+    steps = RealArm().steps(there, Seen(RobotMode.POWER_OFF), None)
+    assert steps[0][2] == "its program was paused"
+    assert "0.5 rad/s" in steps[2][1]
+
+
+@pytest.mark.realtime
+def test_the_page_leads_and_offers_nothing_that_does_nothing():
+    host, endpoint = own_address(73), free_endpoint()
+    robot = ("--ur", "--ur-address", host, "--hidden", "1001", "--profile", "real", "--shaper", "none")
+    with (
+        Served(*robot),
+        Served("--plant", f"ur://{host}", name="arm", endpoint=endpoint) as arm,
+        Page(endpoint, "--name", "arm") as page,
+        browser() as chromium,
+    ):
+        tab = chromium.new_page(viewport={"width": 1280, "height": 800})
+        tab.set_default_timeout(PATIENCE * 1000.0)
+        tab.goto(page.url)
+        tab.get_by_text("Real arm, step 3 of 5").wait_for()
+        for name in ("STOP", "Take control"):
+            button = tab.get_by_role("button", name=name)
+            assert button.is_disabled()
+            assert "only watched" in button.get_attribute("title")
+        assert tab.get_by_role("button", name="Hold it").is_hidden()
+        assert arm.end() == 0
+        tab.get_by_text("The page waits for it").wait_for()
+        moving = ("--plant", f"ur://{host}", "--enable-motion")
+        with Served(*moving, name="arm", endpoint=endpoint):
+            tab.get_by_text("of 7", exact=False).wait_for()
+            assert tab.get_by_role("button", name="STOP").is_enabled()
+            assert "0.5 rad/s" in tab.get_by_role("list").inner_text()
