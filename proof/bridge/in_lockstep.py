@@ -109,6 +109,13 @@ class HiddenRobot:
         """Send a command of the client in control."""
         return self.controller.receive(kind(token=self._token, **fields))
 
+    def follow(self, speed: float, lookahead: float = LOOKAHEAD, gain: float = GAIN) -> None:
+        """Run the program that follows set-points, up to a speed [rad/s]; arguments of `servoj`."""
+        deceleration = min(self.controller.cycle.description.limits.acceleration)
+        text = program(1, speed=speed, deceleration=deceleration, lookahead=lookahead, gain=gain)
+        reply = self.send(ProgramRun, text=text)
+        assert not isinstance(reply, Refused), reply
+
     def tick(self) -> State:
         """Advance by a control period."""
         state, events = self.controller.tick()
@@ -236,11 +243,7 @@ class Bridge:
     ) -> None:
         self.robot = HiddenRobot(description, seed, q, payload)
         speed = min(description.limits.velocity)
-        text = program(
-            1, speed=speed, deceleration=min(description.limits.acceleration), lookahead=lookahead, gain=gain
-        )
-        reply = self.robot.send(ProgramRun, text=text)
-        assert not isinstance(reply, Refused), reply
+        self.robot.follow(speed, lookahead, gain)
         known = ServoLag.simulated(lookahead, gain) if isinstance(lag, str) else lag
         reach = np.array(description.limits.position)
         setpoints = Setpoints(q, known, fastest=(MARGIN - 0.01) * speed, reach=reach)
