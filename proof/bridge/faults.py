@@ -132,7 +132,7 @@ class Faults:
         return Trial(fault, braking, step, acceleration, moved, ended, told, course.missing)
 
     def _until_moving(self, bridge: Server, watch: Watch, robot: Robot, arm: Arm) -> tuple[int, int]:
-        """Move until a random moment, unless the robot stops before; return the numbers of the row and the letter before."""
+        """Move until a random moment, unless the robot stops before; return numbers of the row and letter before it."""
         while True:
             self._hold(robot, arm)
             first, said = watch.count, len(bridge.said)
