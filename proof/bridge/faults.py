@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from proof.bridge.course import STILL, Course, Watch, wait_for
 from proof.bridge.link import LinkProcess
 from proof.bridge.processes import Server, until_done
+from tvist_client import MotionStoppedError
 from tvist_client.blocking import Robot
 from tvist_client.blocking_classes import Arm
 from tvist_protocol.modes import RobotMode
@@ -131,7 +132,7 @@ class Faults:
         return Trial(fault, braking, step, acceleration, moved, ended, told, course.missing)
 
     def _until_moving(self, bridge: Server, watch: Watch, robot: Robot, arm: Arm) -> tuple[int, int]:
-        """Move until a random moment, unless the robot stops before; return the numbers of the row and sign before."""
+        """Move until a random moment, unless the robot stops before; return numbers of the row and letter before it."""
         while True:
             self._hold(robot, arm)
             first, said = watch.count, len(bridge.said)
@@ -158,10 +159,16 @@ class Faults:
         arm.move_j(goal, velocity=SPEED, wait=False)
 
     def _go_on(self, robot: Robot, arm: Arm) -> None:
-        self._hold(robot, arm)
-        goal = list(robot.state().target_q)
-        goal[0] += 0.02 if goal[0] < self._centre[0] else -0.02
-        arm.move_j(goal, velocity=SPEED)
+        while True:
+            self._hold(robot, arm)
+            goal = list(robot.state().target_q)
+            goal[0] += 0.02 if goal[0] < self._centre[0] else -0.02
+            try:
+                arm.move_j(goal, velocity=SPEED)
+            except MotionStoppedError:
+                self.others += 1
+            else:
+                return
 
     def _break(self, fault: str, bridge: Server, link: LinkProcess) -> Callable[[], object]:
         """Let something go wrong; return what puts it right."""
