@@ -40,8 +40,8 @@ SPEEDS = ((1.5, 2.0, 100.0), (1.05, 1.4, 50.0), (0.8, 2.0, 200.0))
 REST = 250
 """Ticks at rest after a motion."""
 TORQUE = 0.95
-"""Share of the joints' torques that twice the motion's accelerations may need [-]. The simulated robots' `servoj` is
-late where they need more than the torques: nothing smooths what a client sends, and the arm swings as far again.
+"""Share of the joints' torques that twice the motion's accelerations may need [-]. The simulated `servoj` is late where
+they need more than the torques: nothing smooths what a client sends, and the arm swings as far again.
 """
 POINTS = 3.0
 """Largest loss by the bridge that counts as none [percentage points]."""

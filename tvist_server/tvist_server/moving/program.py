@@ -104,7 +104,7 @@ def $name():
 
   q = get_target_joint_positions() # where servoj leads the arm
   change = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # of q in the last period
-  bend = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # how much more that was than in the period before
+  before = change # and in the period before
   extra = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # what of the change was not the change of the set-points
   last = setpoint($SETPOINTS + 12) # last set-point that was played
   number = newest - 2 # of the present one, which becomes the last but one, so that the newest may be late by a period
@@ -162,16 +162,9 @@ def $name():
       blind = read_input_integer_register($NUMBER) != now # the next package has come meanwhile
     end
     if blind: # the arm goes on as before, with its acceleration if it is not for long
-      way = change
-      if silence <= $again:
-        way = change + bend
-        i = 0
-        while i < 6:
-          if norm(way[i]) > most:
-            way[i] = change[i]
-          end
-          i = i + 1
-        end
+      way = change + change - before
+      if silence > $again or norm(way) > most: # the sum of all joints, since a tick has no time to look at each
+        way = change
       end
       alone = alone + 1
     else:
@@ -199,7 +192,7 @@ def $name():
       last_number = number
     end
     q = q + way
-    bend = way - change
+    before = change
     change = way
 
     if why == $ended_not:
