@@ -113,8 +113,10 @@ async def _moves(
     client: "Robot", arm: "RobotDescription", wanted: "ModalPlan", picture: Path, *, sure: bool
 ) -> "tuple[MovePlan, Moved]":
     """Plan, show, ask and move as a client."""
+    from tvist_client.errors import MotionStoppedError
     from tvist_lab.figures import move_plan_figure, save
     from tvist_lab.identification.positioned import make_moves, plan_moves
+    from tvist_protocol.errors import RefusedError
 
     say("planning the moves")
     plan = await plan_moves(client, arm, wanted)
@@ -122,9 +124,14 @@ async def _moves(
     _show(plan, picture)
     if not sure and not await asyncio.to_thread(_agreed):
         raise Failure("nothing was moved")
+    stops: list[str | None] = []
+    client.on_event(lambda event: stops.append(event.why) if event.kind.endswith("_stop") else None)
     async with client.control("identify") as control:
         await _ready(client, control, plan)
-        return plan, await make_moves(client, control, plan, say)
+        try:
+            return plan, await make_moves(client, control, plan, say)
+        except (RefusedError, MotionStoppedError) as error:  # the stop says why, what came after it does not
+            raise Failure(f"the moves were not finished: {stops[-1] if stops else error}") from error
 
 
 async def _ready(client: "Robot", control: "Arm", plan: "MovePlan") -> None:
