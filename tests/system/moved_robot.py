@@ -7,12 +7,14 @@ import numpy as np
 from tests.conformance.served import Served
 from tests.system.proxy import Proxy
 
+SPEED = "0.2"
+"""Speed of the robot's time, so that a busy machine is on time, too."""
 DASHBOARD, PRIMARY, SECONDARY, RTDE = 29999, 30001, 30002, 30004
 
 
 def a_robot(host, *options, seed="1001"):
     """The robot in its own process: it shapes nothing, as UR's do."""
-    real = ("--profile", "real", "--shaper", "none", "--hidden", seed)
+    real = ("--profile", "real", "--shaper", "none", "--hidden", seed, "--speed", SPEED)
     return Served("--ur", "--ur-address", host, *real, *options)
 
 
