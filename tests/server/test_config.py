@@ -279,3 +279,27 @@ def test_a_machine_without_a_temporary_folder_serves_all_the_same(monkeypatch, t
     monkeypatch.setattr("tempfile.gettempdir", none)
     monkeypatch.chdir(tmp_path)
     assert ServeConfig().dump_folder() == tmp_path
+
+
+@pytest.mark.parametrize(
+    ("values", "lag"),
+    [
+        ({}, (0.05, 900.0)),
+        ({"servo_lag": "0.1,400"}, (0.1, 400.0)),
+        ({"calibration": "none"}, None),
+    ],
+)
+def test_the_servo_of_a_robot_that_is_moved_is_the_calibrations_unless_another_is_given(
+    tmp_path, values, lag
+):
+    file = tmp_path / "mine.json"
+    known = msgspec.structs.replace(calibration(), robot="UR5e", servo_lag_s=0.05, servo_gain=900.0)
+    file.write_bytes(calibration_to_json(known))
+    given = {
+        "calibration": str(file),
+        "shaper": "none",
+        "enable_motion": True,
+        "plant": "ur://127.0.0.1",
+    } | values
+    moved = config(**given)
+    assert moved.setup().plant.maker.keywords["lag"] == lag

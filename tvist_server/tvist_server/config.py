@@ -14,6 +14,7 @@ from tvist_controller.setup import Adapt, Setup, check_rating, paper_payload
 from tvist_controller.sources.own_plants import OwnPlant, load_plant
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
+from tvist_protocol.calibration import Calibration
 from tvist_protocol.info import Clock
 from tvist_protocol.values import Namespace, Payload, RobotName, Seed
 from tvist_server.allowed_hosts import AllowedHosts
@@ -112,7 +113,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     rad in the flange frame; another one is refused [any: the robot's is taken over]."""
     servo_lag: str | tuple[float, ...] | None = None
     """With --enable-motion: lag of the robot's servoj, which set-points then make up for: T,k in s and 1/s², as
-    tvist identify --plant finds it, or simulated for a robot of tvist serve --ur [none]."""
+    tvist identify --plant finds it, or simulated for a robot of tvist serve --ur [the calibration's, if it has one]."""
     hidden: Seed | None = None
     """Simulate an arm that is not quite its file: springs, dampers, loops, rotors, friction and payload are drawn from
     this seed and told to nobody. With several robots, each further one uses the next."""
@@ -338,7 +339,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
                 shape_servo=self.shape_servo,
                 adapt=self.adapt,
-                plant=None if self.plant is None else self._plant(self.plant, description),
+                plant=None if self.plant is None else self._plant(self.plant, description, calibration),
                 hidden=self.hidden,
             )
             setup = shaped_by(setup, "none" if watched else _either(self.shaper, profile.shaper))
@@ -382,7 +383,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             if value is not None:
                 raise ValueError(f"{name} is {value}, but the robot at {self.plant} {what}: leave {name} out")
 
-    def _plant(self, place: str, description: RobotDescription) -> OwnPlant:
+    def _plant(self, place: str, description: RobotDescription, calibration: Calibration | None) -> OwnPlant:
         """Find a plant: the robot at an address, or what `load_plant` finds.
 
         Raises:
@@ -402,21 +403,30 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                     where,
                     speed_cap=_either(self.speed_cap, SPEED_CAP),
                     tool=None if self.tcp is None else numbers_of("tcp", self.tcp, 6),
-                    lag=self._lag(),
+                    lag=self._lag(calibration),
                     start=start,
                 ),
             )
         return OwnPlant(str(where), "", partial(WatchedRobot, where))
 
-    def _lag(self) -> ServoLag | None:
-        """Return the lag of a robot that is moved.
+    def _lag(self, calibration: Calibration | None) -> ServoLag | None:
+        """Return the lag of a robot that is moved: the one given, or the calibration's.
 
         Raises:
             ValueError: It is none.
         """
-        if self.servo_lag is None or self.servo_lag == "simulated":
-            return None if self.servo_lag is None else ServoLag.simulated()
-        time, gain = numbers_of("servo_lag", self.servo_lag, 2)
+        if self.servo_lag == "simulated":
+            return ServoLag.simulated()
+        if self.servo_lag is not None:
+            time, gain = numbers_of("servo_lag", self.servo_lag, 2)
+        elif (
+            calibration is not None
+            and calibration.servo_lag_s is not None
+            and calibration.servo_gain is not None
+        ):
+            time, gain = calibration.servo_lag_s, calibration.servo_gain
+        else:
+            return None
         if not (0.0 <= time <= MOST_LAG and gain >= LEAST_GAIN):
             raise ValueError(
                 f"servo_lag is {time:g},{gain:g}: must be a time from 0 to {MOST_LAG:g} s and a gain of {LEAST_GAIN:g} "
