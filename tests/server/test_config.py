@@ -14,6 +14,7 @@ from tvist_plant.user_file import UserFileError
 from tvist_protocol.calibration import calibration_to_json
 from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.config_file import from_mapping, read_toml
+from tvist_server.moving.servo_lag import ServoLag
 
 
 def config(**values) -> ServeConfig:
@@ -302,4 +303,4 @@ def test_the_servo_of_a_robot_that_is_moved_is_the_calibrations_unless_another_i
         "plant": "ur://127.0.0.1",
     } | values
     moved = config(**given)
-    assert moved.setup().plant.maker.keywords["lag"] == lag
+    assert moved.setup().plant.maker.keywords["lag"] == (lag and ServoLag(*lag))
