@@ -43,6 +43,11 @@ class Measurement:
     """Specific force in the flange frame, with noise, shape (3,) [m/s^2]."""
     timestamp: float | None = None
     """Time at which the plant measured, by its own clock [s]; None if it has none."""
+    wrench: Floats | None = None
+    """Force and torque about the flange's origin that all beyond the force sensor exerts on the flange, in its frame,
+    shape (6,) [N, N m]: weight, inertia and contact of what is mounted, with noise and offset; a push towards the
+    flange reads along the push, as UR's do. None: the plant has no such sensor.
+    """
 
 
 @dataclass(frozen=True)
