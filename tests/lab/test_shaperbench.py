@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tvist_lab.metrics import best_tool_acceleration
-from tvist_lab.mujoco_arm import MujocoArm
+from tvist_plant.world.mujoco_arm import MujocoArm
 from tvist_lab.studies.leaderboard import ON_PAGE, best_in_bold, leaderboard, ranked
 from tvist_lab.studies.pages import page
 from tvist_lab.studies.shaperbench import WANTED, bends, check_causal, draw, inspect, jobs, path_error

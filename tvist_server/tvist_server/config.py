@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from tvist_controller.cell.description import Cell, as_declared
 from tvist_controller.setup import Adapt, Setup, check_rating, paper_payload
-from tvist_controller.sources.own_plants import OwnPlant, load_plant
+from tvist_controller.sources.own_plants import OwnPlant, load_plant, load_world
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
 from tvist_protocol.info import Clock
@@ -94,6 +94,10 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     which runs that file; or an installed plant, such as mujoco. NAME takes a RobotDescription and a Payload, and makes
     a plant. ur://ADDRESS[:PORT] only watches a robot of UR's through its RTDE interface: its state becomes ours, and
     nothing moves it from here."""
+    world: str | None = None
+    """Scene in which the arm stands, and whose things it touches: table, wall, peg, pallet, or a file in MuJoCo's
+    format, in the frame of the arm's base. The arm is then simulated by MuJoCo, and has a force sensor in its flange.
+    Needs the extra world [nothing to touch; that of the cell, if it names one]."""
     hidden: Seed | None = None
     """Simulate an arm that is not quite its file: springs, dampers, loops, rotors, friction and payload are drawn from
     this seed and told to nobody. With several robots, each further one uses the next."""
@@ -319,7 +323,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
                 shape_servo=self.shape_servo,
                 adapt=self.adapt,
-                plant=None if self.plant is None else _plant(self.plant),
+                plant=self._plant(cell),
                 hidden=self.hidden,
             )
             setup = shaped_by(setup, "none" if watched else _either(self.shaper, profile.shaper))
@@ -346,13 +350,28 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         given = {
             "shaper": self.shaper, "adapt": self.adapt, "learn": self.learn, "cell": self.cell, "state": self.state,
             "start": self.start, "shape_servo": self.shape_servo or None, "truth": self.truth or None,
-            "robots": self.robots,
+            "robots": self.robots, "world": self.world,
         }  # fmt: skip
         for name, value in given.items():
             if value is not None:
                 raise ValueError(
                     f"{name} is {value}, but the robot at {self.plant} is only watched: leave {name} out"
                 )
+
+    def _plant(self, cell: Cell | None) -> OwnPlant | None:
+        """Find the plant, or the scene in which the arm stands; None for the simulated arm of the robot file.
+
+        Raises:
+            ValueError: There is none, or both are given.
+            UserFileError: See `load_plant`.
+        """
+        world = self.world or (None if cell is None else cell.world)
+        if world is None:
+            return None if self.plant is None else _plant(self.plant)
+        if self.plant is not None or self.hidden is not None:
+            other = f"hidden is {self.hidden}" if self.plant is None else f"plant is {self.plant}"
+            raise ValueError(f"world is {world}, in which MuJoCo simulates the arm, but {other}: leave one out")
+        return load_world(world)
 
     @property
     def profile_in_force(self) -> ProfileName | None:
