@@ -319,7 +319,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 name=self.name,
                 seed=self.seed,
                 clock=self.clock,
-                truth=self.truth,
+                truth=self.truth or self._scene(cell) is not None,
                 compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
                 shape_servo=self.shape_servo,
                 adapt=self.adapt,
@@ -365,13 +365,19 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             ValueError: There is none, or both are given.
             UserFileError: See `load_plant`.
         """
-        world = self.world or (None if cell is None else cell.world)
+        world = self._scene(cell)
         if world is None:
             return None if self.plant is None else _plant(self.plant)
         if self.plant is not None or self.hidden is not None:
             other = f"hidden is {self.hidden}" if self.plant is None else f"plant is {self.plant}"
-            raise ValueError(f"world is {world}, in which MuJoCo simulates the arm, but {other}: leave one out")
+            raise ValueError(
+                f"world is {world}, in which MuJoCo simulates the arm, but {other}: leave one out"
+            )
         return load_world(world)
+
+    def _scene(self, cell: Cell | None) -> str | None:
+        """Scene in which the arm stands: that which is given, or else that of the cell; None for none."""
+        return self.world or (None if cell is None else cell.world)
 
     @property
     def profile_in_force(self) -> ProfileName | None:

@@ -12,9 +12,9 @@ from tvist_controller.sources.own_files import OwnFileError, ends, is_file, run_
 from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import Plant, PlantError
-from tvist_plant.user_file import UserFileError, named
+from tvist_plant.user_file import named
 from tvist_plant.variants import VARIANTS, Variant
-from tvist_plant.world.scene_file import SceneFile, find_scene
+from tvist_plant.world.scene_file import SceneError, SceneFile, find_scene
 
 GROUP = "tvist.plants"
 """Group of the entry points by which installed packages offer plants."""
@@ -73,8 +73,9 @@ class OwnPlant:
             made = self.maker(description, carried)
             if isinstance(made, Plant):
                 return called(made, description.joints)
-        except (PlantError, UserFileError) as error:  # it says in a sentence why it cannot be made
-            raise OwnPlantError(f"plant {self.place}: {error}") from error
+        except (PlantError, SceneError) as error:  # it says in a sentence why it cannot be made
+            said = f"{error}" if self.place.startswith(WORLD) else f"plant {self.place}: {error}"
+            raise OwnPlantError(said) from error
         except (Exception, SystemExit) as error:
             if ends(error):
                 raise
@@ -124,7 +125,6 @@ def load_world(scene: str) -> OwnPlant:
 
     Raises:
         SceneError: There is none.
-        UserFileError: It is not a regular file, or is larger than 4 MiB.
     """
     file = find_scene(scene)
     return OwnPlant(WORLD + scene, file.sha256, partial(_in_scene, file))

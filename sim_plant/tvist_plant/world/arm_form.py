@@ -73,7 +73,9 @@ def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -
             frame = body.add_body(name=link_name(description, number), pos=[a / 2, 0, 0], quat=turn)
             add_mass(frame, lump, far, small)
         else:
-            frame = body.add_body(name=link_name(description, number), pos=place.translation.tolist(), quat=turn)
+            frame = body.add_body(
+                name=link_name(description, number), pos=place.translation.tolist(), quat=turn
+            )
             add_mass(frame, links.mass[number], links.com[number], links.inertia[number])
         B = drives.rotor_inertia[number]
         rotor = spec.worldbody.add_body()

@@ -5,10 +5,11 @@ MuJoCo's contact force, with a negative `solref` (-s, -b) and an impedance d tha
     f = (s r + b v) / [Â (1 - d) + A d]
 
 at depth r and speed of approach v, where A is the inverse of the effective mass of the contact, and Â MuJoCo's
-estimate of it at compile time. With d near 0 only Â remains. So s = k Â and b = c Â make a spring of k [N/m] and a damper
-of c [N s/m] of whatever touches, and no light body or far lever changes that. As the force is explicit in the position, a body with
-A k h² near 4 flies apart; `check_masses` refuses it long before. Friction is up to μ f, and up to there a damper of
-`GRIP`/`IMPRATIO` of what friction would need to stop the slip in one step: what is held creeps, by micrometres a second.
+estimate of it at compile time. With d near 0 only Â remains. So s = k Â and b = c Â make a spring of k [N/m] and a
+damper of c [N s/m] of whatever touches, and no light body or far lever changes that. The force follows the position a
+step of h later, so a body with A k h² above 4 flies apart; `check_masses` refuses it long before. Friction is at most
+μ f. Below that it yields a little, by `IMPRATIO` less than the contact does, so that what is held creeps by some
+micrometres a second.
 
 Source: MuJoCo's documentation, "Computation", sections "Impedance", "Reference" and "Regularization".
 """
@@ -21,6 +22,8 @@ import numpy as np
 
 from tvist_plant.world.scene_file import SceneError
 
+PREFIX = "world/"
+"""What precedes the scene's names in the model, so that no name of the arm's is taken."""
 STIFFNESS = 1e5
 """Stiffness of a contact of which no shape gives one [N/m]."""
 DAMPING_RATIO = 0.5
@@ -109,10 +112,11 @@ def check_masses(model: "mujoco.MjModel", timestep: float) -> None:
             light, turning = model.body_invweight0[body]
             reach = min(float(model.geom_rbound[geom]), 1.0)
             if (value := (light + turning * reach**2) * k * timestep**2) > FIRMEST:
-                name = model.body(body).name or f"body {body}"
+                name = model.body(body).name.removeprefix(PREFIX)
                 raise SceneError(
-                    f"{name} of {model.body_subtreemass[body]:.3g} kg is too light for a contact of {k:.3g} N/m: it would "
-                    f'fly apart. Give it {value / FIRMEST:.2g} times the mass, or its shapes a softer solref="-N/m -N s/m"'
+                    f"{name} of {model.body_subtreemass[body]:.3g} kg is too light for a contact of {k:.3g} N/m, and "
+                    f"would fly apart: give it {value / FIRMEST:.2g} times the mass, or its shapes a softer "
+                    'solref="-N/m -N s/m"'
                 )
 
 

@@ -37,7 +37,11 @@ def add_fingers(spec: "mujoco.MjSpec", load: "mujoco.MjsBody", hand: Hand) -> No
         finger = load.add_body(name=name, pos=place.tolist(), quat=turn, mass=MASS, explicitinertial=True)
         finger.inertia = [1e-6, 1e-6, 1e-6]
         finger.add_joint(
-            name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, -side, 0.0], armature=DRIVE, damping=DAMPING
+            name=name,
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=[0.0, -side, 0.0],
+            armature=DRIVE,
+            damping=DAMPING,
         )
         finger.add_geom(
             name=name, type=mujoco.mjtGeom.mjGEOM_BOX, size=list(PAD), mass=0.0, condim=4, friction=list(FRICTION),

@@ -9,14 +9,12 @@ import pinocchio as pin
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import Hand, Shape, Things
 from tvist_plant.world.arm_form import LOAD, arm_spec, link_name
-from tvist_plant.world.contacts import IMPRATIO, add_pairs, check_masses, set_contacts
+from tvist_plant.world.contacts import IMPRATIO, PREFIX, add_pairs, check_masses, set_contacts
 from tvist_plant.world.fingers import add_fingers
 from tvist_plant.world.scene_file import SceneError, SceneFile
 
 TOOL = "tool"
 """Name of the scene's body whose shapes are mounted on the flange."""
-PREFIX = "world/"
-"""What precedes the scene's names in the model, so that no name of the arm's is taken."""
 MOST_BODIES = 50
 """Largest number of bodies that move."""
 _KINDS = {
@@ -114,7 +112,9 @@ def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody") -> None:
         SceneError: It is more than shapes of primitive kinds.
     """
     if tool.joints or tool.bodies:
-        raise SceneError("the body 'tool' is mounted on the flange, and can have shapes only, without joints and bodies")
+        raise SceneError(
+            "the body 'tool', which is mounted on the flange, has joints or bodies: must have shapes only"
+        )
     for number, one in enumerate(tool.geoms):
         if one.type not in _KINDS:
             raise SceneError(f"shape {number} of the body 'tool' is a mesh: must be a primitive shape")
@@ -174,7 +174,8 @@ def _things(name: str, model: "mujoco.MjModel", bodies: tuple[int, ...], arm: se
         )
         for number in range(model.nsite) if model.site(number).name
     }  # fmt: skip
-    return Things(name, tuple(model.body(body).name.removeprefix(PREFIX) for body in bodies), tuple(shapes), areas, unseen)
+    names = tuple(model.body(body).name.removeprefix(PREFIX) for body in bodies)
+    return Things(name, names, tuple(shapes), areas, unseen)
 
 
 def _shape(

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from tvist_plant.user_file import UserFileError, read_bytes
+from tvist_plant.user_file import UserFileError, read_bytes, xml
 
 SCENES = Path(__file__).parent / "scenes"
 """Folder of the scenes that come with the package."""
 
 
-class SceneError(UserFileError):
+class SceneError(ValueError):
     """There is no such scene, or no arm can stand in it; the message says why."""
 
 
@@ -23,7 +23,7 @@ class SceneFile:
     path: Path
     """Its file."""
     sha256: str
-    """SHA-256 of the file, in hexadecimal; of files that it includes nothing is in it."""
+    """SHA-256 of the file, in hexadecimal; it says nothing of files that this one includes."""
 
 
 def scenes() -> list[str]:
@@ -38,8 +38,7 @@ def find_scene(name: str) -> SceneFile:
         name: One of `scenes`, or path of a file in MuJoCo's format (MJCF).
 
     Raises:
-        SceneError: There is no such file, or it cannot be read.
-        UserFileError: It is not a regular file, or is larger than 4 MiB.
+        SceneError: There is no such file, or it is none of MuJoCo's.
     """
     path = SCENES / f"{name}.xml" if name in scenes() else Path(name)
     try:
@@ -49,4 +48,14 @@ def find_scene(name: str) -> SceneFile:
         raise SceneError(
             f"world is {name!r}: must be one of {known}, or a file in MuJoCo's format ({error.strerror})"
         ) from error
+    except UserFileError as error:
+        raise SceneError(str(error)) from error
+    try:
+        root = xml(content).tag
+    except UserFileError as error:
+        raise SceneError(f"world {name}: {error}") from error
+    if root != "mujoco":
+        raise SceneError(
+            f"world {name}: it begins with <{root}>: must be a file in MuJoCo's format, <mujoco>"
+        )
     return SceneFile(name, path.resolve(), sha256(content).hexdigest())

@@ -215,9 +215,11 @@ class SecondOpinion:
         mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, self._flange, self._felt, 1)
 
     def wrench(self) -> Floats:
-        """What all beyond the flange exerts on it, about its origin and in its frame, after `flange`, shape (6,) [N, N m]."""
+        """What all beyond the flange exerts on it, in its frame, shape (6,) [N, N m]; to be asked after `flange`."""
         data, turn = self.data, np.array(self._turn).reshape(3, 3)
-        moment, force = np.split(data.cfrc_int[self._load], 2)  # of the flange, about the centre of mass of the arm
+        moment, force = np.split(
+            data.cfrc_int[self._load], 2
+        )  # of the flange, about the centre of mass of the arm
         lever = data.subtree_com[self._model.body_rootid[self._load]] - self._place
         return -np.concatenate([turn.T @ force, turn.T @ (moment + np.cross(lever, force))])
 

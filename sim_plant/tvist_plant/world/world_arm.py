@@ -1,8 +1,5 @@
 """The arm in MuJoCo among things that it touches, as a plant."""
 
-from collections.abc import Callable
-
-import mujoco
 import numpy as np
 import pinocchio as pin
 
@@ -13,8 +10,8 @@ from tvist_plant.plant import Hand, Measurement, PlantError, Response, Things
 from tvist_plant.sensors import Accelerometer, ForceSensor
 from tvist_plant.world.fingers import Fingers
 from tvist_plant.world.mujoco_arm import TIMESTEP, MujocoArm
-from tvist_plant.world.scene import build
-from tvist_plant.world.scene_file import SceneError, SceneFile
+from tvist_plant.world.scene import PREFIX, build
+from tvist_plant.world.scene_file import SceneFile
 from tvist_plant.world.second_opinion import SecondOpinion
 
 DEEPEST = 1e-4
@@ -40,8 +37,6 @@ class WorldArm(MujocoArm):
         self._fingers: Fingers | None = None
         super().__init__(description, payload)
         self._seeded(0)
-        self._placed = False
-        """Whether the arm has been put somewhere."""
 
     def _made(self, payload: Payload) -> SecondOpinion:
         self._world = build(self._description, payload, self._scene, TIMESTEP, self._hand)
@@ -64,8 +59,7 @@ class WorldArm(MujocoArm):
         """Put the arm at rest, and the things where the scene has them; see `Plant.reset`.
 
         Raises:
-            SceneError: The arm would stand in something, at the first time.
-            PlantError: The same later.
+            PlantError: The arm would stand in something.
         """
         self._seeded(seed)
         if self._fingers is not None:
@@ -73,9 +67,7 @@ class WorldArm(MujocoArm):
         measured = super().reset(command, payload=payload, seed=seed)
         met = self._met()
         if met is not None:
-            why = f"world {self._scene.name}: {met}: choose a posture in which the arm is clear"
-            raise PlantError(why) if self._placed else SceneError(why)
-        self._placed = True
+            raise PlantError(f"world {self._scene.name}: {met}: choose a posture in which the arm is clear")
         return measured
 
     def step(self, command: DriveCommand) -> Measurement:
@@ -147,7 +139,7 @@ class WorldArm(MujocoArm):
             bodies = [int(model.geom_bodyid[geom]) for geom in touch.geom]
             if touch.dist < -DEEPEST and any(body in self._world.arm or model.geom(geom).name.startswith("arm ")
                                              for body, geom in zip(bodies, touch.geom, strict=True)):  # fmt: skip
-                first, second = (model.geom(geom).name for geom in touch.geom)
+                first, second = (model.geom(geom).name.removeprefix(PREFIX) for geom in touch.geom)
                 return f"{first} stands {-1e3 * touch.dist:.3g} mm inside {second}"
         return None
 
