@@ -26,18 +26,22 @@ PREFIX = "world/"
 """What precedes the scene's names in the model, so that no name of the arm's is taken."""
 STIFFNESS = 1e5
 """Stiffness of a contact of which no shape gives one [N/m]."""
-DAMPING_RATIO = 0.5
+DAMPING_RATIO = 0.3
 """Damping ratio of such a contact, for the mass that MuJoCo estimates [-]."""
 IMPEDANCE = 2e-3
 """d: the stiffness of a contact depends by this share on what touches [-]."""
-IMPRATIO = 1e4
+IMPRATIO = 1e6
 """How much harder friction is than the contact [-]."""
+FACES = 4
+"""Points at which a box lies on a box or a plane, which share the stiffness; all else touches at single points."""
 GRIP = 500.0
 """Rate at which friction ends a slip [1/s]."""
 MOST_PAIRS = 4000
 """Largest number of pairs of shapes that may touch, which is what a step of 0.25 ms can look through in real time."""
 FIRMEST = 0.5
 """Largest A k h²: beyond, a contact is an oscillation of few steps [-]."""
+
+_FLAT = {int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_PLANE)}
 
 Names = frozenset[str]
 
@@ -63,8 +67,8 @@ def add_pairs(
         if frozenset((first.name, second.name)) in own:
             continue
         pair = spec.add_pair(geomname1=first.name, geomname2=second.name)
-        pair.condim = max(first.condim, second.condim)
         slide, twist, roll = np.maximum(first.friction, second.friction)
+        pair.condim = max(first.condim, second.condim) if slide > 0.0 else 1
         pair.friction = [slide, slide, twist, roll, roll]
         pair.margin = max(first.margin, second.margin)
         pair.solimp = [IMPEDANCE, IMPEDANCE, 1e-3, 0.5, 2.0]
@@ -92,8 +96,8 @@ def set_contacts(model: "mujoco.MjModel", given: Sequence[tuple[float | None, fl
         inverse = _inverse_mass(model, number)
         k = STIFFNESS if stiffness is None else stiffness
         c = 2.0 * DAMPING_RATIO * np.sqrt(k / inverse) if damping is None else damping
-        model.pair_solref[number] = [-k * inverse, -c * inverse]
-        model.pair_solreffriction[number] = [0.0, -GRIP]
+        model.pair_solref[number] = np.array([-k * inverse, -c * inverse]) / _points(model, number)
+        model.pair_solreffriction[number] = [0.0, -GRIP * IMPEDANCE]
 
 
 def check_masses(model: "mujoco.MjModel", timestep: float) -> None:
@@ -118,6 +122,12 @@ def check_masses(model: "mujoco.MjModel", timestep: float) -> None:
                     f"would fly apart: give it {value / FIRMEST:.2g} times the mass, or its shapes a softer "
                     'solref="-N/m -N s/m"'
                 )
+
+
+def _points(model: "mujoco.MjModel", pair: int) -> int:
+    """Number of points at which two shapes touch that share the stiffness."""
+    kinds = {int(model.geom_type[geom]) for geom in (model.pair_geom1[pair], model.pair_geom2[pair])}
+    return FACES if kinds <= _FLAT else 1
 
 
 def _inverse_mass(model: "mujoco.MjModel", pair: int) -> float:

@@ -126,18 +126,30 @@ def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody") -> None:
 def _add_capsules(
     spec: "mujoco.MjSpec", description: RobotDescription, payload: Payload, hand: Hand | None, *, tooled: bool
 ) -> None:
-    """Give the arm the capsules of its file, and one for the payload unless the scene has a tool."""
+    """Give the arm the capsules of its file, and one for the payload unless the scene has a tool.
+
+    They have no friction of their own: what they touch has.
+    """
     capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
     for one in description.collision.bodies:
         body = spec.worldbody if one.link < 0 else spec.body(link_name(description, one.link))
         ends = _ends(one.start, one.end)
-        body.add_geom(name=f"arm {one.name}", type=capsule, size=[one.radius, 0, 0], fromto=ends, mass=0.0)
+        body.add_geom(
+            name=f"arm {one.name}",
+            type=capsule,
+            size=[one.radius, 0, 0],
+            fromto=ends,
+            mass=0.0,
+            friction=[0, 0, 0],
+        )
     radius, end = description.collision.payload_radius, 2.0 * np.array(payload.com)
     if hand is not None:  # the palm, as far as the fingers' roots
         radius, end = min(radius, 0.04), hand.root - 0.04 * hand.direction
     if not tooled and description.collision.bodies and (payload.mass or hand is not None):
         ends = _ends((0.0, 0.0, 0.0), tuple(end.tolist()))
-        spec.body(LOAD).add_geom(name="arm payload", type=capsule, size=[radius, 0, 0], fromto=ends, mass=0.0)
+        spec.body(LOAD).add_geom(
+            name="arm payload", type=capsule, size=[radius, 0, 0], fromto=ends, mass=0.0, friction=[0, 0, 0]
+        )
 
 
 def _ends(start: tuple[float, ...], end: tuple[float, ...]) -> list[float]:

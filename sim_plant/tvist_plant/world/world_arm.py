@@ -8,9 +8,10 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.model import Floats
 from tvist_plant.plant import Hand, Measurement, PlantError, Response, Things
 from tvist_plant.sensors import Accelerometer, ForceSensor
+from tvist_plant.world.contacts import PREFIX
 from tvist_plant.world.fingers import Fingers
 from tvist_plant.world.mujoco_arm import TIMESTEP, MujocoArm
-from tvist_plant.world.scene import PREFIX, build
+from tvist_plant.world.scene import build
 from tvist_plant.world.scene_file import SceneFile
 from tvist_plant.world.second_opinion import SecondOpinion
 
@@ -33,7 +34,8 @@ class WorldArm(MujocoArm):
     """
 
     def __init__(self, description: RobotDescription, payload: Payload, scene: SceneFile) -> None:
-        self._scene, self._hand = scene, None
+        self._scene = scene
+        self._hand: Hand | None = None
         self._fingers: Fingers | None = None
         super().__init__(description, payload)
         self._seeded(0)
@@ -90,10 +92,10 @@ class WorldArm(MujocoArm):
             measured = self.step(DriveCommand(*command))
             rows.append((measured, self._force, self._arm.flange_position(), self._rotation))
         measured_, *felt = zip(*rows, strict=True)
-        names = ("q", "qd", "moment", "accelerometer")
-        columns = {name: np.array([getattr(one, name) for one in measured_]) for name in names}
-        wrench = np.array([one.wrench for one in measured_])
-        return Response(Measurement(**columns, wrench=wrench), *(np.array(column) for column in felt))
+        names = ("q", "qd", "moment", "accelerometer", "wrench")
+        columns = [np.array([getattr(one, name) for one in measured_]) for name in names]
+        *sensors, wrench = columns
+        return Response(Measurement(*sensors, wrench=wrench), *(np.array(column) for column in felt))
 
     def _measure(self) -> Measurement:
         measured = super()._measure()
