@@ -93,9 +93,9 @@ class WorldArm(MujocoArm):
             rows.append((measured, self._force, self._arm.flange_position(), self._rotation))
         measured_, *felt = zip(*rows, strict=True)
         names = ("q", "qd", "moment", "accelerometer", "wrench")
-        columns = [np.array([getattr(one, name) for one in measured_]) for name in names]
-        *sensors, wrench = columns
-        return Response(Measurement(*sensors, wrench=wrench), *(np.array(column) for column in felt))
+        q, qd, moment, force, wrench = (np.array([getattr(one, name) for one in measured_]) for name in names)
+        measured = Measurement(q, qd, moment, force, wrench=wrench)
+        return Response(measured, *(np.array(column) for column in felt))
 
     def _measure(self) -> Measurement:
         measured = super()._measure()
