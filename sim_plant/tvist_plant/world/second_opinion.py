@@ -116,6 +116,7 @@ class SecondOpinion:
         self._motors = dofs([motor_name(number) for number in range(description.joints)])
         self._flexes = dofs([flex_name(number, axis) for number in links for axis in "yz"])
         self._flange, self._load = self._model.body(FLANGE).id, self._model.body(LOAD).id
+        self._root = self._model.body_rootid[self._load]
         self._flex_stiffness = np.repeat(description.link_flexibility.stiffness, 2)
         self._s = np.zeros(description.joints)
         self._command = np.zeros((3, description.joints))
@@ -216,12 +217,14 @@ class SecondOpinion:
 
     def wrench(self) -> Floats:
         """What all beyond the flange exerts on it, in its frame, shape (6,) [N, N m]; to be asked after `flange`."""
-        data, turn = self.data, np.array(self._turn).reshape(3, 3)
-        moment, force = np.split(
-            data.cfrc_int[self._load], 2
-        )  # of the flange, about the centre of mass of the arm
-        lever = data.subtree_com[self._model.body_rootid[self._load]] - self._place
-        return -np.concatenate([turn.T @ force, turn.T @ (moment + np.cross(lever, force))])
+        data, turn = self.data, self._turn.reshape(3, 3)
+        whole = data.cfrc_int[self._load]  # of the flange, about the centre of mass of the arm
+        x, y, z = (data.subtree_com[self._root] - self._place).tolist()
+        fx, fy, fz = whole[3:].tolist()
+        moment = whole[:3] + (y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)
+        felt = np.empty(6)
+        felt[:3], felt[3:] = -whole[3:] @ turn, -moment @ turn
+        return felt
 
     def push(self, torque: Floats) -> None:
         """Apply torques to the link side of the joints from now on, shape (n,) [N m]."""

@@ -42,6 +42,7 @@ class WorldArm(MujocoArm):
 
     def _made(self, payload: Payload) -> SecondOpinion:
         self._world = build(self._description, payload, self._scene, TIMESTEP, self._hand)
+        self._bodies, self._own = (np.array(one, dtype=np.int64) for one in (self._world.bodies, self._world.arm))
         return SecondOpinion(self._description, payload, TIMESTEP, self._world.model)
 
     def _load(self, payload: Payload) -> None:
@@ -162,11 +163,3 @@ class WorldArm(MujocoArm):
         """Return the measured distance between the fingers [m]."""
         assert self._fingers is not None
         return self._fingers.opening(self._arm.data)
-
-    @property
-    def _bodies(self) -> Floats:
-        return np.array(self._world.bodies, dtype=np.int64)
-
-    @property
-    def _own(self) -> list[int]:
-        return list(self._world.arm)
