@@ -44,7 +44,9 @@ def moving(q, ticks):
     time = np.arange(ticks) / ticks
     way = 0.2 * (1.0 - np.cos(2.0 * np.pi * time))
     speed = np.gradient(way, 0.002)
-    return [DriveCommand(q + one, np.full(6, rate), np.zeros(6)) for one, rate in zip(way, speed, strict=True)]
+    return [
+        DriveCommand(q + one, np.full(6, rate), np.zeros(6)) for one, rate in zip(way, speed, strict=True)
+    ]
 
 
 def test_in_air_it_moves_as_the_arm_without_a_world(tmp_path, ur5e):
@@ -146,7 +148,9 @@ def test_an_elastic_impact_has_the_peak_of_v_sqrt_k_m_and_gains_no_energy(tmp_pa
         else:
             before, speed = energy, data.qvel[0] * reach
     expected = speed * np.sqrt(k * inertia[0, 0] / reach**2)
-    measured("peak over v sqrt(k m), energy gained over the incoming", (peak / expected, after / before - 1.0))
+    measured(
+        "peak over v sqrt(k m), energy gained over the incoming", (peak / expected, after / before - 1.0)
+    )
     assert peak == pytest.approx(expected, rel=0.05)
     assert after / before - 1.0 < 1e-3
 
@@ -190,7 +194,14 @@ def test_equal_runs_are_equal_to_the_bit_and_a_reset_puts_everything_back(tmp_pa
         arm.reset(still(DOWN), seed=3)
         at = arm.places()
         measured = [arm.step(command) for command in moving(DOWN, 60)]
-        runs.append((at, np.array([one.wrench for one in measured]), np.array([one.q for one in measured]), arm.places()))
+        runs.append(
+            (
+                at,
+                np.array([one.wrench for one in measured]),
+                np.array([one.q for one in measured]),
+                arm.places(),
+            )
+        )
     for first, second in zip(*runs, strict=True):
         np.testing.assert_array_equal(first, second)
 
@@ -241,12 +252,15 @@ BOX = '<body name="{0}" pos="-0.5 0 0.2"><freejoint/><geom type="box" size="{1} 
         ("hello", "scene.xml: it is not valid XML"),
         ("<robot/>", "begins with <robot>: must be a file in MuJoCo's format"),
         ("<mujoco><worldbody><geom/></worldbody></mujoco>", "scene.xml: .*size"),
-        (f'<mujoco><worldbody>{2 * BOX.format("a", 0.1, 1)}</worldbody></mujoco>', "repeated name 'a'"),
+        (f"<mujoco><worldbody>{2 * BOX.format('a', 0.1, 1)}</worldbody></mujoco>", "repeated name 'a'"),
         (
             f'<mujoco><worldbody><geom type="plane" size="1 1 1"/>{BOX.format("pea", 0.005, 1e-4)}</worldbody></mujoco>',
             "pea of 0.0001 kg is too light for a contact of .* N/m, .* times the mass",
         ),
-        ('<mujoco><worldbody><body name="tool"><joint/><geom size="0.1"/></body></worldbody></mujoco>', "shapes only"),
+        (
+            '<mujoco><worldbody><body name="tool"><joint/><geom size="0.1"/></body></worldbody></mujoco>',
+            "shapes only",
+        ),
         ('<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>', "stands .* mm inside"),
         (
             "<mujoco><worldbody>"

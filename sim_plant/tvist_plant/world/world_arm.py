@@ -42,7 +42,9 @@ class WorldArm(MujocoArm):
 
     def _made(self, payload: Payload) -> SecondOpinion:
         self._world = build(self._description, payload, self._scene, TIMESTEP, self._hand)
-        self._bodies, self._own = (np.array(one, dtype=np.int64) for one in (self._world.bodies, self._world.arm))
+        self._bodies, self._own = (
+            np.array(one, dtype=np.int64) for one in (self._world.bodies, self._world.arm)
+        )
         return SecondOpinion(self._description, payload, TIMESTEP, self._world.model)
 
     def _load(self, payload: Payload) -> None:
