@@ -221,7 +221,7 @@ class SecondOpinion:
         whole = data.cfrc_int[self._load]  # of the flange, about the centre of mass of the arm
         x, y, z = (data.subtree_com[self._root] - self._place).tolist()
         fx, fy, fz = whole[3:].tolist()
-        moment = whole[:3] + (y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)
+        moment = whole[:3] + np.array([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
         felt = np.empty(6)
         felt[:3], felt[3:] = -whole[3:] @ turn, -moment @ turn
         return felt
