@@ -120,8 +120,8 @@ def test_an_elastic_impact_has_the_peak_of_v_sqrt_k_m_and_gains_no_energy(tmp_pa
     k, v, reach, radius = 1e5, 0.2, 0.55, 0.04
     gap = 4e-4 + phase * v * 0.00025
     text = (
-        f'<mujoco><worldbody><body name="tool"><geom type="sphere" size="{radius}" pos="0 0 0.0125" friction="0 0 0"/></body><geom '
-        f'type="box" size="0.5 0.1 0.3" pos="0.97 {radius + gap + 0.1} 0.2" friction="0 0 0" solref="-{k} 0"/>'
+        f'<mujoco><worldbody><body name="tool"><geom size="{radius}" pos="0 0 0.0125" friction="0 0 0"/></body>'
+        f'<geom type="box" size="0.5 0.1 0.3" pos="0.97 {radius + gap + 0.1} 0.2" friction="0 0 0" solref="-{k} 0"/>'
         "</worldbody></mujoco>"
     )
     arm = world(tmp_path, text, "one-joint")
@@ -254,7 +254,8 @@ BOX = '<body name="{0}" pos="-0.5 0 0.2"><freejoint/><geom type="box" size="{1} 
         ("<mujoco><worldbody><geom/></worldbody></mujoco>", "scene.xml: .*size"),
         (f"<mujoco><worldbody>{2 * BOX.format('a', 0.1, 1)}</worldbody></mujoco>", "repeated name 'a'"),
         (
-            f'<mujoco><worldbody><geom type="plane" size="1 1 1"/>{BOX.format("pea", 0.005, 1e-4)}</worldbody></mujoco>',
+            '<mujoco><worldbody><geom type="plane" size="1 1 1"/>'
+            f"{BOX.format('pea', 0.005, 1e-4)}</worldbody></mujoco>",
             "pea of 0.0001 kg is too light for a contact of .* N/m, .* times the mass",
         ),
         (

@@ -45,9 +45,7 @@ def config(tmp_path, world="table", cell=CELL):
 
 
 def ran(setup, text, record=None):
-    return run_in_lockstep(
-        setup, text, (), record=record, attend=lambda _: None, on_record_error=lambda why: pytest.fail(why)
-    )
+    return run_in_lockstep(setup, text, (), record=record, attend=lambda _: None, on_record_error=pytest.fail)
 
 
 def test_a_program_lifts_a_box_and_its_recording_does_the_same_again(tmp_path):
@@ -118,7 +116,7 @@ def test_an_arm_that_would_stand_in_a_wall_is_one_sentence(tmp_path):
         '<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>'
     )
     with pytest.raises(
-        ConfigError, match="world .*wall.xml: .* stands .* mm inside shape 0: choose a posture"
+        ConfigError, match=r"world .*wall.xml: .* stands .* mm inside shape 0: choose a posture"
     ):
         ran(ServeConfig(world=str(tmp_path / "wall.xml"), clock="free").setup(), "def a():\nend")
 

@@ -186,7 +186,8 @@ def _things(name: str, model: "mujoco.MjModel", bodies: tuple[int, ...], arm: se
         )
         for number in range(model.nsite) if model.site(number).name
     }  # fmt: skip
-    names = tuple(model.body(body).name.removeprefix(PREFIX) for body in bodies)
+    own = (model.body(body).name.removeprefix(PREFIX) for body in bodies)
+    names = tuple(TOOL if one == LOAD else one for one in own)
     return Things(name, names, tuple(shapes), areas, unseen)
 
 
