@@ -244,6 +244,7 @@ def test_the_scenes_stand_still_and_leave_room_for_the_arm(name, ur5e):
 
 
 BOX = '<body name="{0}" pos="-0.5 0 0.2"><freejoint/><geom type="box" size="{1} {1} {1}" mass="{2}"/></body>'
+PEA = BOX.format("pea", 0.005, 1e-4)
 
 
 @pytest.mark.parametrize(
@@ -254,8 +255,7 @@ BOX = '<body name="{0}" pos="-0.5 0 0.2"><freejoint/><geom type="box" size="{1} 
         ("<mujoco><worldbody><geom/></worldbody></mujoco>", "scene.xml: .*size"),
         (f"<mujoco><worldbody>{2 * BOX.format('a', 0.1, 1)}</worldbody></mujoco>", "repeated name 'a'"),
         (
-            '<mujoco><worldbody><geom type="plane" size="1 1 1"/>'
-            f"{BOX.format('pea', 0.005, 1e-4)}</worldbody></mujoco>",
+            f'<mujoco><worldbody><geom type="plane" size="1 1 1"/>{PEA}</worldbody></mujoco>',
             "pea of 0.0001 kg is too light for a contact of .* N/m, .* times the mass",
         ),
         (
