@@ -17,6 +17,7 @@ from tvist_server.config import ConfigError, ServeConfig
 
 if TYPE_CHECKING:
     from tvist_lab.programs.baseline import Run
+    from tvist_lab.programs.expectations import Expectation
     from tvist_lab.programs.limits import Limits, Shortcoming
     from tvist_lab.programs.watch import ProgramWatch, Said
     from tvist_server.server import Server
@@ -48,6 +49,8 @@ class Judged:
     limits: "Limits"
     baseline: "Mapping[str, Run] | None" = None
     """Earlier runs by the names of their programs; None if there is no baseline."""
+    expected: "Sequence[Expectation]" = ()
+    """What each is to leave behind."""
 
 
 def run_program(
@@ -64,6 +67,7 @@ def run_program(
         return refused
     from tvist_lab.programs.account import as_dict, summary
     from tvist_lab.programs.baseline import changes
+    from tvist_lab.programs.expectations import missed
 
     job, lockstep = Job(file, text, inputs, timeout, tell), config.clock == "free"
     watch, errors, server = job.in_lockstep(config) if lockstep else job.in_real_time(config)
@@ -71,14 +75,16 @@ def run_program(
     tell.clear()
     result = {"file": named(file), "lockstep": lockstep, "recording": config.record, **as_dict(watch)}
     found = [*judged.limits.broken(watch)]
+    elsewhere = missed(judged.expected, watch.plant)
     changed = [] if judged.baseline is None else [*changes(judged.baseline[named(file)], result)]
-    failures = [*_ended(watch, errors), *found, *changed]
+    failures = [*_ended(watch, errors), *found, *elsewhere, *changed]
     result |= {"ok": not failures, "failures": [one.as_dict() for one in failures]}
     failure = _failure(file, watch, errors)
-    for one in (*found, *changed):
+    for one in (*found, *elsewhere, *changed):
         say(f"{named(file)}:{'' if one.line is None else f'{one.line}:'} {one.text}")
     if failure is None and failures:
         parts = [f"broke {_counted(found, 'limit')}"] if found else []
+        parts += [f"missed {_counted(elsewhere, 'expectation')}"] if elsewhere else []
         parts += [f"differs from the baseline in {_counted(changed, 'point')}"] if changed else []
         failure = Failure(f"{named(file)} {' and '.join(parts)}")
     return Ran(result, summary(watch), failure, server)

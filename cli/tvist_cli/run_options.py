@@ -13,9 +13,11 @@ from tvist_cli.output import say, typed, write_report
 
 if TYPE_CHECKING:
     from tvist_lab.programs.baseline import Run
+    from tvist_lab.programs.expectations import Expectation
     from tvist_lab.programs.limits import Limits
 
-UNITS = {"max_shake": "m/s²", "max_seconds": "s", "max_joint_speed": "rad/s", "max_tool_speed": "m/s"}
+UNITS = {"max_shake": "m/s²", "max_seconds": "s", "max_joint_speed": "rad/s", "max_tool_speed": "m/s",
+         "max_force": "N"}  # fmt: skip
 """Units of the limits."""
 
 
@@ -39,6 +41,10 @@ class RunLimits:
     """Fail if a joint turns faster than this, in rad/s."""
     max_tool_speed: float | None = None
     """Fail if the tool centre point moves faster than this, in m/s."""
+    max_force: float | None = None
+    """Fail if the world of --world touches the arm with a larger force than this, in N."""
+    expect: list[str] | None = None
+    """BODY in AREA, repeatable: fail if this body of --world does not end in this area, which is a site of its file."""
 
     @property
     def given(self) -> dict[str, float]:
@@ -56,7 +62,20 @@ class RunLimits:
 
         for name, value in self.given.items():
             check_positive(name.replace("_", "-"), value, UNITS[name])
-        return Limits(self.max_shake, self.max_seconds, self.max_joint_speed, self.max_tool_speed)
+        return Limits(
+            self.max_shake, self.max_seconds, self.max_joint_speed, self.max_tool_speed, self.max_force
+        )
+
+    def expected(self) -> "list[Expectation]":
+        """Return what the runs are to leave behind.
+
+        Raises:
+            Failure: It is not said as BODY in AREA.
+        """
+        from tvist_lab.programs.expectations import Expectation, ExpectationError
+
+        with told(ExpectationError, code=2):
+            return [Expectation.of(text) for text in self.expect or ()]
 
 
 @Parameter(name="*")

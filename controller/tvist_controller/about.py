@@ -6,9 +6,9 @@ from tvist_controller.calibrations import available, fits
 from tvist_controller.controller import Controller
 from tvist_controller.reporting.stop_report import stopping
 from tvist_plant.description import RobotDescription
-from tvist_plant.plant import PERIOD
+from tvist_plant.plant import PERIOD, InWorld, Plant
 from tvist_protocol.channels import COMMANDS, tag
-from tvist_protocol.geometry import Capsule, Geometry, Mesh
+from tvist_protocol.geometry import Capsule, Geometry, Mesh, World, WorldShape
 from tvist_protocol.info import CalibrationInfo, Info, Limits
 from tvist_protocol.values import PROTOCOL_VERSION
 
@@ -71,14 +71,28 @@ def info_of(controller: Controller) -> Info:
         arm=controller.arm,
         programs=controller.programs.kept.names,
         poses=setup.description.poses,
-        geometry=geometry_of(setup.description),
+        geometry=geometry_of(setup.description, _world_of(controller.cycle.line.plant)),
         watched=place if watched else None,
         moved=place if controller.supervision is not None else None,
     )
 
 
-def geometry_of(description: RobotDescription) -> Geometry:
-    """Kinematics and shape of an arm, for clients that draw it."""
+def _world_of(plant: Plant) -> World | None:
+    """What stands around an arm, for clients that draw it; None if nothing does."""
+    if not isinstance(plant, InWorld):
+        return None
+    things = plant.things()
+    shapes = [
+        WorldShape(
+            kind=one.kind, size=list(one.size), pose=list(one.pose), body=one.body, colour=list(one.colour)
+        )
+        for one in things.shapes
+    ]
+    return World(name=things.name, bodies=list(things.bodies), shapes=shapes, unseen=things.unseen)
+
+
+def geometry_of(description: RobotDescription, world: World | None = None) -> Geometry:
+    """Kinematics and shape of an arm and its world, for clients that draw it."""
     kinematics, collision = description.kinematics, description.collision
     return Geometry(
         a=list(kinematics.a),
@@ -97,4 +111,5 @@ def geometry_of(description: RobotDescription) -> Geometry:
         payload_radius=collision.payload_radius,
         floor=collision.floor,
         has_floor=collision.has_floor,
+        world=world,
     )

@@ -34,6 +34,7 @@ from tvist_controller.motion.filter_control import Filters
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.planning.basis import PlanBasis, ToolBasis
 from tvist_controller.planning.command_row import Call
+from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.plans import Order, Plans
 from tvist_controller.programs.access import Access
@@ -86,11 +87,7 @@ class Controller(WholeRobot):
         self.plans = Plans(planner, self._basis, order)
         """The way to plans."""
         first = planner.filters.first()
-        self.cycle = ControlCycle(
-            setup.description, first.tvist, elastic=first.elastic, q=np.array(setup.q, dtype=float),
-            declared=body(setup.payload), carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
-            compensate_sag=setup.compensate_sag, law=first.law,
-        )  # fmt: skip
+        self.cycle = _cycle(setup, first, plant)
         if setup.truth:
             truth_of(self.cycle.line.plant)  # raises now, not at the first tick, if the plant has no truth
         self._seed = setup.seed
@@ -465,3 +462,19 @@ class Controller(WholeRobot):
         self._authority.check_step(call.command, call.now)
         self._setpoints.check(call.command)
         return Done(tick=self.tick_number + call.command.ticks)
+
+
+def _cycle(setup: Setup, first: PlannedFilter, plant: Plant | None) -> ControlCycle:
+    """The control line with its arm.
+
+    Raises:
+        ValueError: The arm cannot be where it is to begin.
+    """
+    try:
+        return ControlCycle(
+            setup.description, first.tvist, elastic=first.elastic, q=np.array(setup.q, dtype=float),
+            declared=body(setup.payload), carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
+            compensate_sag=setup.compensate_sag, law=first.law,
+        )  # fmt: skip
+    except PlantError as error:
+        raise ValueError(str(error)) from error

@@ -10,6 +10,7 @@ import numpy as np
 
 from tvist_controller.cell.description import Cell
 from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.paths.poses import placement
 from tvist_controller.sources.mode_source import ModeSource, first_source
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_controller.sources.own_shapers import OwnShaper
@@ -17,7 +18,7 @@ from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
 from tvist_plant.model import carries_weight
-from tvist_plant.plant import Placeable, Plant, Supervised
+from tvist_plant.plant import Gripping, Hand, Placeable, Plant, Supervised
 from tvist_plant.plant_checks import measured_standing
 from tvist_plant.variants import hidden_variant
 from tvist_protocol.calibration import Calibration, calibration_of
@@ -144,7 +145,12 @@ class Setup:
         if self.hidden is not None:
             arm = hidden_variant(self.hidden).make(self.description, carried, self.seed)
             return called(arm, self.description.joints, untold=True)
-        return None if self.plant is None else self.plant.make(self.description, carried, self.seed)
+        made = None if self.plant is None else self.plant.make(self.description, carried, self.seed)
+        if self.cell is not None and self.cell.gripping_tool is not None and isinstance(made, Gripping):
+            assert self.cell.gripper is not None
+            tcp = placement(self.cell.gripping_tool.tcp)
+            made.mount(Hand(self.cell.gripper.stroke, tcp.position, tcp.rotation))
+        return made
 
     def standing(self, plant: Plant | None) -> "Setup":
         """Return the setup for a plant, which begins where it stands if it cannot be placed.

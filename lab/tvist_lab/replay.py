@@ -8,7 +8,15 @@ from typing import Any
 from msgspec.structs import fields
 
 from tvist_controller.api.line import OwnShaper, RecordedShaper, Setup
-from tvist_controller.api.robot import Controller, OwnPlant, Presence, RecordedPlant, SocketNews, load_plant
+from tvist_controller.api.robot import (
+    WORLD,
+    Controller,
+    OwnPlant,
+    Presence,
+    RecordedPlant,
+    SocketNews,
+    load_plant,
+)
 from tvist_lab.recordings.mcap_file import RecordingFile
 from tvist_plant.plant_checks import check_unpaced
 from tvist_plant.variants import VARIANTS
@@ -150,6 +158,11 @@ def _same_plant(start: dict[str, Any], given: OwnPlant | None) -> tuple[OwnPlant
         if given is not None:
             raise ReplayError(f"the robot was served without the plant {given.place}: leave it out")
         return None, []
+    if given is None and recorded.place.startswith(WORLD):  # a scene is data: nothing of it is run
+        try:
+            given = load_plant(recorded.place)
+        except ValueError as error:
+            raise ReplayError(f"{error}: give --plant {WORLD}FILE, with its place now") from error
     if given is None and recorded.place in VARIANTS:
         return load_plant(recorded.place), []
     if recorded.place.lower().startswith("ur://"):

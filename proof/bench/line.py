@@ -19,11 +19,11 @@ from tvist_lab.bench.moving import (
     us_per_tick,
 )  # fmt: skip
 from tvist_lab.in_process import free_setup
-from tvist_lab.second_opinion import SecondOpinion
 from tvist_lab.studies.paper.published import pose
 from tvist_lab.study.line import Unchanged, point_to_point
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD
+from tvist_plant.world.second_opinion import SecondOpinion
 from tvist_shaping import TvistFilter, shaper
 
 OF_TICKS = 20

@@ -39,6 +39,34 @@ class Mesh(Struct, frozen=True, kw_only=True, gc=False):
     """Factors of its coordinates [-]."""
 
 
+class WorldShape(Struct, frozen=True, kw_only=True, gc=False):
+    """A primitive shape of the world around the arm."""
+
+    kind: str
+    """`plane`, `sphere`, `capsule`, `ellipsoid`, `cylinder` or `box`; a client leaves out what it does not know."""
+    size: list[float]
+    """Radius; radius and half of the length along z; half of the lengths; of a plane 0 where it has no end [m]."""
+    pose: list[float]
+    """In the frame of its body: x y z [m] and rotation vector [rad]."""
+    body: int | None
+    """Number of the body that carries it; null: it stands still, in the frame of the base."""
+    colour: list[float]
+    """Red, green, blue and opacity, 0 to 1."""
+
+
+class World(Struct, frozen=True, kw_only=True, gc=False):
+    """What stands around a simulated arm that touches it."""
+
+    name: str
+    """Name of the scene, or its file."""
+    bodies: list[str]
+    """Names of the bodies that move, in the order of `body_poses` in `truth`."""
+    shapes: list[WorldShape]
+    """What can be seen."""
+    unseen: int = 0
+    """Number of shapes that are left out, since they are meshes."""
+
+
 class Geometry(Struct, frozen=True, kw_only=True, gc=False):
     """Kinematics and shape of the arm. Joint i turns about z, then follows Tz(d) Tx(a) Rx(alpha), or its placement."""
 
@@ -65,3 +93,5 @@ class Geometry(Struct, frozen=True, kw_only=True, gc=False):
     """Height of the floor [m]."""
     has_floor: bool = True
     """Whether there is a floor, which motions keep clear of."""
+    world: World | None = None
+    """What stands around the arm; null if it touches nothing."""

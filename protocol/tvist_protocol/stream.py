@@ -178,6 +178,11 @@ class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc
     """Part of `gear_deflection` that remains at rest in this pose; empty if unknown [rad]."""
     static_link_deflection: list[float] = []
     """Part of `link_deflection` that remains at rest in this pose; empty if unknown [rad]."""
+    body_poses: list[float] = []
+    """Poses of the bodies that move in the arm's world, in the frame of the base, one after the other: x y z [m] and
+    rotation vector [rad]; empty without a world."""
+    contact_force: list[float] = []
+    """Force of all that touches the arm, its tool or its fingers, in the frame of the base; empty without one [N]."""
 
 
 class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="telemetry", gc=False):

@@ -5,7 +5,7 @@ are interfaces of their own, too, which a plant implements by having the method:
 and knows the truth; a real arm has power, brakes, faults and a clock.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -43,6 +43,11 @@ class Measurement:
     """Specific force in the flange frame, with noise, shape (3,) [m/s^2]."""
     timestamp: float | None = None
     """Time at which the plant measured, by its own clock [s]; None if it has none."""
+    wrench: Floats | None = None
+    """Force and torque about the flange's origin that all beyond the force sensor exerts on the flange, in its frame,
+    shape (6,) [N, N m]: weight, inertia and contact of what is mounted, with noise and offset; a push towards the
+    flange reads along the push, as UR's do. None: the plant has no such sensor.
+    """
 
 
 @dataclass(frozen=True)
@@ -315,6 +320,93 @@ class Playable(Protocol):
         Raises:
             PlantError: The state is no longer finite.
         """
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A primitive shape of a thing."""
+
+    kind: str
+    """`plane`, `sphere`, `capsule`, `ellipsoid`, `cylinder` or `box`."""
+    size: tuple[float, ...]
+    """As MuJoCo's: radius and half of the length along z; half of the lengths; of a plane 0 where it has no end [m]."""
+    pose: tuple[float, ...]
+    """Pose in the frame of its body: x y z [m] and rotation vector [rad]."""
+    body: int | None
+    """Number of the body that carries it; None if it stands still, in the frame of the arm's base."""
+    colour: tuple[float, ...]
+    """Red, green, blue and opacity, 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Things:
+    """What stands around an arm."""
+
+    name: str
+    """Name of the scene."""
+    bodies: tuple[str, ...]
+    """Names of the bodies that move."""
+    shapes: tuple[Shape, ...]
+    """What they, and all that stands still, look like."""
+    areas: Mapping[str, Shape]
+    """Places of which a test may ask whether a body is there, by their names."""
+    unseen: int = 0
+    """Number of shapes that are left out, such as meshes."""
+
+
+@runtime_checkable
+class InWorld(Protocol):
+    """A plant that stands among things that it touches."""
+
+    def things(self) -> Things:
+        """Return what stands around it, which stays the same."""
+
+    def places(self) -> Floats:
+        """Return the present poses of the bodies that move, in the frame of the base, shape (bodies, 6) [m, rad]."""
+
+    def contact(self) -> Floats:
+        """Return the force of all that touches the arm, its tool or its fingers, base frame, shape (3,) [N]."""
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A gripper whose two fingers close along y of the tool centre point."""
+
+    stroke: float
+    """Distance between open fingers [m]."""
+    position: Floats
+    """Position of the tool centre point in the flange frame, shape (3,) [m]."""
+    rotation: Floats
+    """Its orientation, shape (3, 3)."""
+
+    @property
+    def direction(self) -> Floats:
+        """The way from the flange along which the fingers point, shape (3,)."""
+        return np.asarray(self.rotation[:, 2])
+
+    @property
+    def root(self) -> Floats:
+        """Where the fingers begin, in the flange frame, shape (3,) [m]."""
+        return np.asarray(self.position - 0.05 * self.direction)
+
+
+@runtime_checkable
+class Gripping(Protocol):
+    """A plant with room for a gripper that really holds."""
+
+    def mount(self, hand: Hand) -> None:
+        """Mount a gripper, before the first reset."""
+
+    def grip(self, opening: float, force: float) -> None:
+        """Move the fingers from the next step on.
+
+        Args:
+            opening: Wanted distance between them [m].
+            force: Largest force of each [N].
+        """
+
+    def opening(self) -> float:
+        """Return the measured distance between the fingers [m]."""
 
 
 @runtime_checkable

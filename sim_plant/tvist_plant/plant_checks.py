@@ -55,7 +55,10 @@ def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
     Raises:
         ValueError: An array is missing or has the wrong shape, for example for another number of joints.
     """
-    for name, shape in (("q", (joints,)), ("qd", (joints,)), ("moment", (joints,)), ("accelerometer", (3,))):
+    shapes = {"q": (joints,), "qd": (joints,), "moment": (joints,), "accelerometer": (3,)}
+    if getattr(measured, "wrench", None) is not None:
+        shapes["wrench"] = (6,)
+    for name, shape in shapes.items():
         found = getattr(getattr(measured, name, None), "shape", None)
         if found != shape:
             what = "is not an array" if found is None else f"has shape {found}"

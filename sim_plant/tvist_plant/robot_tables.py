@@ -156,6 +156,16 @@ class Sensors(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """rms per axis [m/s^2]."""
     encoder_step: NotNegative = 0.0
     """Change of a joint angle after which its reading is updated [rad]."""
+    force_noise: NotNegative = 1.2
+    """rms per axis of the force sensor in the flange, which only an arm in a world has; a third of the precision that
+    UR publishes for its e-Series, 3.5 N [N].
+    """
+    torque_noise: NotNegative = 0.07
+    """The same of its torque; a third of 0.2 N m [N m]."""
+    force_offset: NotNegative = 4.0
+    """Largest constant error per axis of its force, which the seed draws; the accuracy that UR publishes [N]."""
+    torque_offset: NotNegative = 0.3
+    """The same of its torque [N m]."""
 
 
 class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -229,7 +239,8 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
 
     def quiet(self) -> "RobotDescription":
         """Return the same arm with sensors whose values are constant once the arm is at rest."""
-        return msgspec.structs.replace(self, sensors=Sensors(encoder_step=QUIET_STEP))
+        still = Sensors(encoder_step=QUIET_STEP, force_noise=0.0, torque_noise=0.0)
+        return msgspec.structs.replace(self, sensors=still)
 
     def without_floor(self) -> "RobotDescription":
         """Return the same arm without a floor that it could collide with."""
@@ -258,5 +269,5 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
         if "gear" not in kept:
             drives = replace(drives, gear_error_amplitude=0.0)
         if "noise" not in kept:
-            sensors = replace(sensors, accelerometer_noise=0.0)
+            sensors = replace(sensors, accelerometer_noise=0.0, force_noise=0.0, torque_noise=0.0)
         return replace(self, drives=drives, sensors=sensors)

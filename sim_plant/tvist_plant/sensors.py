@@ -1,4 +1,4 @@
-"""The arm's sensors: the noise of a MEMS accelerometer in the flange, and the phases of the gears' errors."""
+"""The arm's sensors, an accelerometer and a force sensor in the flange, and the phases of the gears' errors."""
 
 import numpy as np
 
@@ -44,6 +44,28 @@ class Accelerometer:
     def _draw(self) -> None:
         """Draw a block, since one call of the generator takes as long as a hundred samples."""
         self._drawn, self._used = self._noise * self._random.standard_normal((512, 3)), 0
+
+
+class ForceSensor:
+    """Force and torque in the flange with white noise and a constant error, which the seed draws.
+
+    Args:
+        noise: rms of force [N] and torque [N m].
+        offset: Largest constant error of each.
+        seed: Seed of both; equal seeds give equal readings.
+    """
+
+    def __init__(self, noise: tuple[float, float], offset: tuple[float, float], seed: int) -> None:
+        self._random = np.random.default_rng([seed, 2])
+        self._offset = np.repeat(offset, 3) * self._random.uniform(-1.0, 1.0, 6)
+        self._noise = np.repeat(noise, 3)
+        self._drawn: list[Floats] = []
+
+    def read(self, wrench: Floats) -> Floats:
+        """Return a noisy reading, shape (6,) [N, N m]."""
+        if not self._drawn:  # in blocks, as above
+            self._drawn = list(self._noise * self._random.standard_normal((256, 6)) + self._offset)
+        return np.asarray(wrench + self._drawn.pop())
 
 
 def gear_phases(joints: int, seed: int) -> Floats:

@@ -128,6 +128,7 @@ def test_true_modes_that_the_plant_does_not_know_are_empty():
         ("qd", [0.0] * 6, "measured qd is not an array"),
         ("moment", np.zeros((6, 1)), "measured moment has shape"),
         ("accelerometer", np.zeros(6), r"must be \(3,\)"),
+        ("wrench", np.zeros(3), r"measured wrench has shape \(3,\): its shape must be \(6,\)"),
     ],
 )
 def test_what_has_the_wrong_shape_is_refused_at_the_start(field, value, said):

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from tvist_lab.metrics import best_tool_acceleration
-from tvist_lab.mujoco_arm import MujocoArm
 from tvist_lab.studies.leaderboard import ON_PAGE, best_in_bold, leaderboard, ranked
 from tvist_lab.studies.pages import page
 from tvist_lab.studies.shaperbench import WANTED, bends, check_causal, draw, inspect, jobs, path_error
@@ -31,6 +30,7 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.integrator import relaxed
 from tvist_plant.plant import PERIOD
+from tvist_plant.world.mujoco_arm import MujocoArm
 
 HONEST = """
     import numpy as np

@@ -11,7 +11,7 @@ from .reference import commands
 
 def second_opinion(*arguments):
     """MuJoCo's arm; imported here, as other tests do not need to wait for it."""
-    from tvist_lab.second_opinion import SecondOpinion
+    from tvist_plant.world.second_opinion import SecondOpinion
 
     return SecondOpinion(*arguments)
 

@@ -18,9 +18,9 @@ from tvist_controller.sources.own_plants import (
     load_plant,
     named_plants,
 )
-from tvist_lab.mujoco_arm import MujocoArm
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
+from tvist_plant.world.mujoco_arm import MujocoArm
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ServeConfig

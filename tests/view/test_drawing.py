@@ -14,7 +14,7 @@ from tvist_lab.collect import collect
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_plant.description import load
 from tvist_plant.model import FLANGE, flexible_model, rigid_model
-from tvist_protocol.geometry import Capsule, Geometry, Mesh
+from tvist_protocol.geometry import Capsule, Geometry, Mesh, World
 from tvist_view.look import GeometryError, Look
 from tvist_view.playback import playback
 from tvist_view.stage import open_stage, page
@@ -245,3 +245,13 @@ def test_without_truth_the_arm_is_stiff_and_an_older_truth_has_no_static_part(mo
     old = look.row(state, replace(truth, static_gear_deflection=[], static_link_deflection=[]))
     assert old[12:18] == [0.0] * 6
     assert old[18:24] == truth.gear_deflection
+
+
+def test_bodies_of_a_world_follow_the_arm_and_are_nowhere_while_unknown(moved):
+    look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
+    there = Look(replace(look.geometry, world=World(name="table", bodies=["box"], shapes=[])), look.payload)
+    pose = [-0.4, 0.1, 0.2, 0.0, 0.0, 0.3]
+    assert there.row(state, replace(truth, body_poses=pose)) == [*look.row(state, truth), *pose]
+    for row in (there.row(state, None), there.row(state, truth)):
+        assert len(row) == len(look.row(state, truth)) + 6
+        assert np.isnan(row[-6:]).all()

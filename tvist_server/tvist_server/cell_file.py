@@ -1,9 +1,13 @@
 """A cell, read from a TOML file."""
 
 import tomllib
+from pathlib import Path
+
+from msgspec.structs import replace
 
 from tvist_controller.cell.description import Cell, CellError
 from tvist_plant.user_file import read_toml
+from tvist_plant.world.scene_file import scenes
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 
@@ -17,6 +21,8 @@ def read_cell(path: str) -> Cell:
     """
     try:
         cell = checked(read_toml(path, "cell"), Cell)
+        if cell.world is not None and cell.world not in scenes():  # beside the cell's own file
+            cell = replace(cell, world=str(Path(path).parent / cell.world))
         cell.check()
     except OSError as error:
         raise CellError(f"cell {path}: {error.strerror}") from error

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from tvist_controller.cell.description import Cell, as_declared
 from tvist_controller.setup import Adapt, Setup, check_rating, paper_payload
-from tvist_controller.sources.own_plants import OwnPlant, load_plant
+from tvist_controller.sources.own_plants import OwnPlant, load_plant, load_world
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
 from tvist_protocol.calibration import Calibration
@@ -114,6 +114,10 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     servo_lag: str | tuple[float, ...] | None = None
     """With --enable-motion: lag of the robot's servoj, which set-points then make up for: T,k in s and 1/s², as
     tvist identify --plant finds it, or simulated for a robot of tvist serve --ur [the calibration's, if it has one]."""
+    world: str | None = None
+    """Scene in which the arm stands, and whose things it touches: table, wall, peg, pallet, or a file in MuJoCo's
+    format, in the frame of the arm's base. The arm is then simulated by MuJoCo, and has a force sensor in its flange.
+    Needs the extra world [nothing to touch; that of the cell, if it names one]."""
     hidden: Seed | None = None
     """Simulate an arm that is not quite its file: springs, dampers, loops, rotors, friction and payload are drawn from
     this seed and told to nobody. With several robots, each further one uses the next."""
@@ -335,11 +339,11 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 name=self.name,
                 seed=self.seed,
                 clock=self.clock,
-                truth=self.truth,
+                truth=self.truth or self._scene(cell) is not None,
                 compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
                 shape_servo=self.shape_servo,
                 adapt=self.adapt,
-                plant=None if self.plant is None else self._plant(self.plant, description, calibration),
+                plant=self._plant(cell, description, calibration),
                 hidden=self.hidden,
             )
             setup = shaped_by(setup, "none" if watched else _either(self.shaper, profile.shaper))
@@ -383,31 +387,41 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             if value is not None:
                 raise ValueError(f"{name} is {value}, but the robot at {self.plant} {what}: leave {name} out")
 
-    def _plant(self, place: str, description: RobotDescription, calibration: Calibration | None) -> OwnPlant:
-        """Find a plant: the robot at an address, or what `load_plant` finds.
+    def _plant(
+        self, cell: Cell | None, description: RobotDescription, calibration: Calibration | None
+    ) -> OwnPlant | None:
+        """Find the plant, or the scene in which the arm stands; None for the simulated arm of the robot file.
 
         Raises:
-            ValueError: There is none.
+            ValueError: There is none, or both are given.
             UserFileError: See `load_plant`.
         """
-        if not is_place(place):
-            return load_plant(place)
-        where = place_of(place)
-        if self.enable_motion:
-            start = None if self.start is None else posture(self.start, description)
-            return OwnPlant(
-                str(where),
-                "",
-                partial(
-                    MovedRobot,
-                    where,
-                    speed_cap=_either(self.speed_cap, SPEED_CAP),
-                    tool=None if self.tcp is None else numbers_of("tcp", self.tcp, 6),
-                    lag=self._lag(calibration),
-                    start=start,
-                ),
-            )
-        return OwnPlant(str(where), "", partial(WatchedRobot, where))
+        world = self._scene(cell)
+        if world is not None:
+            if self.plant is not None or self.hidden is not None:
+                other = f"hidden is {self.hidden}" if self.plant is None else f"plant is {self.plant}"
+                raise ValueError(
+                    f"world is {world}, in which MuJoCo simulates the arm, but {other}: leave one out"
+                )
+            return load_world(world)
+        if self.plant is None or not is_place(self.plant):
+            return None if self.plant is None else load_plant(self.plant)
+        where = place_of(self.plant)
+        if not self.enable_motion:
+            return OwnPlant(str(where), "", partial(WatchedRobot, where))
+        moved = partial(
+            MovedRobot,
+            where,
+            speed_cap=_either(self.speed_cap, SPEED_CAP),
+            tool=None if self.tcp is None else numbers_of("tcp", self.tcp, 6),
+            lag=self._lag(calibration),
+            start=None if self.start is None else posture(self.start, description),
+        )
+        return OwnPlant(str(where), "", moved)
+
+    def _scene(self, cell: Cell | None) -> str | None:
+        """Scene in which the arm stands: that which is given, or else that of the cell; None for none."""
+        return self.world or (None if cell is None else cell.world)
 
     def _lag(self, calibration: Calibration | None) -> ServoLag | None:
         """Return the lag of a robot that is moved: the one given, or the calibration's.

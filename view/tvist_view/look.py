@@ -79,21 +79,25 @@ class Look:
         }
 
     def row(self, state: State, truth: Truth | None) -> list[float]:
-        """Where the arm is at a tick, 4 joints + 4 bending links values [rad].
+        """Where the arm is at a tick, 4 joints + 4 bending links values [rad], and 6 for each body of its world.
 
         They are motor angles, reference, static gear deflection and the rest of it, and both again for the two angles
         of each link that bends. Without truth the arm is stiff. An older server does not tell the static part; it
-        counts as zero.
+        counts as zero. Bodies whose place is unknown are nowhere (NaN).
         """
         bends = 2 * len(self.geometry.bending)
+        bodies = [math.nan] * (0 if self.geometry.world is None else 6 * len(self.geometry.world.bodies))
         if truth is None:
-            return [*state.actual_q, *state.reference_q, *[0.0] * (2 * self.joints + 2 * bends)]
+            return [*state.actual_q, *state.reference_q, *[0.0] * (2 * self.joints + 2 * bends), *bodies]
+        if len(truth.body_poses) == len(bodies):
+            bodies = truth.body_poses
         gears = _parts(truth.gear_deflection, truth.static_gear_deflection, self.joints)
         return [
             *truth.motor_q,
             *state.reference_q,
             *gears,
             *_parts(truth.link_deflection, truth.static_link_deflection, bends),
+            *bodies,
         ]
 
 

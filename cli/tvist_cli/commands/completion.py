@@ -43,6 +43,7 @@ def _option_values() -> dict[str, _Values]:
     from tvist_controller.sources.own_plants import named_plants
     from tvist_lab.study.menus import UNSHAPED, names
     from tvist_plant.description import robots
+    from tvist_plant.world.scene_file import scenes
     from tvist_server.profiles import ProfileName
     from tvist_shaping import BUILT_IN, SHAPERS
 
@@ -55,6 +56,7 @@ def _option_values() -> dict[str, _Values]:
         "sensitivity": _Values(tuple(SHAPERS), "py"),
         "against": _Values((UNSHAPED, *names("bench"))),
         "plant": _Values(tuple(named_plants()), "py"),
+        "world": _Values(tuple(scenes()), "xml"),
         "profile": _Values(get_args(ProfileName)),
     }
 

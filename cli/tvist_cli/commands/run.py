@@ -18,7 +18,7 @@ from tvist_server.config import ConfigError, ServeConfig
 
 OPTIONS = {
     "robot", "profile", "payload", "overload", "adapt", "learn", "shaper", "shape_servo", "plant", "hidden", "start",
-    "seed", "record", "truth", "listen", "ur", "ur_allow", "cell",
+    "seed", "record", "truth", "listen", "ur", "ur_allow", "cell", "world",
 }  # fmt: skip
 """Options of `tvist serve` that one robot which ends with its program can do with."""
 
@@ -69,7 +69,16 @@ def run(
         given: Fields of `ServeConfig`.
     """
     if check:
-        if given or lockstep or inputs or config or timeout is not None or limits.given or files.given:
+        if (
+            given
+            or lockstep
+            or inputs
+            or config
+            or timeout is not None
+            or limits.given
+            or limits.expect
+            or files.given
+        ):
             raise Failure(
                 "--check runs nothing, so that only --json goes with it: leave the others out", code=2
             )
@@ -77,7 +86,8 @@ def run(
         return
     _check_files(file, lockstep=lockstep)
     check_positive("timeout", timeout)
-    judged = Judged(limits.checked(), files.checked(list(map(named, file)), lockstep=lockstep))
+    compared = files.checked(list(map(named, file)), lockstep=lockstep)
+    judged = Judged(limits.checked(), compared, limits.expected())
     texts = [read_script(one) for one in file]
     checked = _configuration(given, config, lockstep=lockstep)
     if checked.record is not None and len(file) > 1:

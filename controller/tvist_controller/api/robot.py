@@ -19,10 +19,11 @@ from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.reporting.reporter import truth_of
 from tvist_controller.reporting.sink import Sink
-from tvist_controller.sources.own_plants import OwnPlant, RecordedPlant, load_plant
+from tvist_controller.sources.own_plants import WORLD, OwnPlant, RecordedPlant, load_plant
 
 __all__ = [
     "AFTER",
+    "WORLD",
     "Beliefs",
     "Controller",
     "Experience",

@@ -127,6 +127,8 @@ class Cell(_Table, frozen=True, kw_only=True):
     """Gripper; None if there is none."""
     parts: Annotated[tuple[Part, ...], Meta(max_length=MOST)] = ()
     """Parts that it can grip."""
+    world: Annotated[str, Meta(min_length=1, max_length=4096)] | None = None
+    """Scene in which the arm stands, as of `tvist serve --world`: its bodies are gripped, and there are no parts."""
 
     @property
     def changes_load(self) -> bool:
@@ -150,6 +152,8 @@ class Cell(_Table, frozen=True, kw_only=True):
         self._check_tools()
         for key, things in (("tools", self.tools), ("parts", self.parts)):
             _check_names(key, [one.name for one in things])
+        if self.world is not None and self.parts:
+            raise CellError(f"world is {self.world!r}, in which bodies are gripped: leave parts out")
         if self.gripper is None:
             if self.parts:
                 raise CellError("parts need a gripper: add the table [gripper]")

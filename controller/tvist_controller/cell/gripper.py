@@ -17,6 +17,8 @@ ACTIVATION: Final = 500
 """Ticks that an activation takes at least."""
 SPEEDS = {0.085: (0.020, 0.150), 0.14: (0.030, 0.250)}
 """Speed of the fingers at the registers' 0 and 255 for each opening [m/s]."""
+FORCES = {0.085: (20.0, 235.0), 0.14: (10.0, 125.0)}
+"""Force of the fingers at the registers' 0 and 255 for each opening [N]."""
 MOVING, STOPPED_CLOSING, ARRIVED = 0, 2, 3
 """Values of OBJ."""
 WRITABLE: Mapping[str, int] = MappingProxyType(
@@ -56,6 +58,16 @@ class Gripper:
         """Opening [m]."""
         self._activated = activated
         self.begin()
+
+    @property
+    def grip_force(self) -> float:
+        """Force that is set for the fingers [N]."""
+        least, most = FORCES[self.stroke]
+        return least + self._written["FOR"] / 255.0 * (most - least)
+
+    def lose(self) -> None:
+        """Let go of the part that has slipped out, so that the fingers go on."""
+        self.holds = False
 
     def begin(self) -> None:
         """Begin as at the start: the fingers are open."""

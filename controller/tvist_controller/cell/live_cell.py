@@ -14,7 +14,7 @@ from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.paths.poses import Placement, placement
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import Floats
-from tvist_plant.plant import Loadable, Plant
+from tvist_plant.plant import Gripping, Loadable, Plant
 from tvist_protocol.values import Pose
 
 TRANSFER = 100
@@ -23,6 +23,8 @@ NEAR = 0.1
 """Distance up to which a part that closing fingers have missed is worth a warning [m]."""
 THIS_MACHINE = ("127.0.0.1", "localhost", "::1")
 """Names by which programs call the machine on which the URCap runs."""
+STALLED = 0.004
+"""Way by which fingers that really hold are behind when something has stopped them [m]."""
 _SWAPPED = np.diag([-1.0, -1.0, 1.0])
 """Half a turn about z."""
 
@@ -131,7 +133,9 @@ class LiveCell:
         if self._changers:
             first = self._cell.tools[0]
             self._mount(next((tool for bit, tool in self._changers if outputs & bit), first), q)
-        if self.gripper is not None:
+        if self.gripper is not None and isinstance(self._plant, Gripping):
+            self._move_real_fingers(self.gripper, self._plant)
+        elif self.gripper is not None:
             self._move_fingers(self.gripper, q)
         if self._held is not None:
             self._share = min(self._share + 1, TRANSFER)
@@ -154,6 +158,21 @@ class LiveCell:
         self._tool = tool
         self._load = self._first_load if tool is self._cell.tools[0] else tool_body(tool)
         self._emit("text", why=f"cell: the tool {tool.name} ({tool.mass:g} kg) is on the flange")
+
+    def _move_real_fingers(self, gripper: Gripper, hand: Gripping) -> None:
+        """Move fingers that touch things: what stops them is between them, and what they hold does not fall."""
+        opening = hand.opening()
+        if gripper.holds and opening < gripper.opening - STALLED:
+            self._emit("warning", why="cell: the gripper has lost what it held")
+            gripper.lose()
+
+        def meet(_: float, narrow: float) -> float | None:
+            return opening if opening - narrow > STALLED else None
+
+        moved = gripper.tick(meet)
+        if moved.gripped:
+            self._emit("text", why=f"cell: the gripper holds something {1e3 * opening:.1f} mm wide")
+        hand.grip(0.0 if gripper.holds else gripper.opening, gripper.grip_force)
 
     def _move_fingers(self, gripper: Gripper, q: Floats) -> None:
         moved = gripper.tick(lambda wide, narrow: self._between(wide, narrow, q))

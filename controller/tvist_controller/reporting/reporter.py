@@ -5,7 +5,7 @@ from tvist_controller.line.sample import Sample
 from tvist_controller.reporting.report import Layouts, Report
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
-from tvist_plant.plant import PERIOD, ModalPlant, Plant, PlantTruth, Truthful
+from tvist_plant.plant import PERIOD, InWorld, ModalPlant, Plant, PlantTruth, Truthful
 from tvist_protocol.stream import Truth
 from tvist_shaping.base import Filter
 
@@ -79,6 +79,7 @@ class Reporter:
                 for name in ("f_d", "zeta", "participation")
             }
         truth = truth_of(plant)
+        world = plant if isinstance(plant, InWorld) else None
         return Truth(
             tick=tick,
             timestamp=tick * PERIOD,
@@ -90,6 +91,8 @@ class Reporter:
             tool_acceleration=truth.specific_force.tolist(),
             static_gear_deflection=_listed(truth.static_gear_deflection),
             static_link_deflection=_listed(truth.static_link_deflection),
+            body_poses=[] if world is None else world.places().ravel().tolist(),
+            contact_force=[] if world is None else world.contact().tolist(),
             **(self._true_modes or NO_MODES),
         )
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
@@ -14,9 +14,12 @@ from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import Plant, PlantError
 from tvist_plant.user_file import named
 from tvist_plant.variants import VARIANTS, Variant
+from tvist_plant.world.scene_file import SceneError, SceneFile, find_scene
 
 GROUP = "tvist.plants"
 """Group of the entry points by which installed packages offer plants."""
+WORLD = "world:"
+"""What precedes the name of a scene in the place of a plant that is the arm in it."""
 Maker = Callable[[RobotDescription, Payload], Plant]
 """Makes a plant of a robot's description and the payload that it carries."""
 
@@ -29,7 +32,7 @@ class RecordedPlant(Struct, frozen=True):
     """Description of a plant, as a recording contains it."""
 
     place: str
-    """FILE.py:NAME, or a name of `VARIANTS` or of an installed plant."""
+    """FILE.py:NAME, a name of `VARIANTS` or of an installed plant, or `WORLD` and a scene."""
     sha256: str = ""
     """SHA-256 of the file, in hexadecimal; empty if it is installed."""
 
@@ -39,9 +42,9 @@ class OwnPlant:
     """A plant that was found, and is yet to be made."""
 
     place: str
-    """FILE.py:NAME, or a name of `VARIANTS` or of an installed plant."""
+    """FILE.py:NAME, a name of `VARIANTS` or of an installed plant, or `WORLD` and a scene."""
     sha256: str
-    """SHA-256 of the file that was run, in hexadecimal; empty if it is installed."""
+    """SHA-256 of the file that was read, in hexadecimal; empty if it is installed."""
     maker: Maker | Variant = field(compare=False)
     """Makes the plant."""
 
@@ -70,8 +73,9 @@ class OwnPlant:
             made = self.maker(description, carried)
             if isinstance(made, Plant):
                 return called(made, description.joints)
-        except PlantError as error:  # it says in a sentence why it cannot be made
-            raise OwnPlantError(f"plant {self.place}: {error}") from error
+        except (PlantError, SceneError) as error:  # it says in a sentence why it cannot be made
+            said = f"{error}" if self.place.startswith(WORLD) else f"plant {self.place}: {error}"
+            raise OwnPlantError(said) from error
         except (Exception, SystemExit) as error:
             if ends(error):
                 raise
@@ -103,6 +107,8 @@ def load_plant(place: str) -> OwnPlant:
             f"plant {place}: it is a real arm, which only tvist serve takes: it does not do the same again, so that "
             "nothing can be replayed or compared with it"
         )
+    if place.startswith(WORLD):
+        return load_world(place.removeprefix(WORLD))
     if is_file(place):
         own = run_file(place, "plant", OwnPlantError, _may_be_one)
         found, sha256 = own.found, own.sha256
@@ -114,6 +120,28 @@ def load_plant(place: str) -> OwnPlant:
             "RobotDescription and a Payload, and makes a plant"
         )
     return OwnPlant(place, sha256, found)
+
+
+def load_world(scene: str) -> OwnPlant:
+    """Find the arm in a scene.
+
+    Args:
+        scene: Name of a scene that comes with the package, or path of a file in MuJoCo's format.
+
+    Raises:
+        SceneError: There is none.
+    """
+    file = find_scene(scene)
+    return OwnPlant(WORLD + scene, file.sha256, partial(_in_scene, file))
+
+
+def _in_scene(scene: SceneFile, description: RobotDescription, carried: Payload) -> Plant:
+    """Make the arm in a scene."""
+    try:
+        from tvist_plant.world.world_arm import WorldArm
+    except ImportError as error:
+        raise OwnPlantError(f"world needs MuJoCo: pip install 'tvist[world]' ({error})") from error
+    return WorldArm(description, carried, scene)
 
 
 def named_plants() -> list[str]:

@@ -17,7 +17,7 @@ from tvist_plant.user_file import named
 _MEASURING = ("step", "reset", "measure")
 _OTHERS = (
     "truth", "switch", "stop", "wait", "sight", "interval", "load", "push", "make_nan", "play", "held", "modes", "seen",
-    "described",
+    "described", "things", "places", "contact", "mount", "grip", "opening",
 )  # fmt: skip
 _TELLING = ("truth", "play", "held", "modes")
 MOST_KEPT = 10

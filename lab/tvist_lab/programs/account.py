@@ -4,7 +4,7 @@ from typing import Any
 
 from tvist_lab.programs.watch import Fastest, Move, ProgramWatch, Said
 from tvist_lab.words import counted
-from tvist_plant.plant import PERIOD
+from tvist_plant.plant import PERIOD, InWorld
 
 
 def largest_peak(watch: ProgramWatch) -> float | None:
@@ -41,7 +41,20 @@ def as_dict(watch: ProgramWatch) -> dict[str, Any]:
         "largest_peak_after_stop_m_s2": largest_peak(watch),
         "largest_joint_speed": {"joint": watch.fastest_joint.joint, **_fastest(watch.fastest_joint, "rad_s")},
         "largest_tool_speed": _fastest(watch.fastest_tool, "m_s"),
+        **_in_world(watch),
     }
+
+
+def _in_world(watch: ProgramWatch) -> dict[str, Any]:
+    """The largest force of contact, and where the bodies of the arm's world are; nothing without one."""
+    if not isinstance(watch.plant, InWorld):
+        return {}
+    hardest = watch.hardest
+    force = {
+        "force_n": hardest.speed, "timestamp": seconds(hardest.tick), "line": hardest.line or None,
+    }  # fmt: skip
+    poses = zip(watch.plant.things().bodies, watch.plant.places().tolist(), strict=True)
+    return {"largest_contact_force": force, "bodies": dict(poses)}
 
 
 def seconds(ticks: int) -> float:

@@ -36,6 +36,8 @@ class Limits:
     """Largest measured speed of a joint [rad/s]."""
     tool_speed: float | None = None
     """Largest measured speed of the tool centre point [m/s]."""
+    force: float | None = None
+    """Largest force with which the arm's world touches it [N]."""
 
     def broken(self, watch: ProgramWatch) -> Iterator[Shortcoming]:
         """Say of each limit that a run broke where and when, and of the shake after each stop that broke it."""
@@ -49,6 +51,7 @@ class Limits:
         joint, tool = watch.fastest_joint, watch.fastest_tool
         yield from _fast(joint, f"joint {joint.joint} turned with", "rad/s", self.joint_speed, "joint_speed")
         yield from _fast(tool, "the tool moved with", "m/s", self.tool_speed, "tool_speed")
+        yield from _fast(watch.hardest, "the arm was touched with", "N", self.force, "force")
 
 
 def _shaken(number: int, move: Move, most: float) -> Iterator[Shortcoming]:

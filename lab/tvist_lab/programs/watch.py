@@ -11,7 +11,7 @@ import numpy as np
 
 from tvist_controller.api.robot import Controller, Sink, truth_of
 from tvist_plant.model import Floats
-from tvist_plant.plant import GRAVITY, PERIOD, Foreseeing, Response, Truthful
+from tvist_plant.plant import GRAVITY, PERIOD, Foreseeing, InWorld, Response, Truthful
 from tvist_protocol.stream import Event, State
 
 AFTER_STOP = 5
@@ -97,10 +97,10 @@ class Move:
 
 @dataclass(frozen=True)
 class Fastest:
-    """The largest speed of a run, and when and where it was."""
+    """The largest speed or force of a run, and when and where it was."""
 
     speed: float = 0.0
-    """Measured speed [rad/s, or m/s]."""
+    """Measured speed [rad/s, or m/s], or the force [N]."""
     tick: int = 0
     line: int = 0
     """Line that the program carried out then; 0 if none."""
@@ -159,6 +159,8 @@ class ProgramWatch(Sink):
         """Motions of the program."""
         self.fastest_joint, self.fastest_tool = Fastest(), Fastest()
         """Largest speeds of a joint and of the tool centre point, as measured."""
+        self.hardest = Fastest()
+        """Largest force with which the arm's world touched it; 0 without a world."""
         self.over = False
         """Whether there is nothing more to observe."""
         self._names = controller.cycle.description.robot.joints
@@ -169,7 +171,9 @@ class ProgramWatch(Sink):
         """What came in this tick, and whose line is not known yet."""
         self._rest = 0
         """Ticks for which the shaped reference has rested after the last move."""
-        plant = controller.cycle.line.plant
+        self.plant = plant = controller.cycle.line.plant
+        """The arm."""
+        self._world = plant if isinstance(plant, InWorld) else None
         self._truthful = isinstance(plant, Truthful) and plant.truth() is not None
         self._foreseeing = plant if isinstance(plant, Foreseeing) else None
 
@@ -261,6 +265,10 @@ class ProgramWatch(Sink):
             self.fastest_joint = Fastest(most, state.tick, self.line, self._names[speeds.index(most)])
         if (tool := math.hypot(*state.actual_TCP_speed[:3])) > self.fastest_tool.speed:
             self.fastest_tool = Fastest(tool, state.tick, self.line)
+        if self._world is not None:
+            force = math.hypot(*self._world.contact())
+            if force > self.hardest.speed:
+                self.hardest = Fastest(force, state.tick, self.line)
 
     def _note_start(self, event: Event) -> None:
         if self.moves:

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from tvist_lab.mujoco_arm import MujocoArm
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import Placeable
 from tvist_plant.variants import AS_DESCRIBED, VARIANTS, Variant, scattered, stiffer, with_springs
+from tvist_plant.world.mujoco_arm import MujocoArm
 
 __all__ = [
     "ARMS",

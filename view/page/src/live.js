@@ -78,6 +78,7 @@ export class Live {
     this.columns = [[], [], [], []];
     this.stage.noTruth = robot.why_stiff;
     this.stage.say("");
+    this.stage.among(robot.look.geometry.world);
     this.stage.result(null);
     this._overlay(null);
     this.picker.replaceChildren(...robot.robots.map((name) => h("option", { value: name, selected: name === robot.name }, name)));

@@ -14,6 +14,7 @@ export class Playback {
     this.stage = new Stage({ factor: boot.factor, ghost: boot.tracks.length === 1, truth, noTruth: NO_TRUTH });
     const { scene, plots } = this.stage;
     this.tracks = boot.tracks.map((packed, number) => new Track(scene, packed, number, boot.tracks.length));
+    boot.tracks.forEach(({ look }) => this.stage.among(look.geometry.world));
     this.end = Math.max(...this.tracks.map((track) => track.times.at(-1)));
     this.keep();
     this.stage.changed = () => (this.shown = null);

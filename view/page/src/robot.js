@@ -1,6 +1,7 @@
 // A robot on the stage: the arm with its bending magnified, the ghost of where its reference is, the trace of its tool.
 import * as THREE from "three";
 import { Arm } from "./arm.js";
+import { Things } from "./things.js";
 
 const TRACE = 120; // points
 const JUMP = 0.15; // way between two pictures that is not drawn as a trace [m]
@@ -29,6 +30,7 @@ export class Robot {
     this.links = 2 * look.geometry.bending.length;
     this.arm = new Arm(look, colour ? { at, colour } : { at });
     this.ghost = new Arm(look, { at, ghost: true });
+    this.things = look.geometry.world ? new Things(look.geometry.world, scene.scene, at) : null;
     this.points = [];
     this.line = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour ?? trace }));
     this.line.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * TRACE), 3));
@@ -49,6 +51,7 @@ export class Robot {
     this.asked = asked;
     const { q, bends, reference } = Robot.drawn(row, this.joints, this.links, appearance);
     const flange = this.arm.pose(q, bends);
+    this.things?.place(row.slice(4 * this.joints + 2 * this.links));
     // Where both coincide, their surfaces would flicker.
     const apart = Math.max(...q.map((angle, i) => Math.abs(angle - reference[i])), ...bends.map(Math.abs)) > APART;
     this.ghost.root.visible = appearance.ghost && apart;
@@ -75,6 +78,7 @@ export class Robot {
 
   remove() {
     for (const arm of [this.arm, this.ghost]) arm.dispose();
+    this.things?.remove();
     this.line.removeFromParent();
     this.line.geometry.dispose();
     this.scene.arms = this.scene.arms.filter((arm) => arm !== this.arm && arm !== this.ghost);

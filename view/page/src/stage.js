@@ -53,6 +53,14 @@ export class Stage {
     this.scene.invalidate();
   }
 
+  /** Draw the arm as it is, so that it touches what it touches; say what of its world is not drawn. */
+  among(world) {
+    if (!world) return;
+    this.appearance.factor = 1;
+    this._tell();
+    if (world.unseen) this.say(`${world.unseen} shapes of the world ${world.name} are meshes, which are not drawn`, true);
+  }
+
   /** The choices of how the arm is drawn. */
   choices() {
     const set = (name) => (value) => {

@@ -119,7 +119,7 @@ class GripperFunctions:
         self.rq_set_speed(_from_percent("speed_norm", speed_norm), gripper_socket)
 
     def rq_set_force(self, force: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
-        """Set the force of the fingers, 0 to 255. It is stored; every simulated grip is firm."""
+        """Set the force of the fingers, 0 to 255. In a world it limits them; without one every grip is firm."""
         self._write(FOR=integer("force", force, 0, 255))
 
     def rq_set_force_norm(self, force_norm: object, gripper_socket: object = _ONE) -> None:

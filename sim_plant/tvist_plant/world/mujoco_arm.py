@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from tvist_lab.second_opinion import SecondOpinion
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.model import Floats
 from tvist_plant.plant import Measurement, PlantError, PlantTruth, Response
+from tvist_plant.world.second_opinion import SecondOpinion
 
 TIMESTEP = 0.00025
 """Time step at which MuJoCo agrees with `FlexibleArm` [s]."""
@@ -29,8 +29,10 @@ class MujocoArm:
         self._load(payload)
 
     def _load(self, payload: Payload) -> None:
-        self._payload = payload
-        self._arm = SecondOpinion(self._description, payload, TIMESTEP)
+        self._payload, self._arm = payload, self._made(payload)
+
+    def _made(self, payload: Payload) -> SecondOpinion:
+        return SecondOpinion(self._description, payload, TIMESTEP)
 
     @property
     def payload(self) -> Payload:

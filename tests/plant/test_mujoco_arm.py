@@ -24,7 +24,7 @@ TARGET = [0.4, -2.9, 0.3, -1.4, 0.0, 0.1]
 def mujoco_arm():
     """The class, imported where it is used: other tests do not need to wait for MuJoCo."""
     pytest.importorskip("mujoco")
-    from tvist_lab.mujoco_arm import MujocoArm
+    from tvist_plant.world.mujoco_arm import MujocoArm
 
     return MujocoArm
 

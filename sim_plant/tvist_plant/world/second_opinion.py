@@ -9,13 +9,13 @@ import math
 
 import mujoco
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from tvist_kernels.compiling import compiled
-from tvist_plant.description import Payload, RobotDescription, Tensor
+from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.model import FLANGE, link_frame
+from tvist_plant.model import FLANGE
+from tvist_plant.world.arm_form import LOAD, arm_spec, flex_name, joint_name, motor_name, principal
 
 Floats = NDArray[np.float64]
 
@@ -72,12 +72,19 @@ class SecondOpinion:
         description: The robot.
         payload: Carried payload.
         timestep: Time step of MuJoCo's integrator, a fraction of 2 ms [s]. 1 ms is unstable for the UR5e.
+        model: A model of which the arm of `arm_spec` is the first part, in a world; None for the arm alone.
 
     Raises:
         ValueError: 2 ms is not a multiple of the time step.
     """
 
-    def __init__(self, description: RobotDescription, payload: Payload, timestep: float) -> None:
+    def __init__(
+        self,
+        description: RobotDescription,
+        payload: Payload,
+        timestep: float,
+        model: "mujoco.MjModel | None" = None,
+    ) -> None:
         self._steps = round(PERIOD / timestep)
         if self._steps < 1 or abs(self._steps * timestep - PERIOD) > 1e-12:
             raise ValueError(f"timestep is {timestep} s; {PERIOD} s must be a multiple of it")
@@ -97,17 +104,19 @@ class SecondOpinion:
         self._laws = np.array(
             [self._velocity_gain, self._position_gain, self._integral_gain, self._friction, width]
         )
-        self._model = _build(description, payload, timestep)
-        self._data = data = mujoco.MjData(self._model)
+        self._model = arm_spec(description, payload, timestep).compile() if model is None else model
+        self.data = data = mujoco.MjData(self._model)
+        """MuJoCo's state."""
 
         def dofs(names: list[str]) -> NDArray[np.int64]:
             return np.array([self._model.joint(name).dofadr[0] for name in names], dtype=np.int64)
 
         links = description.link_flexibility.links
-        self._joints = dofs([_joint(number) for number in range(description.joints)])
-        self._motors = dofs([_motor(number) for number in range(description.joints)])
-        self._flexes = dofs([_flex(number, axis) for number in links for axis in "yz"])
-        self._flange = self._model.body(FLANGE).id
+        self._joints = dofs([joint_name(number) for number in range(description.joints)])
+        self._motors = dofs([motor_name(number) for number in range(description.joints)])
+        self._flexes = dofs([flex_name(number, axis) for number in links for axis in "yz"])
+        self._flange, self._load = self._model.body(FLANGE).id, self._model.body(LOAD).id
+        self._root = self._model.body_rootid[self._load]
         self._flex_stiffness = np.repeat(description.link_flexibility.stiffness, 2)
         self._s = np.zeros(description.joints)
         self._command = np.zeros((3, description.joints))
@@ -119,7 +128,7 @@ class SecondOpinion:
 
     def reset(self, command: DriveCommand) -> Floats:
         """Set static equilibrium under a command, with preloaded integrators; return link-side q, shape (n,) [rad]."""
-        data, self._evaluated = self._data, False
+        data, self._evaluated = self.data, False
         mujoco.mj_resetData(self._model, data)
         self._command = np.array([command.q, command.qd, command.torque])
         gravity = np.zeros(self._model.nv)
@@ -137,7 +146,7 @@ class SecondOpinion:
         self._move(np.array([command.q, command.qd, command.torque]))
 
     def _move(self, end: Floats) -> None:
-        start, model, data, steps = self._command, self._model, self._data, self._steps
+        start, model, data, steps = self._command, self._model, self.data, self._steps
         timestep, motors, laws, s = self._timestep, self._motors, self._laws, self._s
         step, (q, qd, applied) = mujoco.mj_step, self._state
         for k in range(steps):
@@ -159,8 +168,9 @@ class SecondOpinion:
             After each: link-side angles, their velocities and the torques of the motors, shape (T, n); specific force
             in the flange frame and position of the flange, shape (T, 3), and its orientation, shape (T, 3, 3).
         """
-        T, nv, n = len(commands), self._model.nv, len(self._motors)
-        angles, speeds, sums = np.empty((T, nv)), np.empty((T, nv)), np.empty((T, n))
+        T, n = len(commands), len(self._motors)
+        angles, speeds = np.empty((T, self._model.nq)), np.empty((T, self._model.nv))
+        sums = np.empty((T, n))
         force, position, turned = np.empty((T, 3)), np.empty((T, 3)), np.empty((T, 9))
         q, qd, _ = self._state
         for k, command in enumerate(commands):
@@ -175,7 +185,7 @@ class SecondOpinion:
     def step(self, command: DriveCommand) -> Floats:
         """Simulate 2 ms while the drives approach the command linearly; return link-side q, shape (n,) [rad]."""
         start, end = self._command, np.array([command.q, command.qd, command.torque])
-        data, self._evaluated = self._data, False
+        data, self._evaluated = self.data, False
         for k in range(self._steps):
             q_r, qd_r, torque = start + (k + 0.5) / self._steps * (end - start)
             angle, speed = data.qpos[self._motors], data.qvel[self._motors]
@@ -199,11 +209,34 @@ class SecondOpinion:
 
     def _feel(self) -> None:
         """Evaluate the accelerations at the present state."""
-        model, data = self._model, self._data
+        model, data = self._model, self.data
         mujoco.mj_forward(model, data)
         self._evaluated = True
         mujoco.mj_rnePostConstraint(model, data)  # accelerations in MuJoCo include gravity's
         mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, self._flange, self._felt, 1)
+
+    def wrench(self) -> Floats:
+        """What all beyond the flange exerts on it, in its frame, shape (6,) [N, N m]; to be asked after `flange`."""
+        data, turn = self.data, self._turn.reshape(3, 3)
+        whole = data.cfrc_int[self._load]  # of the flange, about the centre of mass of the arm
+        x, y, z = (data.subtree_com[self._root] - self._place).tolist()
+        fx, fy, fz = whole[3:].tolist()
+        moment = whole[:3] + np.array([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
+        felt = np.empty(6)
+        felt[:3], felt[3:] = -whole[3:] @ turn, -moment @ turn
+        return felt
+
+    def push(self, torque: Floats) -> None:
+        """Apply torques to the link side of the joints from now on, shape (n,) [N m]."""
+        self.data.qfrc_applied[self._joints] = torque
+
+    def carry(self, payload: Payload) -> None:
+        """Carry another payload from now on; positions and velocities stay."""
+        model, load = self._model, self._load
+        model.body_mass[load], model.body_ipos[load] = payload.mass, payload.com
+        model.body_inertia[load], model.body_iquat[load] = principal(payload.inertia)
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        self._evaluated = False
 
     def flange_position(self) -> Floats:
         """Position of the flange, shape (3,) [m]."""
@@ -212,27 +245,27 @@ class SecondOpinion:
     @property
     def q(self) -> Floats:
         """Link-side joint angles, shape (n,) [rad]."""
-        return np.array(self._data.qpos[self._joints])
+        return np.array(self.data.qpos[self._joints])
 
     @property
     def qd(self) -> Floats:
         """Link-side joint velocities, shape (n,) [rad/s]."""
-        return np.array(self._data.qvel[self._joints])
+        return np.array(self.data.qvel[self._joints])
 
     @property
     def motor_q(self) -> Floats:
         """Motor angles on the joint side, shape (n,) [rad]."""
-        return np.array(self._data.qpos[self._motors])
+        return np.array(self.data.qpos[self._motors])
 
     @property
     def motor_qd(self) -> Floats:
         """Motor velocities on the joint side, shape (n,) [rad/s]."""
-        return np.array(self._data.qvel[self._motors])
+        return np.array(self.data.qvel[self._motors])
 
     @property
     def link_deflection(self) -> Floats:
         """Angles of the virtual joints of bending links [rad]."""
-        return np.array(self._data.qpos[self._flexes])
+        return np.array(self.data.qpos[self._flexes])
 
     def moment(self) -> Floats:
         """Torques of the motors on the joint side, shape (n,) [N m]."""
@@ -243,94 +276,3 @@ class SecondOpinion:
         q_r, qd_r, torque = np.moveaxis(command, -2, 0)
         feedback = self._velocity_gain * (qd_r - qd) + self._position_gain * (q_r - q)
         return np.asarray(torque + feedback + self._integral_gain * s)
-
-
-def _joint(number: int) -> str:
-    return f"joint {number}"
-
-
-def _motor(number: int) -> str:
-    return f"motor {number}"
-
-
-def _flex(number: int, axis: str) -> str:
-    return f"flex {number} {axis}"
-
-
-def _build(description: RobotDescription, payload: Payload, timestep: float) -> "mujoco.MjModel":
-    """Compile the arm: hinges, a welded body for each Denavit-Hartenberg frame, rotors beside the chain."""
-    kinematics, links, drives = description.kinematics, description.links, description.drives
-    flexibility = description.link_flexibility
-    stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))
-    spec = mujoco.MjSpec()
-    spec.option.timestep = timestep
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.gravity = [0.0, 0.0, -9.81]
-    # Keep a non-finite state, so that it is detected; by default MuJoCo would restart at zero.
-    spec.option.disableflags = int(
-        mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    )
-    frame = spec.worldbody
-    for number in range(description.joints):
-        place = link_frame(description, number)
-        turn = np.roll(pin.Quaternion(place.rotation).coeffs(), 1).tolist()  # MuJoCo has the scalar first
-        body = frame.add_body()
-        body.add_joint(name=_joint(number), type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
-        if number in stiffness_of:
-            a, d = kinematics.a[number], kinematics.d[number]
-            near, far = _lump_places(description, number)
-            lump, Ixx = links.mass[number] / 2, links.inertia[number][0]
-            small = (Ixx / 2, 0.0, 0.0, Ixx / 2, 0.0, Ixx / 2)
-            _add_mass(body.add_body(pos=[a, 0, d], quat=turn), lump, near, small)
-            body = body.add_body(pos=[a / 2, 0, d])
-            for axis, direction in (("y", [0, 1, 0]), ("z", [0, 0, 1])):
-                body.add_joint(
-                    name=_flex(number, axis),
-                    type=mujoco.mjtJoint.mjJNT_HINGE,
-                    axis=direction,
-                    stiffness=stiffness_of[number],
-                    damping=stiffness_of[number] * flexibility.damping_time,
-                )
-            frame = body.add_body(pos=[a / 2, 0, 0], quat=turn)
-            _add_mass(frame, lump, far, small)
-        else:
-            frame = body.add_body(pos=place.translation.tolist(), quat=turn)
-            _add_mass(frame, links.mass[number], links.com[number], links.inertia[number])
-        B = drives.rotor_inertia[number]
-        rotor = spec.worldbody.add_body()
-        _add_mass(rotor, 1.0, (0.0, 0.0, 0.0), (B, 0.0, 0.0, B, 0.0, B))
-        rotor.add_joint(
-            name=_motor(number),
-            type=mujoco.mjtJoint.mjJNT_HINGE,
-            axis=[0, 0, 1],
-            damping=drives.velocity_gain[number] + drives.coulomb_friction[number] / drives.friction_width,
-        )
-        gear = spec.add_tendon(
-            stiffness=drives.gear_stiffness[number],
-            damping=drives.gear_damping[number],
-            springlength=[0.0, 0.0],
-        )
-        gear.wrap_joint(_joint(number), 1.0)
-        gear.wrap_joint(_motor(number), -1.0)
-    frame.name = FLANGE
-    if payload.mass > 0.0:
-        _add_mass(frame.add_body(), payload.mass, payload.com, payload.inertia)
-    return spec.compile()
-
-
-def _add_mass(body: "mujoco.MjsBody", mass: float, com: tuple[float, float, float], inertia: Tensor) -> None:
-    """Set a body's mass, centre of mass and inertia about it (xx xy xz yy yz zz)."""
-    xx, xy, xz, yy, yz, zz = inertia
-    body.mass, body.ipos, body.fullinertia = mass, list(com), [xx, yy, zz, xy, xz, yz]
-    body.explicitinertial = True
-
-
-def _lump_places(
-    description: RobotDescription, number: int
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Return the positions of a bending link's two halves in its frame, the one nearer to its joint first."""
-    x, y, z = description.links.com[number]
-    arm = float(np.sqrt(description.links.inertia[number][3] / description.links.mass[number]))
-    joint = -description.kinematics.a[number]
-    near, far = sorted((x - arm, x + arm), key=lambda place: abs(place - joint))
-    return (near, y, z), (far, y, z)

@@ -1,0 +1,128 @@
+"""The arm as a model of MuJoCo, built from its description: hinges, rotors, gears and links that bend.
+
+Bodies, virtual joints and lumps are placed by the description's frames. A motor is a rotor of inertia B in a body of
+its own beside the chain, and a gear is the spring of a fixed tendon between its angle and the joint's. All beyond the
+flange hangs on one body, so that the wrench between the two is what a sensor there feels.
+"""
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from tvist_plant.description import Payload, RobotDescription, Tensor
+from tvist_plant.model import FLANGE, link_frame
+
+LOAD = "load"
+"""Name of the body that all beyond the flange is part of: the payload, and the fingers of a gripper."""
+
+
+def joint_name(number: int) -> str:
+    """Name of a joint's hinge."""
+    return f"joint {number}"
+
+
+def motor_name(number: int) -> str:
+    """Name of a rotor's hinge."""
+    return f"motor {number}"
+
+
+def flex_name(number: int, axis: str) -> str:
+    """Name of the virtual joint by which a link bends about an axis, y or z."""
+    return f"flex {number} {axis}"
+
+
+def link_name(description: RobotDescription, number: int) -> str:
+    """Name of the body whose frame is that of a link; -1 for the world."""
+    return "world" if number < 0 else FLANGE if number == description.joints - 1 else f"link {number}"
+
+
+def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -> "mujoco.MjSpec":
+    """Return the arm: hinges, a welded body for each link's frame, rotors beside the chain, and nothing to touch."""
+    kinematics, links, drives = description.kinematics, description.links, description.drives
+    flexibility = description.link_flexibility
+    stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))
+    spec = mujoco.MjSpec()
+    spec.option.timestep = timestep
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.gravity = [0.0, 0.0, -9.81]
+    # Keep a non-finite state, so that it is detected; by default MuJoCo would restart at zero.
+    spec.option.disableflags = int(
+        mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    )
+    frame = spec.worldbody
+    for number in range(description.joints):
+        place = link_frame(description, number)
+        turn = np.roll(pin.Quaternion(place.rotation).coeffs(), 1).tolist()  # MuJoCo has the scalar first
+        body = frame.add_body()
+        body.add_joint(name=joint_name(number), type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+        if number in stiffness_of:
+            a, d = kinematics.a[number], kinematics.d[number]
+            near, far = _lump_places(description, number)
+            lump, Ixx = links.mass[number] / 2, links.inertia[number][0]
+            small = (Ixx / 2, 0.0, 0.0, Ixx / 2, 0.0, Ixx / 2)
+            add_mass(body.add_body(pos=[a, 0, d], quat=turn), lump, near, small)
+            body = body.add_body(pos=[a / 2, 0, d])
+            for axis, direction in (("y", [0, 1, 0]), ("z", [0, 0, 1])):
+                body.add_joint(
+                    name=flex_name(number, axis),
+                    type=mujoco.mjtJoint.mjJNT_HINGE,
+                    axis=direction,
+                    stiffness=stiffness_of[number],
+                    damping=stiffness_of[number] * flexibility.damping_time,
+                )
+            frame = body.add_body(name=link_name(description, number), pos=[a / 2, 0, 0], quat=turn)
+            add_mass(frame, lump, far, small)
+        else:
+            frame = body.add_body(
+                name=link_name(description, number), pos=place.translation.tolist(), quat=turn
+            )
+            add_mass(frame, links.mass[number], links.com[number], links.inertia[number])
+        B = drives.rotor_inertia[number]
+        rotor = spec.worldbody.add_body()
+        add_mass(rotor, 1.0, (0.0, 0.0, 0.0), (B, 0.0, 0.0, B, 0.0, B))
+        rotor.add_joint(
+            name=motor_name(number),
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=[0, 0, 1],
+            damping=drives.velocity_gain[number] + drives.coulomb_friction[number] / drives.friction_width,
+        )
+        gear = spec.add_tendon(
+            stiffness=drives.gear_stiffness[number],
+            damping=drives.gear_damping[number],
+            springlength=[0.0, 0.0],
+        )
+        gear.wrap_joint(joint_name(number), 1.0)
+        gear.wrap_joint(motor_name(number), -1.0)
+    load = frame.add_body(name=LOAD, mass=payload.mass, ipos=list(payload.com), explicitinertial=True)
+    load.inertia, load.iquat = principal(payload.inertia)
+    return spec
+
+
+def principal(inertia: Tensor) -> tuple[list[float], list[float]]:
+    """Return the principal moments of an inertia, and the orientation of their axes as MuJoCo's quaternion.
+
+    Those of a point are not quite zero, which MuJoCo would not take.
+    """
+    xx, xy, xz, yy, yz, zz = inertia
+    moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    if np.linalg.det(axes) < 0.0:
+        axes = -axes
+    return np.maximum(moments, 1e-9).tolist(), np.roll(pin.Quaternion(axes).coeffs(), 1).tolist()
+
+
+def add_mass(body: "mujoco.MjsBody", mass: float, com: tuple[float, float, float], inertia: Tensor) -> None:
+    """Set a body's mass, centre of mass and inertia about it (xx xy xz yy yz zz)."""
+    xx, xy, xz, yy, yz, zz = inertia
+    body.mass, body.ipos, body.fullinertia = mass, list(com), [xx, yy, zz, xy, xz, yz]
+    body.explicitinertial = True
+
+
+def _lump_places(
+    description: RobotDescription, number: int
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Return the positions of a bending link's two halves in its frame, the one nearer to its joint first."""
+    x, y, z = description.links.com[number]
+    arm = float(np.sqrt(description.links.inertia[number][3] / description.links.mass[number]))
+    joint = -description.kinematics.a[number]
+    near, far = sorted((x - arm, x + arm), key=lambda place: abs(place - joint))
+    return (near, y, z), (far, y, z)

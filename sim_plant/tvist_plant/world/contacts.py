@@ -1,0 +1,165 @@
+"""Contacts of a world: every pair of shapes that may touch is a spring and a damper with friction.
+
+MuJoCo's contact force, with a negative `solref` (-s, -b) and an impedance d that does not vary, is
+
+    f = (s r + b v) / [Â (1 - d) + A d]
+
+at depth r and speed of approach v, where A is the inverse of the effective mass of the contact, and Â MuJoCo's
+estimate of it at compile time. With d near 0 only Â remains. So s = k Â and b = c Â make a spring of k [N/m] and a
+damper of c [N s/m] of whatever touches, and no light body or far lever changes that. The force follows the position a
+step of h later, so a body with A k h² above 4 flies apart; `check_masses` refuses it long before. Friction is at most
+μ f. Below that it yields a little, by `IMPRATIO` less than the contact does, so that what is held creeps by some
+micrometres a second.
+
+Source: MuJoCo's documentation, "Computation", sections "Impedance", "Reference" and "Regularization".
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import mujoco
+import numpy as np
+
+from tvist_plant.world.scene_file import SceneError
+
+PREFIX = "world/"
+"""What precedes the scene's names in the model, so that no name of the arm's is taken."""
+STIFFNESS = 1e5
+"""Stiffness of a contact of which no shape gives one [N/m]."""
+DAMPING_RATIO = 0.3
+"""Damping ratio of such a contact, for the mass that MuJoCo estimates [-]."""
+IMPEDANCE = 2e-3
+"""d: the stiffness of a contact depends by this share on what touches [-]."""
+IMPRATIO = 1e6
+"""How much harder friction is than the contact [-]."""
+FACES = 4
+"""Points at which a box lies on a box or a plane, which share the stiffness; all else touches at single points."""
+GRIP = 500.0
+"""Rate at which friction ends a slip [1/s]."""
+MOST_PAIRS = 4000
+"""Largest number of pairs of shapes that may touch, which is what a step of 0.25 ms can look through in real time."""
+FIRMEST = 0.5
+"""Largest A k h²: beyond, a contact is an oscillation of few steps [-]."""
+
+_FLAT = {int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_PLANE)}
+
+Names = frozenset[str]
+
+
+def add_pairs(
+    spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names
+) -> list[tuple[float | None, float | None]]:
+    """Add every pair of shapes that may touch; return the stiffness and the damping of each where a shape gives them.
+
+    Args:
+        spec: The world; all its shapes have names.
+        model: The same, compiled.
+        arm: Names of the arm's shapes, which do not touch one another.
+
+    Raises:
+        SceneError: There are too many.
+    """
+    own = {frozenset((pair.geomname1, pair.geomname2)) for pair in spec.pairs}
+    apart = {frozenset((one.bodyname1, one.bodyname2)) for one in spec.excludes}
+    shapes = [one for one in spec.geoms if one.contype or one.conaffinity or one.name in arm]
+    given: list[tuple[float | None, float | None]] = [(None, None)] * len(spec.pairs)
+    for first, second in _touching(shapes, model, arm, apart):
+        if frozenset((first.name, second.name)) in own:
+            continue
+        pair = spec.add_pair(geomname1=first.name, geomname2=second.name)
+        slide, twist, roll = np.maximum(first.friction, second.friction)
+        pair.condim = max(first.condim, second.condim) if slide > 0.0 else 1
+        pair.friction = [slide, slide, twist, roll, roll]
+        pair.margin = max(first.margin, second.margin)
+        pair.solimp = [IMPEDANCE, IMPEDANCE, 1e-3, 0.5, 2.0]
+        given.append(_in_series(first, second))
+    if len(given) > MOST_PAIRS:
+        raise SceneError(
+            f"{len(given)} pairs of shapes may touch, too many for real time: must be at most {MOST_PAIRS}; "
+            'give what is only seen contype="0" conaffinity="0"'
+        )
+    for one in spec.geoms:  # only the pairs touch
+        one.contype = one.conaffinity = 0
+    return given
+
+
+def set_contacts(model: "mujoco.MjModel", given: Sequence[tuple[float | None, float | None]]) -> None:
+    """Give each pair of a compiled world its spring and damper, as far as it is one of ours.
+
+    Args:
+        model: The world.
+        given: Result of `add_pairs`.
+    """
+    for number, (stiffness, damping) in enumerate(given):
+        if model.pair_solimp[number][0] != IMPEDANCE:
+            continue  # the scene's own pair is as its file says
+        inverse = _inverse_mass(model, number)
+        k = STIFFNESS if stiffness is None else stiffness
+        c = 2.0 * DAMPING_RATIO * np.sqrt(k / inverse) if damping is None else damping
+        model.pair_solref[number] = np.array([-k * inverse, -c * inverse]) / _points(model, number)
+        model.pair_solreffriction[number] = [0.0, -GRIP * IMPEDANCE]
+
+
+def check_masses(model: "mujoco.MjModel", timestep: float) -> None:
+    """Check that no body is too light for the springs that it may touch.
+
+    Raises:
+        SceneError: One is; it would fly apart.
+    """
+    for number in range(model.npair):
+        inverse = _inverse_mass(model, number)
+        if inverse == 0.0:
+            continue
+        k = -model.pair_solref[number][0] / inverse
+        for geom in (model.pair_geom1[number], model.pair_geom2[number]):
+            body = model.body_weldid[model.geom_bodyid[geom]]
+            light, turning = model.body_invweight0[body]
+            reach = min(float(model.geom_rbound[geom]), 1.0)
+            if (value := (light + turning * reach**2) * k * timestep**2) > FIRMEST:
+                name = model.body(body).name.removeprefix(PREFIX)
+                raise SceneError(
+                    f"{name} of {model.body_subtreemass[body]:.3g} kg is too light for a contact of {k:.3g} N/m, and "
+                    f"would fly apart: give it {value / FIRMEST:.2g} times the mass, or its shapes a softer "
+                    'solref="-N/m -N s/m"'
+                )
+
+
+def _points(model: "mujoco.MjModel", pair: int) -> int:
+    """Number of points at which two shapes touch that share the stiffness."""
+    kinds = {int(model.geom_type[geom]) for geom in (model.pair_geom1[pair], model.pair_geom2[pair])}
+    return FACES if kinds <= _FLAT else 1
+
+
+def _inverse_mass(model: "mujoco.MjModel", pair: int) -> float:
+    """MuJoCo's estimate of the inverse effective mass of a pair, Â [1/kg]."""
+    geoms = model.pair_geom1[pair], model.pair_geom2[pair]
+    return float(sum(model.body_invweight0[model.geom_bodyid[geom]][0] for geom in geoms))
+
+
+def _touching(
+    shapes: Sequence["mujoco.MjsGeom"], model: "mujoco.MjModel", arm: Names, apart: set[frozenset[str]]
+) -> Iterator[tuple["mujoco.MjsGeom", "mujoco.MjsGeom"]]:
+    """Pairs of shapes by MuJoCo's own rules: one of them moves, and they are not of one body nor of neighbours."""
+    fixed_to = model.body_weldid
+    for first, second in combinations(shapes, 2):
+        ours = (first.name in arm) + (second.name in arm)
+        one, other = (int(fixed_to[model.geom(shape.name).bodyid[0]]) for shape in (first, second))
+        if ours == 2 or one == other or frozenset((first.parent.name, second.parent.name)) in apart:
+            continue
+        if one and other and (_joins(model, one, other) or _joins(model, other, one)):
+            continue
+        if ours or first.contype & second.conaffinity or second.contype & first.conaffinity:
+            yield first, second
+
+
+def _joins(model: "mujoco.MjModel", parent: int, child: int) -> bool:
+    return int(model.body_weldid[model.body_parentid[child]]) == parent
+
+
+def _in_series(first: "mujoco.MjsGeom", second: "mujoco.MjsGeom") -> tuple[float | None, float | None]:
+    """Stiffness and damping of two shapes that touch, as of springs in series; None if neither gives any."""
+    given = [-np.array(one.solref[:2]) for one in (first, second) if one.solref[0] < 0.0]
+    if not given:
+        return None, None
+    k, c = ([float(one[part]) for one in given] for part in (0, 1))
+    return 1.0 / sum(1.0 / one for one in k), 0.0 if 0.0 in c else 1.0 / sum(1.0 / one for one in c)

@@ -1,0 +1,82 @@
+"""Two fingers on the flange, which close with a limited force and hold by friction."""
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from tvist_plant.plant import Hand
+
+PAD = (0.011, 0.004, 0.03)
+"""Half of the lengths of a finger along x y z of the tool centre point [m]."""
+BEYOND = 0.008
+"""How far a finger reaches beyond the tool centre point [m]."""
+MASS, DRIVE = 0.001, 0.5
+"""Mass of a finger, which is otherwise part of the tool's, and what its gear makes of its motor's inertia [kg]."""
+STIFFNESS, DAMPING = 2e4, 200.0
+"""Gains of the law that moves a finger [N/m, N s/m]."""
+TOGETHER = 2e5
+"""Stiffness of the linkage that keeps both fingers equally far from the middle [N/m]."""
+FRICTION = (1.0, 0.01, 1e-4)
+"""Friction of a finger: sliding [-], torsional and rolling [m]."""
+SIDES = {"finger left": 1.0, "finger right": -1.0}
+"""Bodies of the fingers, and the side on which each stands."""
+
+
+def add_fingers(spec: "mujoco.MjSpec", load: "mujoco.MjsBody", hand: Hand) -> None:
+    """Add the fingers of a hand to an arm, open.
+
+    Args:
+        spec: The arm.
+        load: Body of what is beyond its flange.
+        hand: The hand.
+    """
+    turn = np.roll(pin.Quaternion(hand.rotation).coeffs(), 1).tolist()
+    for name, side in SIDES.items():
+        half = hand.stroke / 2.0
+        place = hand.position + hand.rotation @ np.array([0.0, side * (half + PAD[1]), BEYOND - PAD[2]])
+        finger = load.add_body(name=name, pos=place.tolist(), quat=turn, mass=MASS, explicitinertial=True)
+        finger.inertia = [1e-6, 1e-6, 1e-6]
+        finger.add_joint(
+            name=name,
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=[0.0, -side, 0.0],
+            armature=DRIVE,
+            damping=DAMPING,
+        )
+        finger.add_geom(
+            name=name, type=mujoco.mjtGeom.mjGEOM_BOX, size=list(PAD), mass=0.0, condim=4, friction=list(FRICTION),
+            rgba=[0.25, 0.25, 0.27, 1.0],
+        )  # fmt: skip
+    linkage = spec.add_tendon(stiffness=TOGETHER, damping=DAMPING, springlength=[0.0, 0.0])
+    for name, side in SIDES.items():
+        linkage.wrap_joint(name, side)
+
+
+class Fingers:
+    """The law that moves the fingers of a compiled arm.
+
+    Args:
+        model: The arm.
+        hand: The hand.
+    """
+
+    def __init__(self, model: "mujoco.MjModel", hand: Hand) -> None:
+        self._dofs = [int(model.joint(name).dofadr[0]) for name in SIDES]
+        self._angles = [int(model.joint(name).qposadr[0]) for name in SIDES]
+        self._stroke = hand.stroke
+        self.open()
+
+    def open(self) -> None:
+        """Want the fingers open."""
+        self.wanted, self.force = self._stroke, 0.0
+
+    def opening(self, data: "mujoco.MjData") -> float:
+        """Distance between the fingers [m]."""
+        return float(self._stroke - sum(data.qpos[self._angles]))
+
+    def drive(self, data: "mujoco.MjData") -> None:
+        """Set the forces for the next step: towards the wanted opening, and no larger than allowed."""
+        way = (self._stroke - self.wanted) / 2.0
+        for angle, dof in zip(self._angles, self._dofs, strict=True):
+            force = STIFFNESS * (way - data.qpos[angle])
+            data.qfrc_applied[dof] = min(max(force, -self.force), self.force)

@@ -1,0 +1,282 @@
+"""The arm in a world: what it touches pushes back as the scene says, and a gripper holds by friction."""
+
+import mujoco
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from tvist_plant.description import Payload, load
+from tvist_plant.drives import DriveCommand
+from tvist_plant.plant import GRAVITY, Hand, InWorld, PlantError, played
+from tvist_plant.world.mujoco_arm import MujocoArm
+from tvist_plant.world.scene_file import SceneError, find_scene, scenes
+from tvist_plant.world.world_arm import WorldArm
+
+EMPTY = '<mujoco><worldbody><geom size="0.1" pos="3 3 3"/></worldbody></mujoco>'
+DOWN = np.array([0.4, -1.8, -1.8, -1.1, 1.57, 0.0])
+"""The tool of a UR5e points down."""
+
+
+def world(tmp_path, text, arm="ur5e", payload=None, **sensors):
+    """An arm in a scene, with sensors without noise and offset unless others are given."""
+    description = load(arm)
+    silent = {"force_noise": 0.0, "torque_noise": 0.0, "force_offset": 0.0, "torque_offset": 0.0}
+    description = replace(
+        description, sensors=replace(description.sensors, accelerometer_noise=0.0, **{**silent, **sensors})
+    )
+    file = tmp_path / "scene.xml"
+    file.write_text(text)
+    return WorldArm(description, description.payload if payload is None else payload, find_scene(str(file)))
+
+
+def still(q):
+    return DriveCommand(np.array(q, dtype=float), np.zeros(len(q)), np.zeros(len(q)))
+
+
+def held(arm, q, ticks):
+    for _ in range(ticks):
+        measured = arm.step(still(q))
+    return measured
+
+
+def moving(q, ticks):
+    """A smooth motion of all joints and back."""
+    time = np.arange(ticks) / ticks
+    way = 0.2 * (1.0 - np.cos(2.0 * np.pi * time))
+    speed = np.gradient(way, 0.002)
+    return [
+        DriveCommand(q + one, np.full(6, rate), np.zeros(6)) for one, rate in zip(way, speed, strict=True)
+    ]
+
+
+def test_in_air_it_moves_as_the_arm_without_a_world(tmp_path, ur5e):
+    silent = replace(ur5e, sensors=replace(ur5e.sensors, accelerometer_noise=0.0))
+    arms = world(tmp_path, EMPTY), MujocoArm(silent, silent.payload)
+    for arm in arms:
+        arm.reset(still(DOWN))
+    for command in moving(DOWN, 200):
+        here, alone = (arm.step(command) for arm in arms)
+        for name in ("q", "qd", "moment", "accelerometer"):
+            np.testing.assert_allclose(getattr(here, name), getattr(alone, name), rtol=1e-9, atol=1e-9)
+
+
+def test_the_sensor_in_the_flange_feels_weight_and_inertia_of_what_it_carries(tmp_path):
+    payload = Payload(mass=2.0, com=(0.02, -0.01, 0.05), inertia=(1e-9, 0.0, 0.0, 1e-9, 0.0, 1e-9))
+    arm = world(tmp_path, EMPTY, payload=payload)
+    measured = arm.reset(still(DOWN))
+    rotation = arm.truth().flange_rotation
+    weight = rotation.T @ [0.0, 0.0, -2.0 * GRAVITY]
+    np.testing.assert_allclose(measured.wrench[:3], weight, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(measured.wrench[3:], np.cross(payload.com, weight), rtol=0.0, atol=1e-6)
+    at_origin = Payload(mass=2.0, inertia=(1e-9, 0.0, 0.0, 1e-9, 0.0, 1e-9))
+    arm.load(at_origin)
+    for command in moving(DOWN, 100):
+        measured = arm.step(command)
+        specific = arm.truth().specific_force
+        np.testing.assert_allclose(measured.wrench[:3], -2.0 * specific, rtol=0.0, atol=1e-6)
+
+
+def test_noise_and_offset_are_the_files_and_follow_the_seed(tmp_path):
+    given = {"force_noise": 0.5, "torque_noise": 0.02, "force_offset": 4.0, "torque_offset": 0.3}
+    arm, silent = world(tmp_path, EMPTY, **given), world(tmp_path, EMPTY)
+    true = silent.reset(still(DOWN)).wrench
+    rows = []
+    for seed in (1, 1, 2):
+        arm.reset(still(DOWN), seed=seed)
+        rows.append(np.array([arm.step(still(DOWN)).wrench for _ in range(400)]) - true)
+    np.testing.assert_array_equal(rows[0], rows[1])
+    offset = rows[0].mean(axis=0)
+    assert (np.abs(offset) <= [4.1] * 3 + [0.31] * 3).all()
+    assert np.abs(offset - rows[2].mean(axis=0)).max() > 0.1
+    np.testing.assert_allclose(rows[0].std(axis=0), [0.5] * 3 + [0.02] * 3, rtol=0.2)
+
+
+@pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5])
+def test_pressed_a_surface_yields_by_the_stiffness_it_has(tmp_path, stiffness):
+    arm = world(tmp_path, EMPTY)
+    arm.reset(still(DOWN))
+    x, y, z = arm.truth().flange_position
+    text = (
+        '<mujoco><worldbody><body name="tool"><geom type="sphere" size="0.01" pos="0 0 0.1"/></body><geom '
+        f'type="box" size="0.2 0.2 0.1" pos="{x} {y} {z - 0.2105}" solref="-{stiffness} -50"/></worldbody></mujoco>'
+    )
+    arm = world(tmp_path, text)
+    free = arm.reset(still(DOWN)).wrench
+    q = DOWN - [0.0, 0.0, 0.006, 0.0, 0.0, 0.0]  # some millimetres down
+    measured = held(arm, q, 1500)
+    depth = 0.0005 - (arm.truth().flange_position[2] - z)
+    force = arm.contact()
+    assert force[2] > 1.0
+    sphere = arm._world.model.geom("tool shape 0").id
+    (touch,) = [one for one in arm._arm.data.contact[: arm._arm.data.ncon] if sphere in one.geom]
+    assert force[2] == pytest.approx(-stiffness * touch.dist, rel=0.02), depth
+    upward = arm.truth().flange_rotation @ (measured.wrench - free)[:3]
+    assert upward[2] == pytest.approx(force[2], rel=0.02)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.7])
+def test_an_elastic_impact_has_the_peak_of_v_sqrt_k_m_and_gains_no_energy(tmp_path, phase, measured):
+    """The one-joint arm without damping, friction and drives that yield, stretched out, against a wall."""
+    k, v, reach, radius = 1e5, 0.2, 0.55, 0.04
+    gap = 4e-4 + phase * v * 0.00025
+    text = (
+        f'<mujoco><worldbody><body name="tool"><geom size="{radius}" pos="0 0 0.0125" friction="0 0 0"/></body>'
+        f'<geom type="box" size="0.5 0.1 0.3" pos="0.97 {radius + gap + 0.1} 0.2" friction="0 0 0" solref="-{k} 0"/>'
+        "</worldbody></mujoco>"
+    )
+    arm = world(tmp_path, text, "one-joint")
+    clean = arm._description.clean()
+    description = replace(clean, drives=replace(clean.drives, gear_damping=(0.0, 0.0)))
+    arm = WorldArm(description, description.payload, find_scene(str(tmp_path / "scene.xml")))
+    arm.reset(still([0.0, 0.0]))
+    model, data = arm._world.model, arm._arm.data
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    data.qvel[0] = v / reach
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, inertia)
+    peak = before = after = speed = 0.0
+    while not after:
+        mujoco.mj_step(model, data)
+        mujoco.mj_forward(model, data)
+        mujoco.mj_rnePostConstraint(model, data)
+        force, energy = np.linalg.norm(arm.contact()), data.energy.sum()
+        if force:
+            peak = max(peak, force)
+        elif peak:
+            after = energy
+        else:
+            before, speed = energy, data.qvel[0] * reach
+    expected = speed * np.sqrt(k * inertia[0, 0] / reach**2)
+    measured(
+        "peak over v sqrt(k m), energy gained over the incoming", (peak / expected, after / before - 1.0)
+    )
+    assert peak == pytest.approx(expected, rel=0.05)
+    assert after / before - 1.0 < 1e-3
+
+
+def test_two_fingers_hold_a_box_by_friction_and_no_heavier_than_they_can(tmp_path):
+    hand = Hand(0.085, np.array([0.0, 0.0, 0.163]), np.eye(3))
+    arm = world(tmp_path, EMPTY, payload=Payload(mass=0.9, com=(0.0, 0.0, 0.06)))
+    arm.reset(still(DOWN))
+    truth = arm.truth()
+    x, y, z = truth.flange_position + truth.flange_rotation @ hand.position
+    turn = np.degrees(np.arctan2(truth.flange_rotation[1, 1], truth.flange_rotation[0, 1]))
+    text = (
+        f'<mujoco><worldbody><body name="box" pos="{x} {y} {z}" euler="0 0 {turn}"><freejoint/><geom type="box" '
+        'size="0.025 0.03 0.03" mass="0.5"/></body></worldbody></mujoco>'
+    )
+    for force, stays in ((60.0, True), (1.5, False)):
+        arm = world(tmp_path, text, payload=Payload(mass=0.9, com=(0.0, 0.0, 0.06)))
+        arm.mount(hand)
+        arm.reset(still(DOWN))
+        # The box is put between the fingers when they have closed on it, so that it need not fall until then.
+        start = arm._arm.data.qpos[-7:].copy()
+        arm.grip(0.0, 60.0)
+        for _ in range(150):
+            arm._arm.data.qpos[-7:], arm._arm.data.qvel[-6:] = start, 0.0
+            arm.step(still(DOWN))
+        arm.grip(0.0, force)
+        box = arm.things().bodies.index("box")
+        first = arm.places()[box, :3]
+        held(arm, DOWN, 400)
+        assert (np.linalg.norm(arm.places()[box, :3] - first) < 5e-4) == stays
+        if stays:
+            assert arm.opening() == pytest.approx(0.05, abs=0.002)
+            assert np.linalg.norm(arm.contact()) == pytest.approx(0.5 * GRAVITY, rel=0.02)
+
+
+def test_equal_runs_are_equal_to_the_bit_and_a_reset_puts_everything_back(tmp_path, ur5e):
+    arm = WorldArm(ur5e, ur5e.payload, find_scene("table"))
+    assert isinstance(arm, InWorld)
+    runs = []
+    for _ in range(2):
+        arm.reset(still(DOWN), seed=3)
+        at = arm.places()
+        measured = [arm.step(command) for command in moving(DOWN, 60)]
+        runs.append(
+            (
+                at,
+                np.array([one.wrench for one in measured]),
+                np.array([one.q for one in measured]),
+                arm.places(),
+            )
+        )
+    for first, second in zip(*runs, strict=True):
+        np.testing.assert_array_equal(first, second)
+
+
+def test_many_periods_are_as_one_by_one(tmp_path, ur5e):
+    commands = np.array([[one.q, one.qd, one.torque] for one in moving(DOWN, 40)])
+    found = []
+    for how in (lambda arm: arm.play(commands), lambda arm: played(arm, commands)):
+        arm = WorldArm(ur5e, ur5e.payload, find_scene("table"))
+        arm.reset(still(DOWN))
+        found.append(how(arm))
+    for name in ("specific_force", "flange_position", "flange_rotation"):
+        np.testing.assert_array_equal(*(getattr(one, name) for one in found))
+    for name in ("q", "qd", "moment", "accelerometer"):
+        np.testing.assert_array_equal(*(getattr(one.measured, name) for one in found))
+
+
+def test_a_push_moves_it_and_a_state_that_is_no_number_fails(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log of its warnings where it is
+    arm = world(tmp_path, EMPTY)
+    rest = arm.reset(still(DOWN)).q
+    arm.push(np.array([0.0, 50.0, 0.0, 0.0, 0.0, 0.0]))
+    assert held(arm, DOWN, 50).q[1] > rest[1] + 1e-4
+    arm.make_nan()
+    with pytest.raises(PlantError, match="finite"):
+        arm.step(still(DOWN))
+    np.testing.assert_array_equal(arm.reset(still(DOWN)).q, rest)
+
+
+@pytest.mark.parametrize("name", scenes())
+def test_the_scenes_stand_still_and_leave_room_for_the_arm(name, ur5e):
+    arm = WorldArm(ur5e, Payload(), find_scene(name))
+    ursim = [-1.6, -1.727, -2.203, -0.808, 1.595, -0.031]
+    arm.reset(still(ursim))
+    begun = arm.places()
+    held(arm, ursim, 100)
+    loose = [number for number, body in enumerate(arm.things().bodies) if body.startswith("box")]
+    np.testing.assert_allclose(arm.places()[loose], begun[loose], rtol=0.0, atol=2e-4)
+    assert np.linalg.norm(arm.contact()) == 0.0
+
+
+BOX = '<body name="{0}" pos="-0.5 0 0.2"><freejoint/><geom type="box" size="{1} {1} {1}" mass="{2}"/></body>'
+PEA = BOX.format("pea", 0.005, 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("hello", "scene.xml: it is not valid XML"),
+        ("<robot/>", "begins with <robot>: must be a file in MuJoCo's format"),
+        ("<mujoco><worldbody><geom/></worldbody></mujoco>", "scene.xml: .*size"),
+        (f"<mujoco><worldbody>{2 * BOX.format('a', 0.1, 1)}</worldbody></mujoco>", "repeated name 'a'"),
+        (
+            f'<mujoco><worldbody><geom type="plane" size="1 1 1"/>{PEA}</worldbody></mujoco>',
+            "pea of 0.0001 kg is too light for a contact of .* N/m, .* times the mass",
+        ),
+        (
+            '<mujoco><worldbody><body name="tool"><joint/><geom size="0.1"/></body></worldbody></mujoco>',
+            "shapes only",
+        ),
+        ('<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>', "stands .* mm inside"),
+        (
+            "<mujoco><worldbody>"
+            + "".join(BOX.format(number, 0.1, 1) for number in range(100))
+            + "</worldbody></mujoco>",
+            "too many for real time",
+        ),
+    ],
+)
+def test_a_bad_scene_is_one_sentence(tmp_path, text, said):
+    with pytest.raises((SceneError, PlantError), match=said) as raised:
+        world(tmp_path, text).reset(still(DOWN))
+    assert "\n" not in str(raised.value)
+
+
+def test_a_scene_that_is_missing_names_those_that_come_with_the_package():
+    with pytest.raises(SceneError, match="must be one of pallet, peg, table, wall, or a file"):
+        find_scene("nowhere")

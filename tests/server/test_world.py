@@ -1,0 +1,154 @@
+"""A robot in a world: its configuration, a program that grips, its recording, and what is judged."""
+
+import re
+
+import numpy as np
+import pytest
+
+from tvist_lab.programs.expectations import Expectation, ExpectationError, _is_inside, missed
+from tvist_lab.programs.in_lockstep import run_in_lockstep
+from tvist_lab.recordings.mcap_file import read
+from tvist_lab.replay import ReplayError, replay_file
+from tvist_plant.plant import Shape
+from tvist_server.config import ConfigError, ServeConfig
+
+CELL = """
+world = "{world}"
+
+[[tools]]
+name = "2F-85"
+mass = 0.92
+cog = [0.0, 0.0, 0.058]
+tcp = [0.0, 0.0, 0.163, 0.0, 0.0, 0.0]
+
+[gripper]
+model = "2F-85"
+activated = true
+"""
+LIFT = """def lift():
+  movel(p[-0.144, -0.435, 0.25, 2.2214, 2.2214, 0], a=2, v=1)
+  movel(p[-0.45, -0.3, 0.25, 2.2214, 2.2214, 0], a=2, v=1)
+  movel(p[-0.45, -0.3, 0.15, 2.2214, 2.2214, 0], a=2, v=0.5)
+  rq_set_force({force})
+  rq_close_and_wait()
+  movel(p[-0.45, -0.3, 0.25, 2.2214, 2.2214, 0], a=2, v=0.5)
+  sleep(0.2)
+end
+"""
+FORCE = 80
+
+
+def config(tmp_path, world="table", cell=CELL):
+    file = tmp_path / "cell.toml"
+    file.write_text(cell.format(world=world))
+    return ServeConfig(cell=str(file), profile="ursim", clock="free")
+
+
+def ran(setup, text, record=None):
+    return run_in_lockstep(setup, text, (), record=record, attend=lambda _: None, on_record_error=pytest.fail)
+
+
+def test_a_program_lifts_a_box_and_its_recording_does_the_same_again(tmp_path):
+    file = tmp_path / "run.mcap"
+    watch = ran(config(tmp_path).setup(), LIFT.format(force=FORCE), file)
+    assert watch.reason == "finished"
+    places = dict(zip(watch.plant.things().bodies, watch.plant.places(), strict=True))
+    assert places["box"][2] == pytest.approx(0.24, abs=0.005)
+    (said,) = [said.text for said in watch.said if said.text.startswith("cell")]
+    assert re.fullmatch(r"cell: the gripper holds something (59|60)\.\d mm wide", said)
+    assert 3.0 < watch.hardest.speed < 100.0
+    expected = [
+        Expectation.of("box in left"),
+        Expectation.of("box in nowhere"),
+        Expectation.of("ball in left"),
+    ]
+    said = [one.text for one in missed(expected, watch.plant)]
+    assert "which is not in left" in said[0]
+    assert "has no area 'nowhere': it has left" in said[1]
+    assert "has no body 'ball': it has finger left, finger right, box" in said[2]
+    content = read(file)
+    assert content.info.geometry.world.bodies == ["finger left", "finger right", "box"]
+    np.testing.assert_array_equal(content.truths[-1].body_poses[12:], places["box"])
+    done = replay_file(content)
+    assert (done.first_difference, done.notes) == (None, [])
+
+
+def test_a_force_that_is_too_small_does_not_lift_it(tmp_path):
+    cell = CELL.replace("2F-85", "2F-140")
+    heavy = (
+        '<mujoco><worldbody><geom type="box" size="0.28 0.45 0.05" pos="-0.5 -0.15 0.05"/><body name="box" pos="-0.45 '
+        '-0.3 0.14"><freejoint/><geom type="box" size="0.03 0.025 0.04" mass="4"/></body></worldbody></mujoco>'
+    )
+    (tmp_path / "heavy.xml").write_text(heavy)  # beside the cell's file
+    watch = ran(config(tmp_path, "heavy.xml", cell).setup(), LIFT.format(force=0))
+    assert dict(zip(watch.plant.things().bodies, watch.plant.places(), strict=True))["box"][2] < 0.15
+    assert "cell: the gripper has lost what it held" in [said.text for said in watch.said]
+
+
+def test_a_world_is_named_in_one_place_and_tells_the_truth():
+    setup = ServeConfig(world="wall").setup()
+    assert setup.plant.recorded.place == "world:wall"
+    assert len(setup.plant.recorded.sha256) == 64
+    assert setup.truth
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"world": "nowhere"}, "world is 'nowhere': must be one of pallet, peg, table, wall, or a file"),
+        ({"world": "table", "plant": "mujoco"}, "world is table, .* but plant is mujoco: leave one out"),
+        ({"world": "table", "hidden": 3}, "world is table, .* but hidden is 3: leave one out"),
+    ],
+)
+def test_what_excludes_a_world_is_said(given, said):
+    with pytest.raises(ConfigError, match=said):
+        ServeConfig(**given).setup()
+
+
+def test_parts_and_a_world_exclude_each_other(tmp_path):
+    part = '\n[[parts]]\nname = "box"\nmass = 1.0\nsize = [0.1, 0.05, 0.1]\npose = [0, 0, 1, 0, 0, 0]\n'
+    with pytest.raises(ConfigError, match="in which bodies are gripped: leave parts out"):
+        config(tmp_path, cell=CELL + part).setup()
+
+
+def test_an_arm_that_would_stand_in_a_wall_is_one_sentence(tmp_path):
+    (tmp_path / "wall.xml").write_text(
+        '<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>'
+    )
+    with pytest.raises(
+        ConfigError, match=r"world .*wall.xml: .* stands .* mm inside shape 0: choose a posture"
+    ):
+        ran(ServeConfig(world=str(tmp_path / "wall.xml"), clock="free").setup(), "def a():\nend")
+
+
+def test_a_scene_that_has_changed_is_noted_and_one_that_has_gone_is_asked_for(tmp_path):
+    scene, file = tmp_path / "own.xml", tmp_path / "run.mcap"
+    scene.write_text('<mujoco><worldbody><geom size="0.1" pos="3 3 3"/></worldbody></mujoco>')
+    ran(ServeConfig(world=str(scene), clock="free").setup(), "def a():\n  sleep(0.1)\nend", file)
+    scene.write_text('<mujoco><worldbody><geom size="0.2" pos="3 3 3"/></worldbody></mujoco>')
+    assert "not what it was" in replay_file(read(file)).notes[0]
+    scene.unlink()
+    with pytest.raises(ReplayError, match="give --plant world:FILE"):
+        replay_file(read(file))
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "inside", "outside"),
+    [
+        ("box", (1.0, 2.0, 3.0), (0.9, -1.9, 2.9), (1.1, 0.0, 0.0)),
+        ("sphere", (1.0, 0.0, 0.0), (0.5, 0.5, 0.5), (0.7, 0.7, 0.7)),
+        ("ellipsoid", (1.0, 2.0, 3.0), (0.0, 0.0, 2.9), (0.9, 0.0, 2.0)),
+        ("cylinder", (1.0, 2.0, 0.0), (0.6, 0.6, 1.9), (0.8, 0.8, 0.0)),
+        ("capsule", (1.0, 2.0, 0.0), (0.0, 0.0, 2.9), (0.8, 0.0, 2.9)),
+    ],
+)
+def test_areas_contain_what_their_shape_does(kind, size, inside, outside):
+    area = Shape(kind, size, (0.0,) * 6, None, (0.0,) * 4)
+    assert _is_inside(area, np.array(inside))
+    assert not _is_inside(area, np.array(outside))
+
+
+def test_what_is_expected_is_said_in_one_way():
+    assert Expectation.of("box 1 in place 2") == Expectation("box 1", "place 2")
+    with pytest.raises(ExpectationError, match="must be BODY in AREA"):
+        Expectation.of("box 1")
