@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from tvist_protocol.client_message import ClientMessage
 from tvist_protocol.errors import ProtocolError, short
-from tvist_protocol.forces import EndForceMode, ForceMode, Freedrive, ZeroFtsensor
+from tvist_protocol.forces import EndForceMode, ForceMode, Freedrive, SetExternalWrench, ZeroFtsensor
 from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.motions import MoveC, MoveL, MovePath, ServoJ, SpeedJ, SpeedL, StopJ, StopL
@@ -283,6 +283,7 @@ Command = (
     | Freedrive
     | EndForceMode
     | ZeroFtsensor
+    | SetExternalWrench
     | ServoStart
     | ServoStop
     | Stop

@@ -72,3 +72,10 @@ class ZeroFtsensor(ClientMessage, frozen=True, kw_only=True, tag="zero_ftsensor"
 
     token: Token
     """Token of the lease."""
+
+
+class SetExternalWrench(ClientMessage, frozen=True, kw_only=True, tag="set_external_wrench"):
+    """Tell what a force sensor of one's own measures; it counts once a program has called `ft_rtde_input_enable`."""
+
+    wrench: Wrench
+    """Force [N] and torque [N m] in the directions of the flange frame, with the weight of what the sensor carries."""

@@ -49,9 +49,13 @@ class ForceCommands:
     def _zero(self, _: Call[m.ZeroFtsensor]) -> None:
         self._forces.zero()
 
+    def _sense(self, call: Call[m.SetExternalWrench]) -> None:
+        self._control.sense(np.array(call.command.wrench, dtype=float))
+
     rows: ClassVar[tuple[Row, ...]] = (
         Row(m.ForceMode, _force_mode),
         Row(m.Freedrive, _freedrive),
         Row(m.EndForceMode, _end, stops=True),
         Row(m.ZeroFtsensor, _zero, changes_io=True),
+        Row(m.SetExternalWrench, _sense, lease="none"),
     )

@@ -47,7 +47,8 @@ class ForceControl:
         """Guided motions."""
         self._measure = felt
         self._motion, self._cycle = guidance.motion, guidance.motion.cycle
-        self._smooth = np.zeros(6)
+        self._smooth = self._external = np.zeros(6)
+        self._offset: Sequence[float] | None = None
         self._by_hand, self._beyond, self._contact = False, 0, ContactWatch()
 
     @property
@@ -105,6 +106,22 @@ class ForceControl:
         """Come to rest where the arm is, if force mode is on; a motion in the other axes ends, too."""
         if self.compliant is not None:
             self._guidance.stop_joints(GENTLE, "end_force_mode")
+
+    def sense(self, wrench: Floats) -> None:
+        """Take what an external force sensor measures, in the directions of the flange frame, shape (6,) [N, N m]."""
+        self._external = wrench
+        if self._offset is not None:
+            lever = np.cross(self._offset, wrench[:3])
+            self._cycle.external = np.concatenate((wrench[:3], wrench[3:] + lever))
+
+    def use_external(self, offset: Sequence[float] | None) -> None:
+        """Use an external force sensor; None for the plant's own, if it has one.
+
+        Args:
+            offset: Where it measures, in the flange frame, shape (3,) [m].
+        """
+        self._offset, self._cycle.external = offset, None
+        self.sense(self._external)
 
     def touched(self, direction: Sequence[float]) -> int:
         """Return the number of ticks since just before the tool touched something; 0 if it does not.

@@ -4,7 +4,7 @@ import numpy as np
 
 from tvist_controller.motion.task_frame import Feature
 from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import integer, number, numbers, pose, shown
+from tvist_controller.programs.arguments import flag, integer, number, numbers, pose, shown
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.journey import Turns
 from tvist_controller.trajectory import ForceTask
@@ -13,6 +13,7 @@ from tvist_urscript import Array, Fault, costs
 MOST_LIMIT = 1e3
 """Largest limit of an axis that is passed on: nothing reaches it [m/s, m, rad]."""
 ALL = Array((1,) * 6)
+NOWHERE = Array((0,) * 3)
 
 
 class ForceFunctions:
@@ -79,6 +80,29 @@ class ForceFunctions:
     def end_teach_mode(self) -> None:
         """Hold the position again."""
         self._arm.hold_again(by_hand=True)
+
+    def ft_rtde_input_enable(
+        self,
+        enable: object,
+        sensor_mass: object = 0,
+        sensor_measuring_offset: object = NOWHERE,
+        sensor_cog: object = NOWHERE,
+    ) -> None:
+        """Use the force sensor whose values clients write by RTDE; its mass is part of the payload to declare."""
+        number("sensor_mass", sensor_mass, 0.0)
+        numbers("sensor_cog", sensor_cog, 3)
+        offset = numbers("sensor_measuring_offset", sensor_measuring_offset, 3)
+        self._access.force.use_external(offset if flag("enable", enable) else None)
+
+    def enable_external_ft_sensor(
+        self,
+        enable: object,
+        sensor_mass: object = 0,
+        sensor_measuring_offset: object = NOWHERE,
+        sensor_cog: object = NOWHERE,
+    ) -> None:
+        """Do what `ft_rtde_input_enable` does; its older name."""
+        self.ft_rtde_input_enable(enable, sensor_mass, sensor_measuring_offset, sensor_cog)
 
     @costs(60)
     def tool_contact(self, direction: object = None) -> int:

@@ -14,14 +14,6 @@ _TEMPERATURES, _LIMITS = "temperatures in programs", "limits of the force at the
 _SIGNAL = parameters("signal_name")
 
 SUBJECTS: dict[str, tuple[tuple[Parameter, ...], str]] = {
-    "enable_external_ft_sensor": (
-        parameters("enable", sensor_mass=0, sensor_measuring_offset=None, sensor_cog=None),
-        "an external force sensor",
-    ),
-    "ft_rtde_input_enable": (
-        parameters("enable", sensor_mass=0, sensor_measuring_offset=None, sensor_cog=None),
-        "an external force sensor",
-    ),
     "direct_torque": (
         parameters("torque", friction_comp=True, viscous_scale=None, coulomb_scale=None),
         "torque control",
