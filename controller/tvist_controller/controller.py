@@ -302,7 +302,8 @@ class Controller(WholeRobot):
             sample = self._safety.recover(error, self._seed)
             self._payload.begin_anew()
             self.modes.changed = True
-        self._payload.watch(sample)
+        if self._force_control.compliant is None:  # else what it touches would be taken for a payload
+            self._payload.watch(sample)
         self.filters.watch(sample)
         self.modes.update()
         self.tick_number += 1
