@@ -30,8 +30,8 @@ TOUCH = 10.0
 """Force of a contact, if the flange has a sensor [N]."""
 ESTIMATED_TOUCH = 20.0
 """Force of a contact that is estimated from the drives' torques [N]."""
-GENTLE = 0.3
-"""Deceleration of the fastest joint where force mode ends: hardly anything vibrates after it [rad/s^2]."""
+GENTLE = 1.0
+"""Deceleration of the fastest joint where force mode ends, the lowest of any stop [rad/s^2]."""
 
 
 class ForceControl:

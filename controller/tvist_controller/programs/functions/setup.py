@@ -156,7 +156,7 @@ class SetupFunctions:
             raise Fault(f'action is {shown(action)}: it must be "default" or "freedrive"')
         if action == "freedrive":
             self._warn(
-                f"{what} has the action freedrive: here only freedrive_mode lets the arm be moved by hand, no input does"
+                f"{what} has the action freedrive: here freedrive_mode lets the arm be moved by hand, and no input"
             )
 
     def _choose(self, group: Group, place: int, state: object) -> None:
