@@ -11,6 +11,7 @@ from tvist_client.errors import (
     ClientError,
     ProtectiveStopError,
 )
+from tvist_client.forces import Forces
 from tvist_client.granted import granted
 from tvist_client.guiding import Guiding
 from tvist_client.moves import Moves
@@ -64,7 +65,7 @@ second.
 """
 
 
-class Arm(Moves, Guiding, Terminals, Simulation):
+class Arm(Moves, Guiding, Forces, Terminals, Simulation):
     """The arm that `Robot.control` yields. Joint values are any sequence of numbers [rad], one for each joint.
 
     Every command may raise RefusedError; it has then changed nothing.

@@ -14,6 +14,7 @@ from tvist_client.portal import Portal
 from tvist_client.published import BUFFER
 from tvist_client.robot import ANSWER_S
 from tvist_protocol.commands import Command
+from tvist_protocol.forces import FrameType
 from tvist_protocol.info import Clock, Info
 from tvist_protocol.io import Bank, Io
 from tvist_protocol.motions import Orientation, Segment
@@ -554,6 +555,66 @@ class Arm:
             angular_acceleration: Angular deceleration of the tool [rad/s²]; None for the number of `acceleration`.
         """
         self._portal.call(lambda: self._arm.stop_l(acceleration, angular_acceleration=angular_acceleration))
+
+    def force_mode(
+        self,
+        compliant: Iterable[bool],
+        wrench: Iterable[float],
+        *,
+        limits: Iterable[float] = (0.1, 0.1, 0.1, 0.5, 0.5, 0.5),
+        frame: Iterable[float] | None = None,
+        frame_type: FrameType = 2,
+        damping: float = 0.005,
+        gain: float = 1.0,
+    ) -> Motion:
+        """Give way along and about the compliant axes of a frame until a wrench is reached.
+
+        In the other axes the arm stands, or moves by `servo_j`, `speed_j` and `speed_l`. A further call changes what
+        is to be reached; `end_force_mode`, any stop and the end of control end it.
+
+        Args:
+            compliant: Which axes give way: three directions of the frame, then the turns about them.
+            wrench: What the arm exerts on its environment in these: force [N] and torque [N m].
+            limits: Speed limit of each compliant axis [m/s, rad/s]; largest deviation of each other one [m, rad].
+            frame: The frame, as a pose in the base frame; None for the base frame.
+            frame_type: 1: the frame is turned so that its y axis points from the tool to its origin; 2: it stays; 3: it
+                is turned so that its x axis is the tool's velocity projected into its x-y plane.
+            damping: How quickly the arm slows down where nothing touches it, 0 to 1.
+            gain: Factor of the difference between wanted and felt wrench, 0 to 2.
+        """
+        return Motion(
+            self._portal,
+            self._portal.call(
+                lambda: self._arm.force_mode(
+                    compliant,
+                    wrench,
+                    limits=limits,
+                    frame=frame,
+                    frame_type=frame_type,
+                    damping=damping,
+                    gain=gain,
+                )
+            ),
+        )
+
+    def freedrive(
+        self, free: Iterable[bool] = (True,) * 6, frame: Iterable[float] | Literal["base", "tool"] = "base"
+    ) -> Motion:
+        """Let people move the arm by hand, until `end_force_mode`, a stop or the end of control.
+
+        Args:
+            free: Along which directions of the frame, and about which, it can be moved.
+            frame: The frame: that of the base or of the tool, or a pose in the base frame.
+        """
+        return Motion(self._portal, self._portal.call(lambda: self._arm.freedrive(free, frame)))
+
+    def end_force_mode(self) -> None:
+        """End `force_mode` or `freedrive`, and wait until the arm is at rest."""
+        self._portal.call(self._arm.end_force_mode)
+
+    def zero_ftsensor(self) -> None:
+        """Take the present force and torque at the tool as zero."""
+        self._portal.call(self._arm.zero_ftsensor)
 
     def set_digital_output(self, number: int, on: bool) -> None:
         """Switch a digital output: 0–7 standard, 8–15 configurable, 16–17 tool."""

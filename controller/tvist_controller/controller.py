@@ -17,6 +17,7 @@ from tvist_controller.cell.live_cell import LiveCell
 from tvist_controller.commands.counters import Counters
 from tvist_controller.commands.events import Fields
 from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.dispatch.force_commands import ForceCommands
 from tvist_controller.dispatch.guided_commands import GuidedCommands
 from tvist_controller.dispatch.lessons import Lessons
 from tvist_controller.dispatch.motion_commands import MotionCommands
@@ -31,6 +32,7 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.filter_control import Filters
+from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.planning.basis import PlanBasis, ToolBasis
 from tvist_controller.planning.command_row import Call
@@ -109,7 +111,9 @@ class Controller(WholeRobot):
         self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
         self.watching, self.supervision = self._own_controller(plant)
         """The robot's own controller, which is only watched, or through which the robot is moved; None for neither."""
-        self.forces = ToolForces(setup.description, self.peripherals, lambda: self.latest)
+        self.forces = ToolForces(
+            setup.description, self.peripherals, lambda: self.latest, lambda: self.declared
+        )
         """Forces and torques on the arm."""
         self.cell = (
             None
@@ -117,8 +121,8 @@ class Controller(WholeRobot):
             else LiveCell(setup.cell, setup.description, self.cycle.line.plant, self.peripherals, self._emit)
         )
         """What stands around the robot; None for nothing."""
-        guidance = Guidance(self.motion)
-        self.programs = ProgramPlayer(self._access(guidance), safety)
+        self._force_control = ForceControl(Guidance(self.motion), self.forces.felt)
+        self.programs = ProgramPlayer(self._access(), safety)
         self._told_program = self.programs.progress
         self.filters = Filters(self.motion, first.source, setup.payload, self._emit)
         self._payload = DeclaredPayload(
@@ -130,7 +134,8 @@ class Controller(WholeRobot):
         """What it has learnt from its motions."""
         parts = (
             self._authority, MotionCommands(self.motion, safety, self.programs),
-            GuidedCommands(guidance, self.programs), self.filters, self._payload, self.peripherals,
+            GuidedCommands(self._force_control.guidance, self.programs),
+            ForceCommands(self._force_control, self.forces), self.filters, self._payload, self.peripherals,
             self._faults, self.lessons, ProgramCommands(self.programs, self.motion), self,
         )  # fmt: skip
         self._commands = CommandTable(parts, setup.description)
@@ -290,6 +295,7 @@ class Controller(WholeRobot):
                 raise failed
             sample = self.motion.step()
             self._safety.watch(sample)
+            self._force_control.watch(sample)
             if self.cell is not None:
                 self.cell.tick(self.tick_number + 1, sample.measured.q)
         except PlantError as error:
@@ -298,7 +304,8 @@ class Controller(WholeRobot):
             sample = self._safety.recover(error, self._seed)
             self._payload.begin_anew()
             self.modes.changed = True
-        self._payload.watch(sample)
+        if self._force_control.compliant is None:  # else what it touches would be taken for a payload
+            self._payload.watch(sample)
         self.filters.watch(sample)
         self.modes.update()
         self.tick_number += 1
@@ -401,12 +408,12 @@ class Controller(WholeRobot):
             return None, Supervision(plant, self.motion, self._safety, tools, tools.set_tcp, self._emit)
         return None, None
 
-    def _access(self, guidance: Guidance) -> Access:
+    def _access(self) -> Access:
         """What programs may use of the robot."""
         return Access(
             description=self.setup.description,
             motion=self.motion,
-            guidance=guidance,
+            guidance=self._force_control.guidance,
             peripherals=self.peripherals,
             emit=self._emit,
             send=self._carry_out,
@@ -414,6 +421,7 @@ class Controller(WholeRobot):
             latest=lambda: self.latest,
             io=lambda: self.io(wrench=False),
             declared=lambda: self.declared,
+            force=self._force_control,
             forces=self.forces,
             shape_guided=self.setup.shape_servo,
             cell=self.cell,

@@ -42,6 +42,7 @@ from tvist_protocol.commands import (
     UnlockProtectiveStop,
 )
 from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
+from tvist_protocol.forces import EndForceMode, ForceMode, Freedrive, SetExternalWrench, ZeroFtsensor
 from tvist_protocol.info import CalibrationInfo, Clock, Info, Limits, Stopping, StopReason
 from tvist_protocol.io import Bank, Io, Registers, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
@@ -81,17 +82,17 @@ from tvist_protocol.values import PROTOCOL_VERSION, Payload
 
 __all__ = [
     "CODE_MEANINGS", "EVENT_MEANINGS", "MAX_BYTES", "PROTOCOL_VERSION", "Accepted", "ArcSegment", "Bank",
-    "CalibrationInfo", "Clock", "Code", "Command", "Done", "Event", "EventKind", "Forget", "ForwardKinematics",
-    "HandOver", "Info", "Interpreter", "InverseKinematics", "Io", "JointSegment", "KeepAlive", "Limits",
-    "LineSegment", "Message", "MoveC", "MoveJ", "MoveL", "MovePath", "Pause", "Payload", "Posture",
-    "PowerOff", "PowerOn", "ProcessSegment", "ProgramClosePopup", "ProgramInterpret", "ProgramLabel", "ProgramLoad",
-    "ProgramPause", "ProgramPlay", "ProgramRun", "ProgramSkip", "ProgramState", "ProgramStop",
-    "ProtocolError", "Refused", "RefusedError", "Registers", "ReleaseClock", "ReleaseControl", "Reply",
-    "RestartSafety", "Resume", "RobotMode", "RuntimeState", "SafetyMode", "Segment", "ServoJ", "ServoStart",
-    "ServoStop", "SetEstimator", "SetIo", "SetPayload", "SetRegisters", "SetShaper", "SetSpeed", "SetTcp",
-    "Setpoint", "SimulationInject", "SimulationReset", "SimulationSetInputs", "SimulationStep", "SpeedJ",
-    "SpeedL", "State", "StepSetpoint", "Stop", "StopJ", "StopL", "StopReason", "Stopping", "TakeClock",
-    "TakeControl", "Telemetry", "ToolPose", "Truth", "TvistError", "UnlockProtectiveStop", "check",
-    "decode_command", "decode_event", "decode_info", "decode_io", "decode_reply", "decode_setpoint",
-    "decode_state", "decode_telemetry", "decode_truth", "encode", "refusal",
+    "CalibrationInfo", "Clock", "Code", "Command", "Done", "EndForceMode", "Event", "EventKind", "ForceMode",
+    "Forget", "ForwardKinematics", "Freedrive", "HandOver", "Info", "Interpreter", "InverseKinematics", "Io",
+    "JointSegment", "KeepAlive", "Limits", "LineSegment", "Message", "MoveC", "MoveJ", "MoveL", "MovePath", "Pause",
+    "Payload", "Posture", "PowerOff", "PowerOn", "ProcessSegment", "ProgramClosePopup", "ProgramInterpret",
+    "ProgramLabel", "ProgramLoad", "ProgramPause", "ProgramPlay", "ProgramRun", "ProgramSkip", "ProgramState",
+    "ProgramStop", "ProtocolError", "Refused", "RefusedError", "Registers", "ReleaseClock", "ReleaseControl",
+    "Reply", "RestartSafety", "Resume", "RobotMode", "RuntimeState", "SafetyMode", "Segment", "ServoJ",
+    "ServoStart", "ServoStop", "SetEstimator", "SetExternalWrench", "SetIo", "SetPayload", "SetRegisters",
+    "SetShaper", "SetSpeed", "SetTcp", "Setpoint", "SimulationInject", "SimulationReset", "SimulationSetInputs",
+    "SimulationStep", "SpeedJ", "SpeedL", "State", "StepSetpoint", "Stop", "StopJ", "StopL", "StopReason",
+    "Stopping", "TakeClock", "TakeControl", "Telemetry", "ToolPose", "Truth", "TvistError", "UnlockProtectiveStop",
+    "ZeroFtsensor", "check", "decode_command", "decode_event", "decode_info", "decode_io", "decode_reply",
+    "decode_setpoint", "decode_state", "decode_telemetry", "decode_truth", "encode", "refusal",
 ]  # fmt: skip

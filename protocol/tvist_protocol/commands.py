@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from tvist_protocol.client_message import ClientMessage
 from tvist_protocol.errors import ProtocolError, short
+from tvist_protocol.forces import EndForceMode, ForceMode, Freedrive, SetExternalWrench, ZeroFtsensor
 from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.motions import MoveC, MoveL, MovePath, ServoJ, SpeedJ, SpeedL, StopJ, StopL
@@ -278,6 +279,11 @@ Command = (
     | SpeedL
     | StopJ
     | StopL
+    | ForceMode
+    | Freedrive
+    | EndForceMode
+    | ZeroFtsensor
+    | SetExternalWrench
     | ServoStart
     | ServoStop
     | Stop

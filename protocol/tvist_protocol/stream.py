@@ -112,6 +112,8 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     """Torque that they are given with it; null without it [N m]."""
     motor_limited: bool = False
     """Whether the torque limits keep the motors from leading by as much as the arm's elasticity wants."""
+    flange_wrench: list[float] | None = None
+    """Force [N] and torque about its origin [N m] that the sensor in the flange feels, in its frame; null: none."""
 
 
 class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc=False):

@@ -26,7 +26,9 @@ class Activity(StrEnum):
     STREAMING = "STREAMING"
     """The arm follows a stream of set-points."""
     GUIDED = "GUIDED"
-    """The arm follows `servo_j`, `speed_j` or `speed_l`, each of which replaces the one before."""
+    """The arm follows `servo_j`, `speed_j` or `speed_l`, each of which replaces the one before, or gives way to forces
+    by `force_mode` or `freedrive`.
+    """
     ENDING = "ENDING"
     """A stream has ended, and the arm comes to rest through the filter."""
     STOPPING = "STOPPING"
@@ -91,8 +93,8 @@ HAPPENINGS: dict[str, str] = {
     "at_rest": "the shaped reference has come to rest",
     "interruption": "the motion must end: the lease ended, no set-point came for 250 ms, or there would be a collision",
     "brakes": "a fault or the safety system removed the power: the brakes close at once",
-    "protective_stop": "the torque of a drive exceeded its limit for more than 10 ms, a user's own shaper failed, or "
-    "the fault was injected",
+    "protective_stop": "a drive's torque or the force at the tool exceeded its limit for more than 10 ms, the tool "
+    "left its way in force mode, a user's own shaper failed, or the fault was injected",
     "plant_failure": "the state of the simulated arm was no longer finite; the arm was put at rest at its reference",
     "lease_end": "the client did not renew the lease, or its liveliness token disappeared",
     "clock_end": "the liveliness token of the client that held the clock disappeared",
@@ -148,6 +150,9 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition("servo_j", _GUIDABLE, _A.GUIDED),
     Transition("speed_j", _GUIDABLE, _A.GUIDED),
     Transition("speed_l", _GUIDABLE, _A.GUIDED),
+    Transition("force_mode", (_A.REST, _A.GUIDED), _A.GUIDED),
+    Transition("freedrive", (_A.REST, _A.GUIDED), _A.GUIDED),
+    Transition("end_force_mode", (_A.GUIDED,), _A.STOPPING),
     Transition("pause", (_A.MOVING, _A.PAUSED), _A.PAUSED),
     Transition("resume", (_A.PAUSED,), _A.MOVING),
     Transition("servo_start", (_A.REST,), _A.STREAMING),

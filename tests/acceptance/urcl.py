@@ -88,8 +88,7 @@ EXAMPLES = {
 `external_fts_through_rtde` waits for keys, and `direct_torque_control_example` needs PolyScope 5.23.
 """
 KNOWN_EXAMPLES = {
-    "freedrive_example": "needs moving the arm by hand, which is not simulated",
-    "tool_contact_example": "needs detecting contacts, which is not simulated",
+    "tool_contact_example": "needs something to touch",
 }
 """Examples that do not end well, and what the simulated robot cannot do."""
 

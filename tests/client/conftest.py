@@ -155,7 +155,7 @@ class FakeRobot:
         self.motion = (self.motions, math.inf, None)
         return Accepted(id=self.motions)
 
-    _speed_j = _speed_l = _servo_j
+    _speed_j = _speed_l = _force_mode = _freedrive = _servo_j
 
     def _inverse_kinematics(self, _):
         return Posture(q=(0.5,) * JOINTS)
@@ -192,7 +192,10 @@ class FakeRobot:
             self.motion = None
         return Done()
 
-    _stop_j = _stop_l = _stop
+    _stop_j = _stop_l = _end_force_mode = _stop
+
+    def _zero_ftsensor(self, _):
+        return Done()
 
     def end_stream(self, why):
         self.streaming = False

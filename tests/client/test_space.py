@@ -17,6 +17,7 @@ from tvist_client import (
 )
 from tvist_client.blocking import Robot as BlockingRobot
 from tvist_client.robot import CHUNK
+from tvist_protocol import forces as f
 from tvist_protocol import kinematics as k
 from tvist_protocol import motions as m
 from tvist_protocol.codec import check, encode
@@ -87,7 +88,23 @@ GUIDED = {
         m.SpeedL(token="me#1", xd=POSE, acceleration=2.0, angular_acceleration=3.0, shaped=True),
     ),
 }
+GIVING = {
+    "force_mode": (
+        lambda arm: arm.force_mode(
+            [0, 0, 1, True, False, 0], ARRAY, limits=[0.1] * 6, frame=FRAME, frame_type=3, damping=1, gain=2
+        ),
+        f.ForceMode(
+            token="me#1", compliant=(False, False, True, True, False, False), wrench=POSE, limits=(0.1,) * 6,
+            frame=FRAME, frame_type=3, damping=1.0, gain=2.0,
+        ),
+    ),
+    "freedrive": (
+        lambda arm: arm.freedrive([1, 1, 1, 0, 0, 0], list(FRAME)),
+        f.Freedrive(token="me#1", free=(True, True, True, False, False, False), frame=FRAME),
+    ),
+}  # fmt: skip
 STOPS = {
+    "end_force_mode": (lambda arm: arm.end_force_mode(), f.EndForceMode(token="me#1")),
     "stop_j": (lambda arm: arm.stop_j(3), m.StopJ(token="me#1", acceleration=3.0)),
     "stop_l": (
         lambda arm: arm.stop_l(3, angular_acceleration=4),
@@ -122,6 +139,17 @@ def sent(fake, name):
     """The command of a type, as the robot received it."""
     (command,) = (one for one in fake.commands if type(one).__struct_config__.tag == name)
     return command
+
+
+@pytest.mark.parametrize("name", GIVING)
+async def test_giving_way_to_forces_is_sent_as_it_was_asked_for(fake, free, name):
+    call, wanted = GIVING[name]
+    async with free.control("me") as arm:
+        motion = await call(arm)
+        await arm.zero_ftsensor()
+    assert motion.id == 1
+    assert sent(fake, name) == wanted
+    assert sent(fake, "zero_ftsensor") == f.ZeroFtsensor(token="me#1")
 
 
 @pytest.mark.parametrize("name", MOVES)

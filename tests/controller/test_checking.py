@@ -37,11 +37,11 @@ def test_an_unknown_name_that_is_nearly_a_function_is_told_which():
 
 
 def test_functions_that_are_not_simulated_are_warnings_beside_the_errors():
-    assert found("freedrive_mode()", "sleep(1)", "nope()", "end_freedrive_mode()", "freedrive_mode()") == [
+    assert found("path_offset_enable()", "sleep(1)", "nope()", "end_freedrive_mode()", "path_offset_enable()") == [
         (2, 3, "warning"), (4, 3, "error"), (6, 3, "warning"),
     ]  # fmt: skip
-    (finding, *_) = check_program(script("freedrive_mode()"))
-    assert finding.text == "freedrive_mode: this controller does not simulate moving the arm by hand"
+    (finding, *_) = check_program(script("path_offset_enable()"))
+    assert finding.text == "path_offset_enable: this controller does not simulate path offsets"
 
 
 def test_every_function_that_is_not_simulated_is_warned_of():

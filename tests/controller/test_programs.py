@@ -102,9 +102,23 @@ def test_a_movej_to_a_pose_ends_there_near_the_present_joints():
         ("write_output_integer_register(0, 1.5)", "value is 1.5: it must be an integer"),
         ("set_digital_out(10, True)", "n is 10"),
         (
-            "force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,1,0,0,0], 2, [1,1,1,1,1,1])",
-            "does not simulate force",
+            "force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,1,0,0,0], 4, [1,1,1,1,1,1])",
+            "type is 4: it must be from 1 to 3",
         ),
+        (
+            "force_mode(p[0,0,0,0,0,0], [0,0,2,0,0,0], [0,0,1,0,0,0], 2, [1,1,1,1,1,1])",
+            "selection_vector[2] is 2",
+        ),
+        (
+            "force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,1,0,0,0], 2, [1,1,-1,1,1,1])",
+            "limits[2] is -1",
+        ),
+        ("force_mode_set_damping(1.5)", "damping is 1.5: it must be from 0 to 1"),
+        ("force_mode_set_gain_scaling(3)", "scaling is 3: it must be from 0 to 2"),
+        ("freedrive_mode([1, 1, 1])", "freeAxes has 3 elements"),
+        ('freedrive_mode(feature="table")', "feature is table"),
+        ("tool_contact([0, 0, 1])", "direction has 3 elements"),
+        ("direct_torque([0, 0, 0, 0, 0, 0])", "does not simulate torque control"),
     ],
 )
 def test_what_cannot_be_done_ends_the_program_at_its_call_and_the_arm_stays(move, text):

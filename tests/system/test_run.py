@@ -33,7 +33,7 @@ WAITS = """def waits():
 end
 """
 FAILS = "def fails():\n  sleep(0.1)\n  x = [1, 2]\n  y = x[2]\nend\n"
-WRONG = "def wrong():\n  movej(x)\n  freedrive_mode()\nend\n"
+WRONG = "def wrong():\n  movej(x)\n  path_offset_enable()\nend\n"
 WRITES = """
 import sys
 from rtde_io import RTDEIOInterface
@@ -104,7 +104,7 @@ class TestInLockstep:
         assert json.loads(out)["exit_reason"] == "compile_error"
         assert err.splitlines() == [
             "wrong.script:2:9: compile_error_name_not_found:x:",
-            "wrong.script:3:3: warning: freedrive_mode: this controller does not simulate moving the arm by hand",
+            "wrong.script:3:3: warning: path_offset_enable: this controller does not simulate path offsets",
             "tvist: wrong.script cannot run: it has 1 error",
         ]
 
@@ -351,12 +351,12 @@ class TestCheckScript:
         assert code == 1
         assert out.splitlines() == [
             "wrong.script:2:9: compile_error_name_not_found:x:",
-            "wrong.script:3:3: warning: freedrive_mode: this controller does not simulate moving the arm by hand",
+            "wrong.script:3:3: warning: path_offset_enable: this controller does not simulate path offsets",
         ]
         assert err == "tvist: 1 error in 2 programs\n"
 
     def test_warnings_alone_are_exit_code_0(self, tvist):
-        code, out, err = tvist("run", "--check", "-", stdin="freedrive_mode()\n")
+        code, out, err = tvist("run", "--check", "-", stdin="path_offset_enable()\n")
         assert (code, err) == (0, "")
         assert out.startswith("<stdin>:1:1: warning: ")
         assert tvist("run", "--check", "moves.script", "fails.script") == (0, "", "")

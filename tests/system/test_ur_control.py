@@ -113,6 +113,29 @@ def test_a_script_of_the_users_own_runs_and_control_comes_back(arm, seen):
     assert arm.moveJ(beside((5, 0.1)), 1.0, 1.5)
 
 
+def test_force_mode_pushes_into_the_air_and_back(arm, seen):
+    before = seen.getActualTCPPose()
+    for force, seconds in ((-10.0, 1.0), (10.0, 1.0)):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            arm.forceMode([0.0] * 6, [0, 0, 1, 0, 0, 0], [0, 0, force, 0, 0, 0], 2, [2, 2, 1.5, 1, 1, 1])
+        if force < 0.0:
+            assert seen.getActualTCPPose()[2] < before[2] - 0.001
+    assert arm.forceModeStop() is True
+    assert seen.getActualTCPPose()[:3] == pytest.approx(before[:3], abs=0.02)
+
+
+def test_the_arm_is_freed_and_held_again_and_contacts_are_looked_for(arm):
+    assert arm.freedriveMode([1, 1, 1, 0, 0, 0], [0.0] * 6) is True
+    assert arm.getFreedriveStatus() == 0
+    assert arm.endFreedriveMode() is True
+    assert arm.teachMode() is True
+    assert arm.endTeachMode() is True
+    assert arm.startContactDetection([0, 0, -1, 0, 0, 0]) is True
+    assert arm.stopContactDetection() is False  # nothing was touched
+    assert arm.isProgramRunning() is True
+
+
 def test_a_protective_stop_ends_a_move_and_the_next_program_moves_again(arm, seen, served):
     arm.triggerProtectiveStop()  # False: the program is suspended before it can report that it is done
     eventually(seen.isProtectiveStopped)
@@ -129,28 +152,3 @@ def test_a_protective_stop_ends_a_move_and_the_next_program_moves_again(arm, see
 def test_it_connects_from_cold(served, attempt):
     with Client("rtde_control", "RTDEControlInterface", HOST) as arm:
         assert arm.isProgramRunning()
-
-
-AT_THE_CLIENT = [
-    ("forceMode", ([0] * 6, [0, 0, 1, 0, 0, 0], [0, 0, 5, 0, 0, 0], 2, [0.1] * 6), True, False),
-    ("toolContact", ([0, 0, 1, 0, 0, 0],), 0, 0),
-    ("startContactDetection", ([0, 0, 1, 0, 0, 0],), True, False),
-    ("moveUntilContact", ([0, 0, -0.05, 0, 0, 0], [0] * 6, 0.5), False, False),
-    ("teachMode", (), False, False),
-    ("freedriveMode", ([1] * 6, [0] * 6), False, False),
-    ("ftRtdeInputEnable", (True,), False, False),
-]
-"""Methods, what they are given, and what they return the first time and later, as the page of tested clients says."""
-
-
-@pytest.mark.parametrize(
-    ("method", "given", "first", "later"), AT_THE_CLIENT, ids=[row[0] for row in AT_THE_CLIENT]
-)
-def test_what_is_not_simulated_ends_the_program_and_it_can_be_sent_again(arm, method, given, first, later):
-    """Two of the methods return before the robot has answered; the program tells the truth in all cases."""
-    assert getattr(arm, method)(*given) == first
-    eventually(lambda: not arm.isProgramRunning())
-    assert getattr(arm, method)(*given) == later
-    assert arm.reuploadScript()
-    eventually(arm.isProgramRunning)
-    assert arm.moveJ(HOME, 1.0, 1.5)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Protocol
 
 from tvist_controller.authority.rights import Authority
 from tvist_controller.commands.refusal import check_body, check_joints
+from tvist_controller.dispatch.force_commands import ForceCommands
 from tvist_controller.dispatch.guided_commands import GuidedCommands
 from tvist_controller.dispatch.lessons import Lessons
 from tvist_controller.dispatch.motion_commands import MotionCommands
@@ -70,8 +71,8 @@ class WholeRobot(ABC):
 
 
 _PARTS: tuple[type[Part], ...] = (
-    Authority, MotionCommands, GuidedCommands, Filters, DeclaredPayload, Peripherals, Faults, Lessons, ProgramCommands,
-    WholeRobot,
+    Authority, MotionCommands, GuidedCommands, ForceCommands, Filters, DeclaredPayload, Peripherals, Faults, Lessons,
+    ProgramCommands, WholeRobot,
 )  # fmt: skip
 COMMANDS: dict[type[Command], Row] = {row.message: row for part in _PARTS for row in part.rows}
 """The row of each command."""

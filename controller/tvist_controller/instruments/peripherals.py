@@ -90,7 +90,7 @@ class Peripherals:
         self.changed = True
         """True if `io` has to be published, since something in it has changed; whoever publishes it resets this."""
         self.wrench_zero: list[float] | None = None
-        """Force and torque at the tool that count as zero, base frame [N, N m]."""
+        """Force and torque that count as zero [N, N m]: at the tool in the base frame, or by a sensor at the flange."""
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
 

@@ -4,6 +4,7 @@ from math import sqrt
 
 import numpy as np
 
+from tvist_controller.instruments.force_sensor import at_tool, without_weight
 from tvist_controller.instruments.joint_lists import ACTUAL_Q, ACTUAL_QD, SHAPED, UNSHAPED
 from tvist_controller.instruments.reading import Reading
 from tvist_controller.instruments.rigid_body import add, carried, cross
@@ -76,14 +77,21 @@ class ToolValues(Reading):
 
     @computed_once
     def actual_TCP_force(self) -> Vector6D:
-        """Computed: force at the TCP that explains the measured torques, through the Jacobian [N, N m].
+        """Computed: force at the TCP by the sensor in the flange, without the declared payload's weight [N, N m].
 
-        The torque that the shaped motion needs (rigid arm with the declared payload, rotors, friction) is subtracted
-        first, and last the force that a program has taken as zero. Near a singularity part of the force cannot be
-        measured and is left out. It is zero while the arm is braked.
+        Without a sensor, it is the force that explains the measured torques, through the Jacobian. The torque that the
+        shaped motion needs (rigid arm with the declared payload, rotors, friction) is subtracted first. Near a
+        singularity part of the force cannot be measured and is left out. It is zero while the arm is braked.
+
+        In either case, the force that a program has taken as zero is subtracted last.
         """
-        force: list[float] = self._force.tolist()
-        return since_zeroed(force, self.io.tcp_force_zero)
+        raw, zero = self.state.flange_wrench, self.io.tcp_force_zero
+        if raw is None:
+            return self.wrench_calc_from_currents
+        felt = without_weight(np.array(raw), self._rotation, self.io.payload)
+        felt = felt if zero is None else felt - zero
+        sensed: list[float] = at_tool(felt, self._rotation, self.io.tcp_offset).tolist()
+        return sensed
 
     @computed_once
     def tcp_force_scalar(self) -> Double:
@@ -91,18 +99,21 @@ class ToolValues(Reading):
         x, y, z, *_ = self.actual_TCP_force
         return sqrt(x * x + y * y + z * z)
 
-    @property
+    @computed_once
     def wrench_calc_from_currents(self) -> Vector6D:
-        """Computed: the TCP force again, since it is computed from currents here [N, N m]."""
-        return self.actual_TCP_force
+        """Computed: force at the TCP that explains the measured torques; see `actual_TCP_force` [N, N m]."""
+        force: list[float] = self._force.tolist()
+        return force if self.state.flange_wrench is not None else since_zeroed(force, self.io.tcp_force_zero)
 
     @computed_once
     def ft_raw_wrench(self) -> Vector6D:
-        """Computed: wrench that a sensor between flange and payload would measure, in the flange frame [N, N m].
+        """Computed: wrench that the sensor between flange and payload measures, in the flange frame [N, N m].
 
-        It is the weight and inertial force of the declared payload, from the accelerometer and without the effect of
-        rotation, plus the TCP force.
+        Without a sensor, it is the weight and inertial force of the declared payload, from the accelerometer and
+        without the effect of rotation, plus the TCP force.
         """
+        if self.state.flange_wrench is not None:
+            return self.state.flange_wrench
         payload, force = self.io.payload, self._force
         carries = [-payload.mass * felt for felt in self.state.actual_tool_accelerometer]
         pushes: list[float] = (force[:3] @ self._rotation).tolist()

@@ -2,25 +2,40 @@
 
 from collections.abc import Callable
 
+import numpy as np
+
+from tvist_controller.instruments.force_sensor import at_tool, without_weight
+from tvist_controller.instruments.joint_lists import ACTUAL_Q, ROWS, SHAPED
 from tvist_controller.instruments.peripherals import Peripherals
+from tvist_controller.instruments.rigid_body import RigidBody
 from tvist_controller.instruments.wrench import ToolWrench, since_zeroed
+from tvist_controller.line.line_tick import QDD, TORQUE, Q
+from tvist_controller.line.sample import Sample
 from tvist_plant.description import RobotDescription
+from tvist_plant.model import Floats
 from tvist_protocol.stream import State
+from tvist_protocol.values import Payload
 
 
 class ToolForces:
-    """What the drives' torques say of the outside.
+    """What acts on the arm from outside: by the sensor in its flange if it has one, else by the drives' torques.
 
     Args:
         description: The robot.
         peripherals: The tool centre point, and the wrench that counts as zero.
         latest: Returns the state of the last tick.
+        declared: Returns the declared payload.
     """
 
     def __init__(
-        self, description: RobotDescription, peripherals: Peripherals, latest: Callable[[], State]
+        self,
+        description: RobotDescription,
+        peripherals: Peripherals,
+        latest: Callable[[], State],
+        declared: Callable[[], Payload],
     ) -> None:
         self._wrench, self._peripherals, self._latest = ToolWrench(description), peripherals, latest
+        self._rigid, self._declared = RigidBody(description), declared
 
     def torques(self) -> list[float]:
         """External torques on the joints, shape (n,) [N m]."""
@@ -28,11 +43,38 @@ class ToolForces:
 
     def wrench(self) -> list[float]:
         """External force and torque at the tool centre point, base frame [N, N m]."""
-        return since_zeroed(self._estimate()[:6], self._peripherals.wrench_zero)
+        state = self._latest()
+        if state.flange_wrench is None:
+            return since_zeroed(self._estimate()[:6], self._peripherals.wrench_zero)
+        found = self._sensed(np.array(state.flange_wrench), np.array(state.actual_q))
+        wrench: list[float] = found.tolist()
+        return wrench
 
     def zero(self) -> None:
-        """Take the present force and torque at the tool as zero."""
-        self._peripherals.zero_wrench(self._estimate()[:6])
+        """Take the present force and torque at the tool as zero; of a sensor, in its own frame."""
+        state = self._latest()
+        if state.flange_wrench is None:
+            self._peripherals.zero_wrench(self._estimate()[:6])
+            return
+        rotation = self._rigid.flange_rotation(np.array(state.actual_q))
+        felt = without_weight(np.array(state.flange_wrench), rotation, self._declared())
+        self._peripherals.zero_wrench(felt.tolist())
+
+    def felt(self, sample: Sample) -> Floats:
+        """Return the same as `wrench` for a tick whose signals are known, shape (6,), with the arm driven."""
+        measured, zero = sample.measured, self._peripherals.wrench_zero
+        if measured.wrench is not None:
+            return self._sensed(measured.wrench, measured.q)
+        motion = np.zeros((ROWS, len(measured.q)))
+        motion[SHAPED], motion[SHAPED.stop] = sample.signals[Q : QDD + 1], sample.signals[TORQUE]
+        motion[ACTUAL_Q:] = measured.q, measured.qd, measured.moment
+        found = self._wrench.estimate(motion, self._peripherals.tcp_offset)[:6]
+        return found if zero is None else found - zero
+
+    def _sensed(self, raw: Floats, q: Floats) -> Floats:
+        rotation, zero = self._rigid.flange_rotation(q), self._peripherals.wrench_zero
+        felt = without_weight(raw, rotation, self._declared())
+        return at_tool(felt if zero is None else felt - zero, rotation, self._peripherals.tcp_offset)
 
     def _estimate(self) -> list[float]:
         found: list[float] = self._wrench.of(self._latest(), self._peripherals.tcp_offset).tolist()

@@ -10,7 +10,7 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import GENTLEST_STOP, GuidedTorqueRoom, arm_limits
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.trajectory import Guided, JointSpeed, MotionLimits, Servo, ToolSpeed
+from tvist_controller.trajectory import Compliant, Guided, JointSpeed, MotionLimits, Servo, ToolSpeed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.transitions import Activity
 
@@ -28,10 +28,15 @@ class Guidance:
     """
 
     def __init__(self, motion: MotionControl) -> None:
-        self._motion, self._cycle = motion, motion.cycle
-        self._limits = arm_limits(motion.cycle.description)
-        self._reach = np.array(motion.cycle.description.limits.position)
-        self._torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.line.dynamics)
+        self.motion = motion
+        """The robot's motion."""
+        self._cycle = motion.cycle
+        self.limits = arm_limits(motion.cycle.description)
+        """Limits of every joint."""
+        self.reach = np.array(motion.cycle.description.limits.position)
+        """Largest position of each joint in either direction, shape (n,) [rad]."""
+        self.torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.line.dynamics)
+        """Motion that the torque permits."""
         self._tcp, self._kinematics = motion.tcp, ToolKinematics(motion.cycle.description)
         self._kinematics.rehearse(PERIOD)
 
@@ -41,12 +46,12 @@ class Guidance:
         Raises:
             RefusalError: The present activity does not allow it, or its motion cannot be taken over.
         """
-        self._check("servo_j", shaped)
+        self.check("servo_j", shaped=shaped)
         servo = self._present(Servo, shaped)
         if servo is None:
-            servo = Servo(self._start(shaped), self._most(shaped), self._reach, self._torque, PERIOD)
+            servo = Servo(self._start(shaped), self._most(shaped), self.reach, self.torque, PERIOD)
         servo.aim(q, lookahead, gain)
-        return self._follow("servo_j", servo, shaped)
+        return self.follow("servo_j", servo, shaped=shaped)
 
     def move_joints(self, qd: Floats, acceleration: float, *, shaped: bool) -> int:
         """Approach velocities of the joints, see `JointSpeed`; return the motion's number.
@@ -54,15 +59,15 @@ class Guidance:
         Raises:
             RefusalError: See `servo`.
         """
-        self._check("speed_j", shaped)
+        self.check("speed_j", shaped=shaped)
         speed, most = self._present(JointSpeed, shaped), self._most(shaped)
         if speed is None:
-            rate = self._motion.motions.speed
-            speed = JointSpeed(self._start(shaped), most, self._torque, PERIOD, rate=rate)
+            rate = self.motion.motions.speed
+            speed = JointSpeed(self._start(shaped), most, self.torque, PERIOD, rate=rate)
         if shaped:
             qd = qd * min(1.0, most.velocity / max(float(np.abs(qd).max()), most.velocity))
         speed.aim(qd, acceleration)
-        return self._follow("speed_j", speed, shaped)
+        return self.follow("speed_j", speed, shaped=shaped)
 
     def move_tool(
         self, twist: Floats, acceleration: float, angular_acceleration: float, *, shaped: bool
@@ -72,13 +77,13 @@ class Guidance:
         Raises:
             RefusalError: See `servo`.
         """
-        self._check("speed_l", shaped)
-        speed, tool = self._present(ToolSpeed, shaped), self._tool
+        self.check("speed_l", shaped=shaped)
+        speed, tool = self._present(ToolSpeed, shaped), self.tool
         if speed is None or speed.kinematics is not tool:
-            rate = self._motion.motions.speed
-            speed = ToolSpeed(self._start(shaped), self._most(shaped), tool, self._torque, PERIOD, rate=rate)
+            rate = self.motion.motions.speed
+            speed = ToolSpeed(self._start(shaped), self._most(shaped), tool, self.torque, PERIOD, rate=rate)
         speed.aim(twist, acceleration, angular_acceleration)
-        return self._follow("speed_l", speed, shaped)
+        return self.follow("speed_l", speed, shaped=shaped)
 
     def stop_joints(self, acceleration: float | None, trigger: str = "stop_j") -> None:
         """Come to rest with a deceleration of the joints; a guided motion with all of them in phase.
@@ -87,13 +92,13 @@ class Guidance:
             acceleration: Deceleration of the fastest joint [rad/s^2]; None for what the torque permits.
             trigger: Trigger of the table of transitions.
         """
-        motion = self._motion
+        motion = self.motion
         if motion.activity is not Activity.GUIDED or acceleration is None:
             motion.end(trigger, f"{trigger} was commanded", deceleration=acceleration)
             return
-        acceleration = min(max(acceleration, GENTLEST_STOP), self._limits.acceleration)
-        state = self._start(shaped=False)
-        stop = JointSpeed(state, self._limits, self._torque, PERIOD)
+        acceleration = min(max(acceleration, GENTLEST_STOP), self.limits.acceleration)
+        state = self.state
+        stop = JointSpeed(state, self.limits, self.torque, PERIOD)
         stop.aim(np.zeros_like(state[0]), acceleration)
         stop.acceleration = acceleration
         self._halt(trigger, stop, stop.duration)
@@ -108,65 +113,115 @@ class Guidance:
             angular_acceleration: Angular deceleration [rad/s^2].
         """
         cycle = self._cycle
-        state, present, tool = cycle.line.shaped.newest, cycle.trajectory, self._tool
+        state, present, tool = cycle.line.shaped.newest, cycle.trajectory, self.tool
         fastest, twist = float(np.abs(state.qd).max()), tool.jacobian(state.q) @ state.qd
         duration = max(
             float(np.linalg.norm(twist[:3])) / acceleration,
             float(np.linalg.norm(twist[3:])) / angular_acceleration,
         )
-        straight = self._motion.activity is Activity.GUIDED and isinstance(present, ToolSpeed)
+        straight = self.motion.activity is Activity.GUIDED and isinstance(present, ToolSpeed)
         if not straight or duration == 0.0:
             self.stop_joints(fastest / duration if duration > 0.0 else None, "stop_l")
             return
         harder = max(duration * GENTLEST_STOP / fastest, 1.0)
-        stop = ToolSpeed(self._start(shaped=False), self._limits, tool, self._torque, PERIOD)
+        stop = ToolSpeed(self._start(shaped=False), self.limits, tool, self.torque, PERIOD)
         stop.aim(np.zeros(6), harder * acceleration, harder * angular_acceleration)
         stop.acceleration = harder * fastest / duration
         self._halt("stop_l", stop, stop.duration)
 
     @property
-    def _tool(self) -> ToolKinematics:
+    def tool(self) -> ToolKinematics:
         """Kinematics of the present tool centre point."""
-        if self._motion.tcp != self._tcp:
-            self._tcp = self._motion.tcp
+        if self.motion.tcp != self._tcp:
+            self._tcp = self.motion.tcp
             self._kinematics = self._kinematics.with_tool(self._tcp)
         return self._kinematics
 
     def _most(self, shaped: bool) -> MotionLimits:
         """Limits of a reference."""
-        return self._cycle.line.filter.spared(self._limits) if shaped else self._limits
+        return self._cycle.line.filter.spared(self.limits) if shaped else self.limits
 
-    def _check(self, trigger: str, shaped: bool) -> None:
+    def check(self, trigger: str, *, shaped: bool = False) -> None:
         """Refuse a command that the present activity does not allow."""
-        self._motion.check(trigger)
-        if shaped and self._motion.activity is not Activity.REST and not self._continues(shaped):
+        self.motion.check(trigger)
+        if shaped and self.motion.activity is not Activity.REST and not self._continues(shaped):
             why = "shaped is true; it must be false, since this motion does not begin at rest"
             raise RefusalError("busy", "shaped", why)
 
     def _continues(self, shaped: bool) -> bool:
         """Return whether a command continues the reference of the one before."""
-        return self._motion.activity is Activity.GUIDED and shaped == self._cycle.mode.shaped
+        return self.motion.activity is Activity.GUIDED and shaped == self._cycle.mode.shaped
 
     def _present(self, kind: type[G], shaped: bool) -> G | None:
         """Return the present trajectory, if it is of this kind and continues."""
-        present = self._cycle.trajectory
+        present = self.guided
         return present if self._continues(shaped) and isinstance(present, kind) else None
+
+    @property
+    def compliant(self) -> Compliant | None:
+        """The present motion that gives way to forces; None without one."""
+        present = self._cycle.trajectory
+        guided = self.motion.activity is Activity.GUIDED
+        return present if guided and isinstance(present, Compliant) else None
+
+    @property
+    def guided(self) -> Guided | None:
+        """The present guided motion, which is the inner one of a motion that gives way; None if none can go on."""
+        lead, present = self.compliant, self._cycle.trajectory
+        found = present if lead is None else lead.inner
+        return (
+            found if self._continues(shaped=self._cycle.mode.shaped) and isinstance(found, Guided) else None
+        )
+
+    @property
+    def reference(self) -> Floats:
+        """Position from which the next motion leads on, shape (n,) [rad]: that without what gave way to forces."""
+        return self._cycle.sample.reference if self.compliant is None else self.compliant.nominal
+
+    @property
+    def resting(self) -> bool:
+        """Whether nothing moves, but for what gives way to forces."""
+        lead = self.compliant
+        return not self.motion.activity.moving if lead is None else lead.inner.finished
+
+    @property
+    def state(self) -> tuple[Floats, Floats, Floats]:
+        """Position, velocity and acceleration of the present reference, from which one that is not shaped begins."""
+        return self._start(shaped=False) if self.compliant is None else self.compliant.state
+
+    def stand(self, deceleration: float) -> None:
+        """Come to rest in the axes that do not give way to forces [rad/s^2]."""
+        lead = self.compliant
+        if lead is None or lead.inner.finished:
+            return
+        stop = JointSpeed(self._start(shaped=False), self.limits, self.torque, PERIOD)
+        stop.aim(np.zeros(len(self.reach)), deceleration)
+        lead.take(stop)
 
     def _start(self, shaped: bool) -> tuple[Floats, Floats, Floats]:
         """Position, velocity and acceleration from which a trajectory begins."""
-        cycle, present = self._cycle, self._cycle.trajectory
-        if self._continues(shaped) and isinstance(present, Guided):
+        cycle, lead = self._cycle, self.compliant
+        if self._continues(shaped) and (present := self.guided) is not None:
             return present.state
+        if lead is not None:  # its inner reference stands
+            return lead.nominal, np.zeros_like(lead.nominal), np.zeros_like(lead.nominal)
         if cycle.mode.at_rest:
             q = cycle.sample.reference if shaped else cycle.line.shaped.position
             return q, np.zeros_like(q), np.zeros_like(q)
         newest = cycle.line.shaped.newest
         return newest.q, newest.qd, newest.qdd
 
-    def _follow(self, trigger: str, trajectory: Guided, shaped: bool) -> int:
-        """Carry out the transition; return the motion's number."""
-        motion, cycle = self._motion, self._cycle
-        guard = None
+    def follow(self, trigger: str, trajectory: Guided, *, shaped: bool = False) -> int:
+        """Carry out the transition, or let a motion that gives way go on with another one in its other axes.
+
+        Returns:
+            The motion's number.
+        """
+        motion, cycle, guard, lead = self.motion, self._cycle, None, self.compliant
+        if lead is not None and trajectory is not lead:
+            lead.take(trajectory)
+            motion.go(trigger)
+            return motion.motions.guide(lead)
         if motion.activity is not Activity.GUIDED:
             guard = motion.ahead.guard_of_guided()
             motion.motions.stopped(f"{trigger} took over", None)
@@ -181,7 +236,7 @@ class Guidance:
 
     def _halt(self, trigger: str, stop: Guided, duration: float) -> None:
         """End the guided motion by a trajectory that comes to rest in some time [s]."""
-        motion, fastest = self._motion, float(np.abs(stop.state[1]).max())
+        motion, fastest = self.motion, float(np.abs(stop.state[1]).max())
         self._cycle.begin(stop, LineMode.BYPASSED)
         motion.go(trigger)
         why, way = f"{trigger} was commanded", 0.5 * duration * fastest

@@ -8,6 +8,7 @@ from tvist_controller.commands.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.plans import Plans
@@ -39,6 +40,8 @@ class Access:
     """Terminals, registers and settings, as published."""
     declared: Callable[[], Payload]
     """Declared payload."""
+    force: ForceControl
+    """Force mode, freedrive and contacts."""
     forces: ToolForces
     """Forces and torques on the arm in the last tick."""
     shape_guided: bool = False

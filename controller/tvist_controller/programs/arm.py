@@ -15,6 +15,7 @@ from tvist_urscript import Fault
 
 BRAKING = 2.0
 """Deceleration of the fastest joint where a move follows a motion that has not ended [rad/s^2]."""
+STREAMED = "a client streams set-points to the arm, so the program cannot move it"
 TAKEN = "another thread is controlling the robot: only one thread of a program can move it at a time"
 
 
@@ -141,7 +142,7 @@ class ProgramArm:
         """Stop what still moves. In a protective stop of this tick the program is paused here."""
         motion = self._motion
         if motion.activity is Activity.STREAMING:
-            raise Fault("a client streams set-points to the arm, so the program cannot move it")
+            raise Fault(STREAMED)
         if motion.activity in {Activity.GUIDED, Activity.MOVING, Activity.PAUSED}:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
         while motion.activity.moving or motion.activity.protective or self._allowance.waits:
@@ -171,6 +172,39 @@ class ProgramArm:
         """Whether a guided motion has to wait: for a stop under way, or in a protective stop of this tick."""
         activity = self._motion.activity
         return (activity.moving or activity.protective) and after(activity, "speed_j") is None
+
+    def give_way(self, start: Callable[[], int]) -> Turns:
+        """Let the arm give way to forces, or change how it does, beside what else moves it.
+
+        Args:
+            start: Begins it; returns its number.
+
+        Raises:
+            Fault: A client streams set-points to the arm, or it is not possible.
+        """
+        yield from self.finish()
+        motion = self._motion
+        while (
+            motion.activity.moving and after(motion.activity, "force_mode") is None
+        ) or self._allowance.waits:
+            if motion.activity is Activity.STREAMING:
+                raise Fault(STREAMED)
+            yield
+        if motion.activity.protective:
+            return
+        self._own = True
+        try:
+            self._guided = start()
+        except RefusalError as refusal:
+            raise Fault(refusal.reply.why) from refusal
+        finally:
+            self._own = False
+
+    def hold_again(self, *, by_hand: bool) -> None:
+        """End what `give_way` has begun: freedrive, or else force mode."""
+        force = self._access.force
+        if force.compliant is not None and force.by_hand == by_hand:
+            self.brake(force.end, wholly=True)
 
     def steer(self, start: Callable[[bool], int | None]) -> None:
         """Begin or change a guided motion within a call of `guide`; see there. In a protective stop nothing happens."""
@@ -212,7 +246,7 @@ class ProgramArm:
         with self._moving():
             self.brake(stop)
             yield
-            while self._motion.activity.moving:
+            while not self._access.guidance.resting:
                 yield
 
     def abort(self) -> None:
@@ -225,16 +259,27 @@ class ProgramArm:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
             journey.outcome = "motion_done"
 
-    def brake(self, stop: Callable[[], None]) -> None:
-        """Begin a stop of what moves, which is the program's own will."""
+    def brake(self, stop: Callable[[], None], *, wholly: bool = False) -> None:
+        """Begin a stop of what moves, which is the program's own will.
+
+        Args:
+            stop: Stops everything.
+            wholly: Whether also what gives way to forces ends, which otherwise goes on.
+        """
+        guidance = self._access.guidance
         if self._motion.activity.moving:
             self._allowance.owe()
         self._own = True  # so that `hear` does not take this stop for one that ends the program
         try:
-            stop()
+            if wholly or guidance.compliant is None:
+                stop()
+            else:
+                guidance.stand(BRAKING)
         finally:
             self._own = self._abandoned = False
-            self._guided = self._driver = None
+            self._driver = None
+            if guidance.compliant is None:
+                self._guided = None
             if self._journey is not None:
                 self._journey.number = None
 

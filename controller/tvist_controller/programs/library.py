@@ -6,6 +6,7 @@ from typing import Any
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.functions.force import ForceFunctions
 from tvist_controller.programs.functions.gripper import GripperFunctions
 from tvist_controller.programs.functions.messages import MessageFunctions
 from tvist_controller.programs.functions.motions import MotionFunctions
@@ -18,7 +19,7 @@ from tvist_controller.programs.functions.sockets import SocketFunctions
 from tvist_controller.programs.functions.state import StateFunctions
 from tvist_controller.programs.functions.statements import StatementFunctions
 from tvist_controller.programs.functions.terminals import TerminalFunctions
-from tvist_controller.programs.functions.unsimulated import MISSING, SUBJECTS, IdleFunctions
+from tvist_controller.programs.functions.unsimulated import MISSING, SUBJECTS
 from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.programs.popups import Popups
@@ -29,6 +30,7 @@ from tvist_urscript import Signature, Signatures, names, signatures
 
 FAMILIES: Mapping[type, str] = {
     MotionFunctions: "Motions",
+    ForceFunctions: "Force",
     PoseFunctions: "Kinematics and dynamics",
     StateFunctions: "State",
     SettingFunctions: "Settings",
@@ -43,7 +45,12 @@ FAMILIES: Mapping[type, str] = {
 }
 """What the functions of each class are about, in the order of the documentation."""
 
-MOVING = frozenset(names(MotionFunctions)) | {"interpreter_mode"}
+MOVING = frozenset(names(MotionFunctions)) | {
+    "interpreter_mode",
+    "force_mode",
+    "freedrive_mode",
+    "teach_mode",
+}
 """Functions that move the arm, or let clients do so."""
 
 
@@ -53,7 +60,6 @@ def known_signatures() -> Signatures:
     return {
         **{name: one for family in FAMILIES for name, one in signatures(family).items()},
         **{name: Signature(given) for name, (given, _) in SUBJECTS.items()},
-        **signatures(IdleFunctions),
     }
 
 
@@ -81,6 +87,6 @@ def functions(
         StatementFunctions(arm, queue),
         SafetyFunctions(access, arm, watchdogs),
         GripperFunctions(access, arm),
-        IdleFunctions(),
+        ForceFunctions(access, arm),
     )
     return MISSING | {name: getattr(family, name) for family in families for name in names(type(family))}

@@ -319,7 +319,7 @@ class ProgramPlayer:
         if self._motion.activity is Activity.MOVING and self.arm.moves:
             self._motion.pause()
         elif self._motion.activity is Activity.GUIDED and self.arm.guides:
-            self.arm.brake(lambda: self._motion.stop(None, "the program was paused"))
+            self.arm.brake(lambda: self._motion.stop(None, "the program was paused"), wholly=True)
         self._wait()
 
     def _wait(self, *, failed: bool = False) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from inspect import getdoc
 
-from tvist_controller.programs.functions.unsimulated import SUBJECTS, IdleFunctions
+from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import FAMILIES, known_signatures
 from tvist_urscript import METHOD, REQUIRED, Signature, signatures
 
@@ -47,10 +47,9 @@ def page() -> str:
         for name, (_, what) in sorted(SUBJECTS.items(), key=lambda row: (row[1][1], row[0]))
         if name != METHOD
     ]
-    idle = ", ".join(f"`{name}`" for name in signatures(IdleFunctions))
     parts.append(
-        "## Not simulated\n\nThese, and methods such as `handle.call()`, end the program with an error that says so. "
-        f"{idle} succeed, since what they set or end is never going on.\n\n{_table(('function', 'subject'), missing)}\n"
+        "## Not simulated\n\nThese, and methods such as `handle.call()`, end the program with an error that says so."
+        f"\n\n{_table(('function', 'subject'), missing)}\n"
     )
     return "\n".join(parts)
 

@@ -117,6 +117,7 @@ def write_state(
     f_d: Floats,
     zeta: Floats,
     motors: Floats,
+    wrench: Floats,
 ) -> None:
     """Write a state.
 
@@ -142,6 +143,7 @@ def write_state(
         f_d: Damped frequencies, shape (modes,) [Hz].
         zeta: Damping ratios, shape (modes,) [-].
         motors: Velocities, accelerations and torques of the motors, if there are any, shape (3, n) or (0, n).
+        wrench: Force and torque by the sensor in the flange, if there is one, shape (6,) or (0,).
     """
     numbers = np.empty(places.shape[0])
     numbers[0] = tick * period
@@ -153,7 +155,9 @@ def write_state(
         rates = numbers[end + unshaped : end + 3 * unshaped].reshape(2, unshaped)
         differentiate(before, middle, last, period, rates)
         end += 3 * unshaped
-    append(numbers, end, motors)
+    end = append(numbers, end, motors)
+    for j in range(wrench.shape[0]):
+        numbers[end + j] = wrench[j]
     bits = numbers.view(np.uint64)
     for i in range(places.shape[0]):
         at = places[i]

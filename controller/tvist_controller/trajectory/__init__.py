@@ -1,8 +1,10 @@
 """Sources of references: planned motions along paths, streams of set-points, stops."""
 
 from tvist_controller.trajectory.base import Forecast, Rest, Trajectory
+from tvist_controller.trajectory.compliant import Compliant
 from tvist_controller.trajectory.curve import Bends, Curve
 from tvist_controller.trajectory.double_s import DoubleS
+from tvist_controller.trajectory.force_law import ForceTask
 from tvist_controller.trajectory.guided import Guided, StuckError
 from tvist_controller.trajectory.joint_speed import JointSpeed
 from tvist_controller.trajectory.known import Known
@@ -22,8 +24,10 @@ AnyStop = JointStop | PathStop | SlowedStop
 __all__ = [
     "AnyStop",
     "Bends",
+    "Compliant",
     "Curve",
     "DoubleS",
+    "ForceTask",
     "Forecast",
     "Guided",
     "JointLine",

@@ -12,9 +12,10 @@ from tvist_controller.programs.arguments import integer, is_pose, number, number
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.journey import Turns
 from tvist_controller.programs.kinematics import ProgramKinematics
+from tvist_controller.programs.led_moves import TURN, LedMoves, approach
 from tvist_controller.trajectory import Guided, JointSpeed, ToolSpeed
 from tvist_plant.plant import PERIOD
-from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
+from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, Segment
 from tvist_protocol.transitions import Activity
 from tvist_urscript import Array, Fault, costs
 
@@ -23,8 +24,6 @@ LONGEST: Final = 3600.0
 """Longest duration of a move [s]."""
 CLOSE: Final = 1e-3
 """Distance at which `servoc` has arrived [m, and rad times `TURN`]."""
-TURN: Final = 0.25
-"""Length that a turn of 1 rad counts as [m]."""
 
 
 class MotionFunctions:
@@ -38,6 +37,7 @@ class MotionFunctions:
 
     def __init__(self, access: Access, arm: ProgramArm, kinematics: ProgramKinematics) -> None:
         self._access, self._arm, self._kinematics = access, arm, kinematics
+        self._led = LedMoves(access, arm, kinematics)
         limits = access.description.limits
         self._velocity, self._acceleration = min(limits.velocity), min(limits.acceleration)
 
@@ -57,7 +57,7 @@ class MotionFunctions:
             duration=_duration(t),
             blend=number("r", r, 0.0, MAX_BLEND),
         )
-        yield from self._arm.follow(segment)
+        yield from self._follow(segment)
 
     @costs(60)
     def movel(self, pose: object, a: object = 1.2, v: object = 0.25, t: object = 0, r: object = 0) -> Turns:
@@ -69,7 +69,7 @@ class MotionFunctions:
             duration=_duration(t),
             blend=number("r", r, 0.0, MAX_BLEND),
         )
-        yield from self._arm.follow(segment)
+        yield from self._follow(segment)
 
     @costs(60)
     def movep(self, pose: object, a: object = 1.2, v: object = 0.25, r: object = 0) -> Turns:
@@ -80,7 +80,7 @@ class MotionFunctions:
             acceleration=_tool("a", a, "acceleration"),
             blend=number("r", r, 0.0, MAX_BLEND),
         )
-        yield from self._arm.follow(segment)
+        yield from self._follow(segment)
 
     @costs(100)
     def movec(
@@ -101,7 +101,7 @@ class MotionFunctions:
             acceleration=_tool("a", a, "acceleration"),
             blend=number("r", r, 0.0, MAX_BLEND),
         )
-        yield from self._arm.follow(segment)
+        yield from self._follow(segment)
 
     @costs(180)
     def optimovej(self, goal: object, a: object = 0.3, v: object = 0.3, r: object = 0) -> Turns:
@@ -114,6 +114,10 @@ class MotionFunctions:
         """Move the tool on a line with shares of the largest acceleration and speed, which the joints limit further."""
         acceleration, velocity = _share("a", a), _share("v", v)
         yield from self.movel(goal, acceleration * MAX_TOOL[1], velocity * MAX_TOOL[0], 0, r)
+
+    def _follow(self, segment: Segment) -> Turns:
+        moves = self._arm if self._access.force.compliant is None else self._led
+        yield from moves.follow(segment)
 
     # ------------------------------------------------------------------ guided motions
 
@@ -153,8 +157,7 @@ class MotionFunctions:
         def course() -> tuple[Floats, float]:
             away = self._kinematics.difference(self._kinematics.tool_pose(self._reference), goal)
             far = max(float(np.linalg.norm(away[:3])), TURN * float(np.linalg.norm(away[3:])))
-            speed = min(velocity, max(2.0 * acceleration * far, 0.0) ** 0.5, far / (4.0 * PERIOD))
-            return away * (speed / far if far > 0.0 else 0.0), far
+            return approach(away, far, velocity, acceleration), far
 
         def start(shaped: bool) -> int:
             return guidance.move_tool(course()[0], acceleration, angular, shaped=shaped)
@@ -212,7 +215,7 @@ class MotionFunctions:
 
     @property
     def _reference(self) -> Floats:
-        return self._access.motion.cycle.sample.reference
+        return self._access.guidance.reference
 
     @property
     def _here(self) -> list[float]:
@@ -233,8 +236,7 @@ class MotionFunctions:
 
     @property
     def _guided(self) -> Guided | None:
-        trajectory = self._access.motion.cycle.trajectory
-        return trajectory if isinstance(trajectory, Guided) else None
+        return self._access.guidance.guided
 
     def _posture(self, name: str, value: object) -> tuple[float, ...]:
         """Joint positions within their range, from these or from a pose."""

@@ -68,7 +68,7 @@ class SetupFunctions:
         """Let no input move the arm to freedrive, which none does."""
 
     def set_standard_digital_input_action(self, port: object, action: object) -> None:
-        """Check what an input does: "default", or "freedrive", of which a warning says that it is not simulated."""
+        """Check what an input does: "default", or "freedrive", of which a warning says that it has no effect."""
         self._act(f"standard digital input {integer('port', port, 0, len(STANDARD) - 1)}", action)
 
     def set_configurable_digital_input_action(self, port: object, action: object) -> None:
@@ -156,7 +156,7 @@ class SetupFunctions:
             raise Fault(f'action is {shown(action)}: it must be "default" or "freedrive"')
         if action == "freedrive":
             self._warn(
-                f"{what} has the action freedrive: this controller does not simulate moving the arm by hand"
+                f"{what} has the action freedrive: here freedrive_mode lets the arm be moved by hand, and no input"
             )
 
     def _choose(self, group: Group, place: int, state: object) -> None:

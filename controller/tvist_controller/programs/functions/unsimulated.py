@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-from tvist_controller.programs.arguments import number
 from tvist_urscript import METHOD, Fault, Parameter, parameters
 
 _LIGHT, _CONVEYORS, _OFFSETS, _MODBUS = "the light of the base", "conveyor tracking", "path offsets", "Modbus"
@@ -15,18 +14,6 @@ _TEMPERATURES, _LIMITS = "temperatures in programs", "limits of the force at the
 _SIGNAL = parameters("signal_name")
 
 SUBJECTS: dict[str, tuple[tuple[Parameter, ...], str]] = {
-    "force_mode": (parameters("task_frame", "selection_vector", "wrench", "type", "limits"), "force control"),
-    "freedrive_mode": (parameters(freeAxes=None, feature=None), "moving the arm by hand"),
-    "teach_mode": (parameters(), "moving the arm by hand"),
-    "tool_contact": (parameters(direction=None), "detecting contacts"),
-    "enable_external_ft_sensor": (
-        parameters("enable", sensor_mass=0, sensor_measuring_offset=None, sensor_cog=None),
-        "an external force sensor",
-    ),
-    "ft_rtde_input_enable": (
-        parameters("enable", sensor_mass=0, sensor_measuring_offset=None, sensor_cog=None),
-        "an external force sensor",
-    ),
     "direct_torque": (
         parameters("torque", friction_comp=True, viscous_scale=None, coulomb_scale=None),
         "torque control",
@@ -142,28 +129,3 @@ def _missing(name: str, subject: str) -> Callable[..., None]:
 
 MISSING = {name: _missing(name, subject) for name, (_, subject) in SUBJECTS.items()} | {METHOD: _method}
 """Functions that end their program with an error, which says what is not simulated."""
-
-
-class IdleFunctions:
-    """Functions that only set or end what is not simulated: they succeed, since nothing of that kind is going on."""
-
-    def end_force_mode(self) -> None:
-        """Do nothing, since there is no force mode to end."""
-
-    def end_freedrive_mode(self) -> None:
-        """Do nothing, since nobody moves the arm by hand."""
-
-    def end_teach_mode(self) -> None:
-        """Do nothing, since nobody moves the arm by hand."""
-
-    def get_freedrive_status(self) -> int:
-        """Return 0: the arm is not moved by hand."""
-        return 0
-
-    def force_mode_set_damping(self, damping: object) -> None:
-        """Check a setting that only matters in force mode, which says that it is not simulated."""
-        number("damping", damping, 0.0, 1.0)
-
-    def force_mode_set_gain_scaling(self, scaling: object) -> None:
-        """Check a setting that only matters in force mode, which says that it is not simulated."""
-        number("scaling", scaling, 0.0, 2.0)

@@ -30,7 +30,7 @@ NAMED: dict[str, tuple[Wire, str]] = {
     "standard_analog_output_1": (Wire.DOUBLE, "Value of analogue output 1 as a share of its range, 0 to 1."),
     "external_force_torque": (
         Wire.VECTOR6D,
-        "Ignored, as on a UR robot without ft_rtde_input_enable.",
+        "What a force sensor of one's own measures [N, N m]; used once a program has called ft_rtde_input_enable.",
     ),
 }
 """Type and description of each input variable that is no register."""

@@ -5,6 +5,7 @@ from math import isclose
 
 from tvist_controller.instruments.peripherals import analog_share
 from tvist_protocol.commands import Command, SetSpeed
+from tvist_protocol.forces import SetExternalWrench
 from tvist_protocol.io import Bank, Io, Registers, SetIo, SetRegisters
 from tvist_protocol.replies import Refused, Reply
 from tvist_server.gateways.ur.base import ControllerAccess
@@ -38,7 +39,7 @@ class InputWriter:
         self._complain = complain
         self._ledger = robot.inputs.ledger
         self._held: dict[str, Value] = {}
-        self._told_of_force = False
+        self._wrench: Value | None = None
 
     def write(self, values: dict[str, Value]) -> None:
         """Set the variables of one package; values that are not finite are refused one by one."""
@@ -53,11 +54,11 @@ class InputWriter:
             self._set_registers(registers)
         if len(registers) == len(values):
             return
-        if "external_force_torque" in values and not self._told_of_force:
-            self._told_of_force = True
-            self._complain(
-                "external_force_torque is ignored: it needs ft_rtde_input_enable, which this robot does not have"
-            )
+        wrench = values.get("external_force_torque")
+        if isinstance(wrench, tuple) and wrench != self._wrench:
+            self._wrench = wrench
+            a, b, c, d, e, f = (float(number) for number in wrench)
+            self._control.ask(SetExternalWrench(wrench=(a, b, c, d, e, f)), self._answer_of({}))
         if "speed_slider_mask" in values or "speed_slider_fraction" in values:
             self._set_speed()
         if any("_output" in name for name in values):

@@ -1,0 +1,236 @@
+"""A reference that gives way to forces at the tool, while another one moves it in the other directions."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from tvist_controller.trajectory.base import Rest
+from tvist_controller.trajectory.force_law import ForceTask, compliant_velocity
+from tvist_controller.trajectory.guided import Guided, StuckError
+from tvist_controller.trajectory.limiter import Limiter, TorqueRoom
+from tvist_controller.trajectory.limits import Floats, MotionLimits
+
+NEWTON = 3
+"""Newton steps from the tool's pose to the joints' angles; two suffice for what the tool moves in a tick."""
+ACCURATE = 1e-10
+"""Error of the tool's pose at which they end [m or rad]."""
+OFF = 1e-5
+"""Error of the tool's pose in a direction that does not give way above which the motion cannot go on [m or rad]."""
+FASTEST = 0.5
+"""Share of the joints' velocity that giving way may use up [-]."""
+CRAWL = 0.05
+"""Share of it below which giving way counts as hindered by a singular posture [-]."""
+
+
+class Pose(Protocol):
+    """Kinematics of the tool centre point, in the base frame."""
+
+    def pose(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return its rotation matrix, shape (3, 3), and its position, shape (3,) [m]."""
+
+    def inverse(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return the Jacobian, and its pseudo-inverse without the directions that are lost, shape (n, 6)."""
+
+
+Frame = Callable[[tuple[Floats, Floats], Floats], Floats]
+"""Axes of the task as columns in the base frame, shape (3, 3), from the tool's pose and its velocity, shape (3,)."""
+Turn = Callable[[Floats, Floats], Floats]
+"""Rotation vector from one rotation matrix to another, see `turn`."""
+
+
+class Compliant(Guided):
+    """Moves the tool by the law of force control in compliant axes, and as another reference does in all others.
+
+    The pose P that is followed is integrated from twists: in the axes of the task, the law's velocity where these are
+    compliant, and the velocity of the inner reference's tool elsewhere. The joints follow P by Newton's method through
+    a `Limiter`. Whatever giving way is kept from, by the joints' limits or near a singular posture, is dropped from P,
+    so that nothing is caught up with later.
+
+    Args:
+        state: Position [rad], velocity [rad/s] and acceleration [rad/s^2] to continue from, each of shape (n,).
+        limits: Limits of every joint.
+        reach: Largest position of each joint in either direction, shape (n,) [rad].
+        torque: Motion that the torque permits.
+        period: Tick [s].
+        kinematics: Kinematics of the tool centre point.
+        inner: The reference that moves the tool otherwise, which continues from the same state.
+        felt: Returns force and torque on the tool centre point in the last tick, base frame, shape (6,) [N, N m].
+        turn: Rotation vector from one rotation matrix to another.
+        turned: Turns a rotation matrix by a rotation vector.
+    """
+
+    def __init__(
+        self,
+        state: tuple[Floats, Floats, Floats],
+        limits: MotionLimits,
+        reach: Floats,
+        torque: TorqueRoom,
+        period: float,
+        *,
+        kinematics: Pose,
+        inner: Guided | Rest,
+        felt: Callable[[], Floats],
+        turn: Turn,
+        turned: Turn,
+    ) -> None:
+        self._arm, self._torque, self._period, self._reach = limits, torque, period, reach
+        self.adopt(limits)
+        self.kinematics, self.inner = kinematics, inner
+        """Kinematics of the tool centre point; the reference that moves the tool otherwise."""
+        self._felt, self._turn, self._turned = felt, turn, turned
+        self.rate = 1.0
+        self._speed: tuple[float, float | None] = (1.0, None)
+        q, qd, _ = state
+        self._limiter = Limiter(q, self.limits, period, reach=reach, torque=torque, state=state)
+        self._pose = kinematics.pose(q)
+        self._twist = kinematics.inverse(q)[0] @ qd
+        self._nominal = kinematics.pose(inner_q(inner))
+        self._moved = self._twist.copy()
+        """Velocity of the inner reference's tool [m/s, rad/s]."""
+        self._task: ForceTask | None = None
+        self._frame: Frame = lambda _pose, _velocity: np.eye(3)
+        self._given = np.zeros(6)
+        """Velocity by the law in the base frame, beside that of the inner reference in axes that are not compliant."""
+        self.axes = np.eye(3)
+        """Axes of the task, as columns in the base frame, shape (3, 3)."""
+        self.hindered = 1.0
+        """Share of the law's velocity that a singular posture permits, of the last tick [-]."""
+
+    def aim(self, task: ForceTask, frame: Frame) -> None:
+        """Control the force by another task from now on; the velocity stays and changes by the law."""
+        self._frame = frame
+        self.axes = axes = frame(self._pose, self._twist[:3])
+        before = np.zeros(6) if self._task is None else self._task.compliant
+        joined = (task.compliant - before) * _into(axes, self._moved)
+        self._given, self._task = self._given + _out(axes, joined), task
+
+    @property
+    def task(self) -> ForceTask:
+        """What is to be reached."""
+        assert self._task is not None, "it is aimed before it moves"
+        return self._task
+
+    @property
+    def state(self) -> tuple[Floats, Floats, Floats]:
+        """Position, velocity and acceleration of the reference, each of shape (n,)."""
+        return self._limiter.state
+
+    @property
+    def finished(self) -> bool:
+        """Never: it gives way until a command ends it."""
+        return False
+
+    @property
+    def nominal(self) -> Floats:
+        """Position of the joints by the inner reference, shape (n,) [rad]."""
+        return inner_q(self.inner)
+
+    def take(self, inner: Guided | Rest) -> None:
+        """Move the tool by another reference, which continues from where the present one is."""
+        self.inner = inner
+        if isinstance(inner, Guided):
+            inner.pace(*self._speed)
+
+    def adopt(self, limits: MotionLimits) -> None:
+        """See `Guided.adopt`; as the speeds of joints, it changes its acceleration within a tick."""
+        self._arm = limits
+        self.limits = MotionLimits(
+            limits.velocity, limits.acceleration, 2.0 * limits.acceleration / self._period
+        )
+
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Set the speed of the inner reference, and the velocity limit of all."""
+        self._speed = speed, slowest
+        if isinstance(self.inner, Guided):
+            self.inner.pace(speed, slowest)
+        self.rate = speed
+        velocity = self._arm.velocity if slowest is None else min(slowest, self._arm.velocity)
+        if velocity != self.limits.velocity:
+            self.limits = MotionLimits(velocity, self.limits.acceleration, self.limits.jerk)
+            state = self._limiter.state
+            self._limiter = Limiter(
+                state[0], self.limits, self._period, reach=self._reach, torque=self._torque, state=state
+            )
+
+    def next(self) -> Floats:
+        """Advance by one tick and return the position of the joints.
+
+        Raises:
+            StuckError: The inner reference cannot go on, or the joints cannot follow it.
+        """
+        h, task = self._period, self.task
+        moved = self._move_inner()
+        self.axes = axes = self._frame(self._pose, self._twist[:3])
+        given = compliant_velocity(task, _into(axes, self._given), _into(axes, self._felt()), h)
+        kept = np.where(task.compliant > 0.0, 0.0, _into(axes, moved))
+        q, present = self._limiter.q, self._pose
+        inverse = self.kinematics.inverse(q)[1]
+        slope = np.abs(inverse @ _out(axes, given)).max()
+        self.hindered = share = min(1.0, FASTEST * self.limits.velocity / max(slope, 1e-12))
+        for part in (share, 0.0):  # a singular posture may forbid all of what the law wants
+            self._given = _out(axes, part * given)
+            self._twist = _out(axes, kept) + self._given
+            self._pose = self._shifted(present, h * self._twist)
+            found, error = self._joints(q, inverse)
+            if np.abs(error).max() <= OFF:
+                break
+        else:
+            if np.abs(np.where(task.compliant > 0.0, 0.0, _into(axes, error))).max() > OFF:
+                raise StuckError("the joints cannot move the tool on beside the force that it controls")
+            self._drop(found, axes)
+        reached = self._limiter.follow(found, (found - q) / h)
+        if self._limiter.limited:
+            self._drop(reached, axes)
+        return reached
+
+    def _move_inner(self) -> Floats:
+        """Let the inner reference advance by a tick; return the velocity of its tool, shape (6,)."""
+        if self.inner.finished:
+            self._moved = np.zeros(6)
+            return self._moved
+        rotation, position = self._nominal
+        self._nominal = there = self.kinematics.pose(self.inner.next())
+        way = np.concatenate((there[1] - position, self._turn(rotation, there[0])))
+        self._moved = way / self._period
+        return self._moved
+
+    def _shifted(self, pose: tuple[Floats, Floats], way: Floats) -> tuple[Floats, Floats]:
+        return self._turned(pose[0], way[3:]), pose[1] + way[:3]
+
+    def _off(self, q: Floats) -> Floats:
+        """What the pose lacks to the one that is followed, shape (6,) [m, rad]."""
+        rotation, position = self.kinematics.pose(q)
+        return np.concatenate((self._pose[1] - position, self._turn(rotation, self._pose[0])))
+
+    def _joints(self, q: Floats, inverse: Floats) -> tuple[Floats, Floats]:
+        """Joints that reach the pose, from those nearby, and what is lacking then."""
+        error = self._off(q)
+        for _ in range(NEWTON):
+            q = q + inverse @ error
+            error = self._off(q)
+            if np.abs(error).max() <= ACCURATE:
+                break
+        return q, error
+
+    def _drop(self, q: Floats, axes: Floats) -> None:
+        """Give up, in the compliant axes, what the joints have not followed."""
+        lost = np.where(self.task.compliant > 0.0, _into(axes, self._off(q)), 0.0)
+        self._pose = self._shifted(self._pose, -_out(axes, lost))
+        kept = np.where(self.task.compliant > 0.0, 0.0, _into(axes, self._given))
+        self._given = _out(axes, kept)
+
+
+def inner_q(inner: Guided | Rest) -> Floats:
+    """Position of a reference, shape (n,) [rad]."""
+    return inner.state[0] if isinstance(inner, Guided) else inner.next()
+
+
+def _into(axes: Floats, base: Floats) -> Floats:
+    """Components of a twist or wrench along axes, from those in the base frame."""
+    return np.concatenate((base[:3] @ axes, base[3:] @ axes))
+
+
+def _out(axes: Floats, own: Floats) -> Floats:
+    """Components in the base frame, from those along axes."""
+    return np.concatenate((axes @ own[:3], axes @ own[3:]))

@@ -1,0 +1,74 @@
+"""The flexible arm above a surface that is a spring with damping, with a force sensor in its flange or without."""
+
+import numpy as np
+
+from tvist_plant.drives import DriveCommand
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.plant import PERIOD, Measurement
+
+PARTS = 4
+"""Parts of a control period in each of which the contact force is constant: surfaces of 1e5 N/m need it."""
+
+
+class TouchingArm:
+    """A `FlexibleArm` whose flange presses into a plane of normal z when it is below `height`.
+
+    Args:
+        stiffness: Stiffness of the surface [N/m].
+        damping: Its damping, which pulls nothing towards it [N s/m].
+        sensor: Whether the flange has a force sensor, with the weight and the inertia of the payload.
+    """
+
+    def __init__(
+        self, description, payload, *, stiffness=0.0, damping=0.0, sensor=True, parts=PARTS, noise=0.0
+    ):
+        self._arm = FlexibleArm(description, payload, period=PERIOD / parts, substeps=1)
+        self._parts, self.stiffness, self.damping, self.height, self.sensor = (
+            parts,
+            stiffness,
+            damping,
+            -1e9,
+            sensor,
+        )
+        self.pushed = np.zeros(3)
+        self.force = np.zeros(3)
+        self._noise, self._random = noise, np.random.default_rng(1)
+
+    def __getattr__(self, name):
+        return getattr(self._arm, name)
+
+    def reset(self, command, *, payload=None, seed=0):
+        self.force = np.zeros(3)
+        measured = self._arm.reset(command, payload=payload, seed=seed)
+        self._last, self._z = command, self._place()
+        return self._sensed(measured)
+
+    def _place(self):
+        return float(self._arm.truth().flange_position[2])
+
+    def step(self, command):
+        last = self._last
+        for k in range(1, self._parts + 1):
+            share = k / self._parts
+            z = self._place()
+            rate, self._z = (z - self._z) * self._parts / PERIOD, z
+            deep = self.height - z
+            push = max(self.stiffness * deep - self.damping * rate, 0.0) if deep > 0.0 else 0.0
+            self.force = np.array([0.0, 0.0, push]) + self.pushed
+            self._arm.push_body("flange", self.force)
+            q, qd, torque = (
+                (1.0 - share) * getattr(last, name) + share * getattr(command, name)
+                for name in ("q", "qd", "torque")
+            )
+            measured = self._arm.step(DriveCommand(q, qd, torque))
+        self._last = command
+        return self._sensed(measured)
+
+    def _sensed(self, measured):
+        if not self.sensor:
+            return measured
+        rotation, payload = self._arm.truth().flange_rotation, self._arm.payload
+        inertial = -payload.mass * measured.accelerometer
+        wrench = np.concatenate((inertial + rotation.T @ self.force, np.cross(payload.com, inertial)))
+        wrench[:3] += self._noise * self._random.standard_normal(3)
+        return Measurement(measured.q, measured.qd, measured.moment, measured.accelerometer, wrench=wrench)
