@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 READY = 30.0
 """Longest wait for the robot to follow [s]."""
+MOVED = 0.01
+"""Distance of a joint from where the moves were planned from, from which on they are not made [rad]."""
 
 
 def identify_robot(
@@ -145,6 +147,10 @@ async def _ready(client: "Robot", control: "Arm", plan: "MovePlan") -> None:
         state = await client.state()
         try:
             if state.robot_mode == RobotMode.RUNNING:
+                if max(abs(q - there) for q, there in zip(state.target_q, plan.at, strict=True)) > MOVED:
+                    raise Failure(
+                        "the arm was moved since the moves were planned: nothing was moved, begin again"
+                    )
                 await control.move_j(state.target_q, velocity=plan.ways.velocity)
                 return
             await control.power_on()

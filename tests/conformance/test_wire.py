@@ -59,12 +59,12 @@ class TestStates:
         assert set(state) == STATE_FIELDS
         joints = (name for name in STATE_FIELDS if name.endswith(("_q", "_qd", "_qdd", "_moment")))
         # Without a shaped motion, the reference before shaping is the target itself and is left out; so is what only
-        # elastic feed-forward knows.
+        # elastic feed-forward knows, and a force sensor.
         assert all(state[name] is None or len(state[name]) == 6 for name in joints)
         assert all(
             state[name] is not None
             for name in STATE_FIELDS
-            if not name.startswith(("unshaped_", "setpoint_", "motor_"))
+            if not name.startswith(("unshaped_", "setpoint_", "motor_", "flange_"))
         )
 
     def test_at_rest_the_accelerometer_feels_gravity_and_the_modes_are_normal(self, live):

@@ -17,6 +17,7 @@ STATE_FIELDS = {
     "actual_TCP_pose", "actual_TCP_speed", "actual_tool_accelerometer", "speed_scaling", "estimated_f_d",
     "estimated_zeta", "shaper_delay", "missed_ticks", "shaper_clipped", "unshaped_q",
     "unshaped_qd", "unshaped_qdd", "motor_qd", "motor_qdd", "motor_moment", "motor_limited",
+    "flange_wrench",
 }  # fmt: skip
 Q1 = [0.0, -math.pi, 0.0, -math.pi / 2, 0.0, 0.0]
 STOPPED, PLAYING = 1, 2

@@ -36,7 +36,7 @@ DEFAULT_NAME = "ur5e"
 SPEED_CAP = 0.5
 """Largest speed of a robot that is moved, unless another is given [rad/s]."""
 _REAL = ("enable_motion", "speed_cap", "tcp", "servo_lag")
-MOST_LAG, LEAST_GAIN = 0.3, 50.0
+MOST_LAG, LEAST_GAIN = 0.15, 50.0
 """Largest time and smallest gain of a `servoj` that can be compensated [s, 1/s²]."""
 T = TypeVar("T")
 

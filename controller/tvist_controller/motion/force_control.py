@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.kinematics.tool import turn, turned
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
@@ -13,7 +14,7 @@ from tvist_controller.motion.task_frame import Feature, frame_of
 from tvist_controller.trajectory import Compliant, ForceTask, Guided, JointSpeed, Rest
 from tvist_controller.trajectory.compliant import CRAWL
 from tvist_controller.trajectory.force_law import FREE_DAMPING
-from tvist_plant.plant import PERIOD
+from tvist_plant.plant import PERIOD, Supervised
 
 SMOOTHED = 0.04
 """Time constant of a wrench that is estimated from the drives' torques, which the arm's elasticity shakes [s]."""
@@ -82,6 +83,9 @@ class ForceControl:
         Raises:
             RefusalError: The present activity does not allow it, or its motion cannot be taken over.
         """
+        if isinstance(self._cycle.line.plant, Supervised):
+            why = "this arm follows positions with a lag, and its force is a guess: forces cannot move it"
+            raise RefusalError("wrong_mode", "", why)
         self._guidance.check(trigger)
         lead = self.compliant or self._new()
         lead.aim(task, frame_of(feature, kind))

@@ -42,6 +42,7 @@ STATE_COLUMNS = (
     "motor_qdd",
     "motor_moment",
     "motor_limited",
+    "flange_wrench",
 )
 """Fields of a `state`, each of which becomes a column of the same name."""
 TRUTH_PREFIX = "truth_"

@@ -27,7 +27,7 @@ from tvist_server.moving.start_checks import (
 from tvist_server.watching.place import Place
 
 NUMBERS = 1_000_000_000
-"""Numbers of runs begin with our time in seconds, so that those of two processes differ."""
+"""Numbers of runs begin with our time in microseconds, so that those of two processes differ."""
 
 
 class MovedRobot:
@@ -76,7 +76,7 @@ class MovedRobot:
             self._told.append("its primary interface tells no limits: those of the robot file hold alone")
         if not answers:
             self._told.append("it has no dashboard: model and remote control were not checked")
-        self._pace, self._number = Pace(), int(time.time()) % NUMBERS
+        self._pace, self._number = Pace(), time.monotonic_ns() // 1000 % NUMBERS
         self._held, self._lag, self._interval = False, lag, round(self._robot.interval() / PERIOD)
         self._run: Run | None = None
         self._halt: Halt | None = None
@@ -136,8 +136,10 @@ class MovedRobot:
             if self._robot.wait(min(self._pace.until(now), until - now)):
                 if self._take(self._robot.sight()):
                     return True
-            elif self._run is not None and self._pace.silent(time.monotonic()):
-                self._let_go(SILENT)
+            elif self._run is not None and self._pace.silent(time.monotonic()) and not self._robot.wait(0.0):
+                self._let_go(
+                    SILENT
+                )  # and it is not this process that was stopped, with rows that wait to be read
         return self._pace.next(time.monotonic())
 
     def _take(self, sight: Sight) -> bool:
@@ -149,9 +151,13 @@ class MovedRobot:
                 self._let_go(SILENT)
             return False
         if self._held and self._run is None:
-            self._number += 1
-            limits = self._wanted.description.limits
-            self._run = Run(self._robot, self._place, self._number, limits, self._lag)
+            trouble = state_trouble(self._wanted, sight, may_play=self._left_paused)
+            if trouble is None:
+                self._number += 1
+                limits = self._wanted.description.limits
+                self._run = Run(self._robot, self._place, self._number, limits, self._lag)
+            else:  # what was so at the last look is not any more
+                self._let_go(Halt(trouble, sight.modes[1]))
         self._left_paused &= sight.modes[2] in {RuntimeState.PAUSING, RuntimeState.PAUSED}
         if self._run is not None:
             told = self._run.take(sight)

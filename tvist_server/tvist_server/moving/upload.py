@@ -35,11 +35,13 @@ class Upload:
 
     def _run(self) -> None:
         self.trouble = remote_trouble(asked(self._place, [REMOTE]))
-        if self.trouble is not None:
+        if self.trouble is not None or self._closed.is_set():
             return
         where = self._place.beside(PRIMARY)
         try:
             with socket.create_connection((where.host, where.port), PATIENCE) as connection:
+                if self._closed.is_set():  # a program that comes late would end its successor's motion
+                    return
                 connection.sendall(self._text.encode())
                 connection.settimeout(LOOK_EVERY)
                 while not self._closed.is_set():

@@ -58,7 +58,7 @@ class Connection:
             LostError: The robot is not there, has gone, or is none.
         """
         try:
-            ready = self._selector.select(max(0.0, timeout))
+            ready = self._selector.select(max(0.0, timeout)) or self._selector.select(0.0)
             if ready and not self._connected:
                 self._begin()
                 return ()
