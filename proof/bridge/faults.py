@@ -181,7 +181,7 @@ class Faults:
                 time.sleep(self._random.uniform(0.06, 0.5) / self._speed)
                 return lambda: bridge.signal(signal.SIGCONT)
             case "cut":
-                how, back = self._random.choice((("cut", "restore"), ("freeze", "flow")))
+                how, back = self._random.choice((("cut", "restore"), ("hold", "flow")))
                 link.do(how)
                 return lambda: link.do(back)
             case "pause":

@@ -69,6 +69,7 @@ class LiveCell:
         if cell.tools:
             terminals.set_tcp(cell.tools[0].tcp)
         self._cell, self._plant, self._terminals, self._emit = cell, plant, terminals, emit
+        self._hand = plant if isinstance(plant, Gripping) else None
         self._kinematics = ToolKinematics(description)
         self._kinematics.pose(np.zeros(description.joints))  # its kernel is loaded before the first tick
         self.gripper = (
@@ -133,8 +134,8 @@ class LiveCell:
         if self._changers:
             first = self._cell.tools[0]
             self._mount(next((tool for bit, tool in self._changers if outputs & bit), first), q)
-        if self.gripper is not None and isinstance(self._plant, Gripping):
-            self._move_real_fingers(self.gripper, self._plant)
+        if self.gripper is not None and self._hand is not None:
+            self._move_real_fingers(self.gripper, self._hand)
         elif self.gripper is not None:
             self._move_fingers(self.gripper, q)
         if self._held is not None:

@@ -1,12 +1,14 @@
 """A robot that is moved: a plant whose drives are another controller's."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
+from tvist_plant.model import Floats
 from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, PlantError, Sight
 from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_server.moving.commanded_robot import CommandedRobot
@@ -115,7 +117,7 @@ class MovedRobot:
                 self._run.write()
         return self._measured(self._sight.measured.q)
 
-    def _measured(self, q: np.ndarray | tuple[float, ...]) -> Measurement:
+    def _measured(self, q: Floats | Sequence[float]) -> Measurement:
         """Return the latest measurements at a posture, with the time of the present period."""
         felt = self._sight.measured
         return Measurement(
@@ -137,9 +139,8 @@ class MovedRobot:
                 if self._take(self._robot.sight()):
                     return True
             elif self._run is not None and self._pace.silent(time.monotonic()) and not self._robot.wait(0.0):
-                self._let_go(
-                    SILENT
-                )  # and it is not this process that was stopped, with rows that wait to be read
+                # Nor is it this process that was stopped, with rows that wait to be read.
+                self._let_go(SILENT)
         return self._pace.next(time.monotonic())
 
     def _take(self, sight: Sight) -> bool:

@@ -1,6 +1,7 @@
 """One run of the program on a robot, from its upload to its end."""
 
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -59,9 +60,9 @@ class Run:
         self._upload = Upload(place, text)
 
     @property
-    def last(self) -> tuple[float, ...] | None:
-        """The newest set-point [rad]; None before the first."""
-        return self._window.values(Order.FOLLOW)[2:8] if self._window.number else None
+    def last(self) -> Sequence[float] | None:
+        """The newest set-point, shape (6,) [rad]; None before the first."""
+        return self._window.newest
 
     def add(self, command: DriveCommand, *, played: bool) -> None:
         """Take the command of a tick, or where the robot stands until the program follows.

@@ -12,12 +12,17 @@ class Window:
     def __init__(self) -> None:
         self.number = 0
         """Number of the newest set-point; 0 before the first."""
-        self._newest = deque[Sequence[float]](maxlen=KEPT)
+        self._kept = deque[Sequence[float]](maxlen=KEPT)
+
+    @property
+    def newest(self) -> Sequence[float] | None:
+        """The newest set-point, shape (6,) [rad]; None before the first."""
+        return self._kept[0] if self._kept else None
 
     def add(self, setpoint: Sequence[float]) -> None:
         """Add the next set-point, joint angles of shape (6,) [rad]. Before the first one, the arm counts as there."""
         self.number = self.number % MOST + 1
-        self._newest.extendleft([setpoint] * (1 if self._newest else KEPT))
+        self._kept.extendleft([setpoint] * (1 if self._kept else KEPT))
 
     def values(self, order: Order) -> tuple[float, ...]:
         """Return the values of an input package, in the order of `registers.INPUTS`.
@@ -26,4 +31,4 @@ class Window:
             order: What the program is to do.
         """
         assert self.number, "a package has a set-point"
-        return self.number, order, *(angle for one in self._newest for angle in one)
+        return self.number, order, *(angle for one in self._kept for angle in one)
