@@ -1,5 +1,6 @@
-// Bundles src/ and try/ into an HTML file each, which loads nothing: page.html and try.html of ../tvist_view, with their licences beside them.
+// Bundles src/ and try/ into an HTML file each, which loads nothing: page.html.gz, which is served, and try.html of ../tvist_view, with their licences beside them.
 import { readFileSync, writeFileSync } from "node:fs";
+import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
 
 const out = process.argv[2] ?? "../tvist_view";
@@ -21,10 +22,10 @@ async function one(folder, entry, name) {
   const page = readFileSync(`${folder}/page.html`, "utf8")
     .replace("/* style */", () => style)
     .replace("/* script */", () => script);
-  writeFileSync(`${out}/${name}`, page);
+  writeFileSync(`${out}/${name}`, name.endsWith(".gz") ? gzipSync(page, { level: 9 }) : page);
 }
 
-await one("src", "main.js", "page.html");
+await one("src", "main.js", "page.html.gz");
 await one("try", "main.ts", "try.html");
 const licences = ["three", "uplot"].map((name) => {
   const { version } = JSON.parse(readFileSync(`node_modules/${name}/package.json`, "utf8"));

@@ -1,5 +1,6 @@
 """The page's server: one page, and a WebSocket for each tab. Only this machine reaches it, unless told otherwise."""
 
+import gzip
 import ipaddress
 import itertools
 import json
@@ -71,7 +72,7 @@ def page(boot: Mapping[str, Any]) -> str:
 
 @cache
 def _page() -> str:
-    return files("tvist_view").joinpath("page.html").read_text(encoding="utf-8")
+    return gzip.decompress(files("tvist_view").joinpath("page.html.gz").read_bytes()).decode()
 
 
 @asynccontextmanager
