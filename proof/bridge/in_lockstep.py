@@ -36,6 +36,8 @@ COMPUTING = 0.2
 LATEST = 2.0
 """Time after a tick of the robot at which the controller ticks without its row [ms]."""
 CLIENT = "proof"
+RUN = 1
+"""Number of the run of the program."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ class HiddenRobot:
     def follow(self, speed: float, lookahead: float = LOOKAHEAD, gain: float = GAIN) -> None:
         """Run the program that follows set-points, up to a speed [rad/s]; arguments of `servoj`."""
         deceleration = min(self.controller.cycle.description.limits.acceleration)
-        text = program(1, speed=speed, deceleration=deceleration, lookahead=lookahead, gain=gain)
+        text = program(RUN, speed=speed, deceleration=deceleration, lookahead=lookahead, gain=gain)
         reply = self.send(ProgramRun, text=text)
         assert not isinstance(reply, Refused), reply
 
@@ -184,7 +186,7 @@ class Port:
         self.wanted = command.q
         self.sent = self.setpoints.next(command)
         self._window.add(self.sent.tolist())
-        self._packages.append((self._there.arrival(begun + COMPUTING), self._window.values(r.Order.FOLLOW)))
+        self._packages.append((self._there.arrival(begun + COMPUTING), self._window.values(RUN)))
         counts.ticks += 1
         self._deliver(now + TICK)
         before = robot.controller.latest.target_q

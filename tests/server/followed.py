@@ -168,7 +168,7 @@ class Alone(Followed):
         return self._outputs[place]
 
 
-def packages(path, count, order=r.Order.FOLLOW):
+def packages(path, count, order=RUN):
     """The input packages of set-points: rows of a path, from the first on."""
     window, made = Window(), []
     for row in path[:count]:

@@ -60,9 +60,9 @@ def test_a_package_has_the_newest_set_point_first_and_every_register_once():
     window = Window()
     for k in range(6):
         window.add((float(k),) * 6)
-    assert window.values(r.Order.FOLLOW)[:2] == (6, 1)
-    assert window.values(r.Order.END)[1::6] == (0, 5.0, 4.0, 3.0, 2.0)
-    assert len(r.INPUTS) == len(window.values(r.Order.FOLLOW))
+    assert window.values(RUN)[:2] == (6, RUN)
+    assert window.values(0)[1::6] == (0, 5.0, 4.0, 3.0, 2.0)
+    assert len(r.INPUTS) == len(window.values(RUN))
 
 
 @examples(20)

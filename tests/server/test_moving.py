@@ -1,9 +1,11 @@
 """What a robot is moved by, without a socket or a clock: inputs that are claimed, start checks, reasons and periods."""
 
+import contextlib
 import struct
 from dataclasses import replace
 from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -30,7 +32,9 @@ from tvist_server.moving.start_checks import (
     mounting_trouble,
     state_trouble,
     tells_gravity,
+    version_trouble,
 )
+from tvist_server.moving.upload import Upload
 from tvist_server.rtde.client import RtdeError
 from tvist_server.rtde.codec import PackageKind, package
 from tvist_server.rtde.commanding import CommandingClient
@@ -242,20 +246,28 @@ class Written:
         self.newest[f"output_int_register_{place}"] = (number,)
 
 
+PLAYING = replace(GOOD, modes=(7, 1, RuntimeState.PLAYING))
+
+
 @pytest.fixture
-def running(monkeypatch):
-    """A run whose program waits for the first set-point, and its robot."""
+def new_run(monkeypatch):
+    """A run whose program has not begun, and its robot."""
     monkeypatch.setattr(
         "tvist_server.moving.run.Upload", lambda *_: SimpleNamespace(trouble=None, close=lambda: None)
     )
     robot = Written()
-    run = Run(robot, place_of("ur://robot"), 7, UR5E.limits, None)
+    return Run(robot, place_of("ur://robot"), 7, UR5E.limits, None, lambda: None), robot
+
+
+@pytest.fixture
+def running(new_run):
+    """A run whose program waits for the first set-point, its robot, and what that says."""
+    run, robot = new_run
     robot.says(r.RUN, 7)
     robot.says(r.STATE, r.State.WAITING)
-    playing = replace(GOOD, modes=(7, 1, RuntimeState.PLAYING))
     for _ in range(50):
-        run.take(playing)
-    return run, robot, playing
+        run.take(PLAYING)
+    return run, robot, PLAYING
 
 
 @pytest.mark.parametrize("interval", [1, 4])
@@ -264,20 +276,23 @@ def test_a_period_of_the_robot_gets_one_set_point_and_begins_where_it_stands(run
     assert robot.written == [(0,) * len(r.INPUTS)]
     run.add(DriveCommand(Q + 1.0, np.zeros(6), np.zeros(6)), played=True)
     run.write()
-    assert robot.written[-1] == (1, r.Order.FOLLOW, *(4 * tuple(Q)))
+    assert robot.written[-1] == (1, 7, *(4 * tuple(Q)))
     robot.says(r.STATE, r.State.FOLLOWING)
     run.take(playing)
+    assert not run.ready, "a command that comes before the next tick is of before it followed"
+    run.add(DriveCommand(Q + 1.0, np.zeros(6), np.zeros(6)), played=False)
     assert run.ready
+    assert run.last == tuple(Q)
     for tick in range(1, 9):
         q = Q + 1e-4 * tick
         run.add(DriveCommand(q, np.zeros(6), np.zeros(6)), played=tick % interval == 0)
     run.write()
     number, order, *angles = robot.written[-1]
-    assert (number, order) == (1 + 8 // interval, r.Order.FOLLOW)
+    assert (number, order) == (1 + 8 // interval, 7)
     assert angles[:6] == pytest.approx(Q + 8e-4)
     assert angles[6:12] == pytest.approx(Q + 1e-4 * (8 - interval))
     run.end()
-    assert robot.written[-1][1] == r.Order.END
+    assert robot.written[-1][1] == 0
 
 
 def test_modes_have_some_rows_to_tell_why_the_program_has_ended(running):
@@ -296,10 +311,66 @@ def test_a_program_that_stops_without_another_reason_is_told_within_20_ms(runnin
     assert "its program was stopped at the robot" in run.halt.why
 
 
-def test_registers_of_an_earlier_run_are_not_taken_for_ours(running):
-    run, robot, playing = running
+def test_registers_of_an_earlier_run_are_not_taken_for_ours(new_run):
+    run, robot = new_run
     robot.says(r.RUN, 6)
+    robot.says(r.STATE, r.State.FOLLOWING)
     robot.says(r.ENDED, Ended.SILENCE)
-    run.take(playing)
+    for _ in range(50):
+        run.take(PLAYING)
     assert run.halt is None
     assert not run.ready
+
+
+@pytest.mark.parametrize("how", ["a run of ours", "any program"])
+def test_a_program_that_takes_the_place_of_ours_is_noticed(running, how):
+    """Any other program leaves the registers as ours has left them, and the robot says that it plays."""
+    run, robot, playing = running
+    robot.says(r.STATE, r.State.FOLLOWING)
+    for number in range(30):
+        robot.says(r.PLAYED, number)
+        run.take(playing)
+        assert run.halt is None
+    for row in range(20):
+        robot.says(r.PLAYED, 30 + row if how == "a run of ours" else 29)
+        robot.says(r.RUN, 8 if how == "a run of ours" else 7)
+        run.take(playing)
+    assert "another program has taken the place of ours" in run.halt.why
+    assert not run.ready
+
+
+@pytest.mark.parametrize(
+    ("version", "may"),
+    [
+        ((3, 13), False),
+        ((3, 15, 8), True),
+        ((4, 20), False),
+        ((5, 8, 2), False),
+        ((5, 9), True),
+        ((10, 1), True),
+    ],
+)
+def test_older_software_is_not_moved(version, may):
+    trouble = version_trouble(version)
+    assert (trouble is None) == may
+    assert may or "update it to 5.9 or later" in trouble
+
+
+@pytest.mark.parametrize(("cap", "most"), [(0.05, 5.0), (0.5, 5.0), (3.2, 25.6), (10.0, 40.0)])
+def test_it_brakes_within_an_eighth_of_a_second_and_within_the_limits(monkeypatch, cap, most):
+    texts = []
+    monkeypatch.setattr("tvist_server.moving.run.Upload", lambda _, text, __: texts.append(text))
+    limits = msgspec.structs.replace(UR5E.limits, velocity=6 * (cap,))
+    Run(Written(), place_of("ur://robot"), 7, limits, None, lambda: None)
+    assert f"stopj({most})" in texts[0]
+
+
+def test_a_program_is_sent_only_if_the_robot_is_free_at_the_last_moment(monkeypatch):
+    sent = []
+    connection = contextlib.nullcontext(SimpleNamespace(sendall=sent.append))
+    monkeypatch.setattr("tvist_server.moving.upload.asked", lambda *_: {})
+    monkeypatch.setattr("socket.create_connection", lambda *_: connection)
+    upload = Upload(place_of("ur://robot"), "def nothing():\nend\n", lambda: "a program runs on it")
+    upload.thread.join(10.0)
+    assert upload.trouble == "a program runs on it"
+    assert sent == []

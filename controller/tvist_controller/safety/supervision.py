@@ -17,8 +17,6 @@ from tvist_protocol.modes import SafetyMode
 
 SAME_MASS = 0.05
 """Largest difference of two masses that count as equal [kg]."""
-LEAST_SPEED = 0.01
-"""Slowest speed of motions, however far down the robot's slider is [-]."""
 
 
 class Supervision(Said):
@@ -81,7 +79,7 @@ class Supervision(Said):
         """Scale motions by the robot's speed slider."""
         slider, motions = 1.0 if sight.slider is None else sight.slider, self._motion.motions
         before = motions.wanted_speed
-        motions.scale(max(slider, LEAST_SPEED))
+        motions.scale(slider)
         if motions.wanted_speed != before:
             self._emit(
                 "warning", why=f"the speed slider of the robot is at {100.0 * slider:.0f} %: so are motions"

@@ -20,9 +20,12 @@ _ENDED = {
     Ended.AWAY: f"it stands more than .01 rad from the first set-point: {_AGAIN}, to begin where it stands",
     Ended.TOO_FAST: f"a set-point was faster than the speed cap, so that it has braked: {_AGAIN}, and tell us how",
     Ended.LOST: f"its program was paused or fell behind, so that it has braked: see why, {_AGAIN}",
+    Ended.STRAYED: "the arm did not follow the set-points, so that it has braked: see what held it, and whether the "
+    f"speed slider was moved while it was going, {_AGAIN}",
 }
 _MOVABLE = {SafetyMode.NORMAL, SafetyMode.REDUCED}
 _PAUSED = {RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING}
+REPLACED = f"another program has taken the place of ours: end that, and see who has sent it, {_AGAIN}"
 SILENT = Halt(
     "it says nothing any more, so that its own program has stopped it: look at the network and at the robot, "
     f"{_AGAIN}",

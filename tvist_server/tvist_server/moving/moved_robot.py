@@ -25,6 +25,7 @@ from tvist_server.moving.start_checks import (
     mounting_trouble,
     state_trouble,
     tells_gravity,
+    version_trouble,
 )
 from tvist_server.watching.place import Place
 
@@ -66,7 +67,7 @@ class MovedRobot:
         own = configuration_of(place)
         answers = asked(place, QUESTIONS)
         file = Wanted(description, payload, tool, start)
-        self._refuse_if(answers_trouble(file, answers, own))
+        self._refuse_if(version_trouble(self._robot.version) or answers_trouble(file, answers, own))
         self._wanted = file._replace(description=narrowed(description, own, speed_cap))
         self._refuse_if(state_trouble(self._wanted, self._sight))
         felt = np.mean([row["actual_tool_accelerometer"] for row in self._robot.looked_at], axis=0)
@@ -74,6 +75,7 @@ class MovedRobot:
             self._refuse_if(mounting_trouble(description, self._sight.measured.q, felt))
         else:
             self._told.append("its accelerometer does not tell gravity: nobody has checked how it is mounted")
+        self._wanted = self._wanted._replace(q=None)  # where it is to stand before it is first moved
         if own is None:
             self._told.append("its primary interface tells no limits: those of the robot file hold alone")
         if not answers:
@@ -152,11 +154,11 @@ class MovedRobot:
                 self._let_go(SILENT)
             return False
         if self._held and self._run is None:
-            trouble = state_trouble(self._wanted, sight, may_play=self._left_paused)
+            trouble = self._trouble()
             if trouble is None:
                 self._number += 1
                 limits = self._wanted.description.limits
-                self._run = Run(self._robot, self._place, self._number, limits, self._lag)
+                self._run = Run(self._robot, self._place, self._number, limits, self._lag, self._trouble)
             else:  # what was so at the last look is not any more
                 self._let_go(Halt(trouble, sight.modes[1]))
         self._left_paused &= sight.modes[2] in {RuntimeState.PAUSING, RuntimeState.PAUSED}
@@ -166,6 +168,10 @@ class MovedRobot:
             if self._run.halt is not None:
                 self._let_go(self._run.halt)
         return self._pace.row(sight.tick, time.monotonic())
+
+    def _trouble(self) -> str | None:
+        """Return why the robot takes no program of ours as it is now."""
+        return state_trouble(self._wanted, self._sight, may_play=self._left_paused)
 
     # ------------------------------------------------------------------ its program
 

@@ -3,7 +3,7 @@
 from string import Template
 
 from tvist_server.moving import registers
-from tvist_server.moving.registers import JOINTS, MOST, Ended, Order, State
+from tvist_server.moving.registers import JOINTS, MOST, Ended, State
 
 NAME = "tvist_follow"
 """Name of the program, which robots show."""
@@ -48,7 +48,7 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         {name: getattr(registers, name) for name in _REGISTERS}
         | {f"ended_{one.name.lower()}": int(one) for one in Ended}
         | {f"state_{one.name.lower()}": int(one) for one in State}
-        | {"name": NAME, "run": run, "follow": int(Order.FOLLOW), "speed": float(MARGIN * speed)}
+        | {"name": NAME, "run": run, "speed": float(MARGIN * speed)}
         | {"deceleration": float(deceleration), "lookahead": float(lookahead), "gain": float(gain)}
         | {"silence": SILENCE, "first": FIRST, "away": AWAY, "fade": FADE, "again": AGAIN}
         | {
@@ -65,14 +65,14 @@ def $name():
   # when they stop. It moves nothing before the first has come, and after a stop it has ended.
   #
   # Input registers, which one package writes:
-  #   integer $NUMBER: number of the newest set-point, 1 more in each period; integer $ORDER: $follow to follow
+  #   integer $NUMBER: number of the newest set-point, 1 more in each period; integer $ORDER: $run to follow
   #   float $SETPOINTS to 47: the newest set-point and the three before it, six joint angles each [rad]
   # Output registers:
   #   integer $STATE: $state_waiting waiting, $state_following following, $state_braking braking, $state_ended ended
   #   integer $PLAYED: number of the set-point whose turn it is; integer $RUN: number of this run
   #   integer $ENDED: why it ended: $ended_ordered ordered, $ended_silence no set-point came,
   #     $ended_away the first is too far from the arm, $ended_too_fast one is too far from the one before,
-  #     $ended_lost paused, or out of step
+  #     $ended_lost paused, or out of step, $ended_strayed the arm did not follow
   #   integer $ALONE: periods without a set-point; integer $LEFT_OUT: set-points left out
 
   def setpoint(at):
@@ -96,7 +96,7 @@ def $name():
   old = read_input_integer_register($NUMBER)
   newest = old
   waited = 0.0
-  while waited < $first and (newest == old or read_input_integer_register($ORDER) != $follow):
+  while waited < $first and (newest == old or read_input_integer_register($ORDER) != $run):
     sync()
     waited = waited + step
     newest = read_input_integer_register($NUMBER)
@@ -141,7 +141,7 @@ def $name():
       number = now - 1
     end
 
-    if read_input_integer_register($ORDER) != $follow:
+    if read_input_integer_register($ORDER) != $run:
       why = $ended_ordered
     elif now < newest or behind * step > $silence: # another sender, or a pause: it must not catch up
       why = $ended_lost
@@ -174,7 +174,7 @@ def $name():
         leap = new - last
         extra = change - own
       elif norm(q - get_target_joint_positions()) > near:
-        why = $ended_lost
+        why = $ended_strayed
       end
       way = own + extra * keep - (q - previous) * pull
       far = most * gap

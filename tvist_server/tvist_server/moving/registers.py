@@ -16,7 +16,7 @@ MOST = 2**31 - 1
 NUMBER = 24
 """Input integer: number n of the newest set-point, 1 more in each control period of the robot; 0: none yet."""
 ORDER = 25
-"""Input integer: an `Order`."""
+"""Input integer: number of the run whose program is to follow. Any other number, such as 0, ends it."""
 SETPOINTS = 24
 """First of the input doubles: joint angles of set-point n, then of n-1, n-2 and n-3 [rad]."""
 
@@ -32,13 +32,6 @@ LEFT_OUT = 28
 """Output integer: number of set-points that were never played, since they came too late or the program fell behind."""
 RUN = 29
 """Output integer: number of the run. The others are of this run once it is there, since it is written last."""
-
-
-class Order(IntEnum):
-    """What the program is to do."""
-
-    END = 0
-    FOLLOW = 1
 
 
 class State(IntEnum):
@@ -64,7 +57,9 @@ class Ended(IntEnum):
     TOO_FAST = 4
     """A set-point is further from the one before than the speed cap permits, or is no number."""
     LOST = 5
-    """The program was paused, fell behind or stopped being followed by the arm, or the numbers do not continue."""
+    """The program was paused or fell behind, or the numbers do not continue."""
+    STRAYED = 6
+    """The arm did not follow the program."""
 
 
 INPUTS: dict[str, Wire] = {

@@ -1,7 +1,7 @@
 """One run of the program on a robot, from its upload to its end."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -10,21 +10,25 @@ from tvist_plant.plant import Halt, Sight
 from tvist_plant.robot_tables import ArmLimits
 from tvist_protocol.modes import RuntimeState
 from tvist_server.moving.commanded_robot import CommandedRobot
-from tvist_server.moving.halts import halt_by_modes, halt_by_program
+from tvist_server.moving.halts import REPLACED, halt_by_modes, halt_by_program
 from tvist_server.moving.program import program
-from tvist_server.moving.registers import ALONE, ENDED, INPUTS, LEFT_OUT, RUN, STATE, Order, State
+from tvist_server.moving.registers import ALONE, ENDED, INPUTS, LEFT_OUT, PLAYED, RUN, STATE, State
 from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
 from tvist_server.moving.upload import Upload
 from tvist_server.moving.window import Window
 from tvist_server.watching.place import Place
 
 DECELERATION = 5.0
-"""Deceleration of the fastest joint when the program brakes [rad/s²]."""
+"""Least deceleration of the fastest joint when the program brakes [rad/s²]."""
+BRAKES = 0.125
+"""Time in which it brakes at the speed cap, if that takes more [s]."""
 SETTLES = 25
 """Number of rows of the waiting program after which it gets the first set-point: what its start has delayed has come
 by then, since it ends when numbers come faster than it counts."""
 GRACE = 5
 """Number of rows after the program's end in which modes may still tell why."""
+STANDS = 10
+"""Number of rows with the same set-point after which another program has taken the place of ours."""
 BEGINS = 5.0
 """Longest time in which the program has to begin [s]."""
 TELL_EVERY = 10.0
@@ -40,24 +44,33 @@ class Run:
         number: Number of the run.
         limits: Limits of the robot.
         lag: Lag of its `servoj`; None if it is not known.
+        check: Returns why the robot takes no program now, in words; called from another thread.
     """
 
     def __init__(
-        self, robot: CommandedRobot, place: Place, number: int, limits: ArmLimits, lag: ServoLag | None
+        self,
+        robot: CommandedRobot,
+        place: Place,
+        number: int,
+        limits: ArmLimits,
+        lag: ServoLag | None,
+        check: Callable[[], str | None],
     ) -> None:
         self._robot, self._number, self._window = robot, number, Window()
         stands, speed = np.array(robot.newest["target_q"]), max(limits.velocity)
         self._setpoints = Setpoints(stands, lag, fastest=speed, reach=np.array(limits.position))
         self._begun, self._plays = time.monotonic(), False
         self._waiting, self._settled, self._ending = False, 0, 0
+        self._follows, self._played, self._still = False, 0, 0
         self.ready = False
-        """Whether the program follows."""
+        """Whether the program follows what is added. It begins to between two ticks, so that no command comes first."""
         self.halt: Halt | None = None
         """Why it does not, and will not any more."""
-        self._told, self._told_at = (0, 0), 0.0
+        self._told, self._told_at = (0, 0, 0), 0.0
         robot.write((0,) * len(INPUTS))  # what an earlier run has left there is not played
-        text = program(number, speed=speed, deceleration=DECELERATION, lookahead=LOOKAHEAD, gain=GAIN)
-        self._upload = Upload(place, text)
+        deceleration = min(max(DECELERATION, speed / BRAKES), *limits.acceleration)
+        text = program(number, speed=speed, deceleration=deceleration, lookahead=LOOKAHEAD, gain=GAIN)
+        self._upload = Upload(place, text, check)
 
     @property
     def last(self) -> Sequence[float] | None:
@@ -75,31 +88,36 @@ class Run:
             setpoint = self._setpoints.next(command).tolist()
             if played:
                 self._window.add(setpoint)
-        elif played and self._waiting and self._settled > SETTLES:
+        elif played and (self._follows or (self._waiting and self._settled > SETTLES)):
             stands = self._robot.newest["target_q"] if self.last is None else self.last
             self._setpoints.begin(np.array(stands))
             self._window.add(stands)
+        self.ready = self._follows
 
-    def write(self, order: Order = Order.FOLLOW) -> None:
+    def write(self) -> None:
         """Write the newest set-points."""
+        self._write(self._number)
+
+    def _write(self, order: int) -> None:
         if self._window.number:
             self._robot.write(self._window.values(order))
 
     def end(self) -> None:
         """Let the program brake and end."""
-        self.write(Order.END)
+        self._write(0)
         self._upload.close()
-        self._waiting = self.ready = False
+        self._waiting = self._follows = self.ready = False
 
     def take(self, sight: Sight) -> str | None:
         """See by a row what has become of the program; return what people should know."""
-        state, ended, number, *missed = (
+        state, played, ended, number, alone, left_out = (
             int(self._robot.newest[f"output_int_register_{place}"][0])
-            for place in (STATE, ENDED, RUN, ALONE, LEFT_OUT)
+            for place in (STATE, PLAYED, ENDED, RUN, ALONE, LEFT_OUT)
         )
         self.halt = self.halt or halt_by_modes(sight.modes)
-        if number != self._number or not self._plays:
-            self._plays = number == self._number and sight.modes[2] == RuntimeState.PLAYING
+        ours = number == self._number
+        if not self._plays:
+            self._plays = ours and sight.modes[2] == RuntimeState.PLAYING
             if self.halt is None and self._upload.trouble is not None:
                 self.halt = Halt(self._upload.trouble, sight.modes[1])
             elif self.halt is None and time.monotonic() - self._begun > BEGINS:
@@ -108,21 +126,26 @@ class Run:
                 )
                 self.halt = Halt(f"{why}, then power on here", sight.modes[1])
             return None
-        ends = halt_by_program(ended, sight.modes)
+        self._still = self._still + 1 if state == State.FOLLOWING and played == self._played else 0
+        self._played = played
+        ends = halt_by_program(ended if ours else 0, sight.modes)
+        if ends is None and not (ours and self._still < STANDS):
+            ends = Halt(REPLACED, sight.modes[1])
         self._ending = 0 if ends is None else self._ending + 1
         if self._ending > GRACE:
             self.halt = self.halt or ends
-        self.ready = (state == State.FOLLOWING or self.ready) and self.halt is None
+        self._follows = (state == State.FOLLOWING or self._follows) and self.halt is None
         self._waiting = state == State.WAITING and self.halt is None
         self._settled += state == State.WAITING
-        return self._tell_missed((missed[0], missed[1]))
+        return self._tell_missed((alone, left_out, self._setpoints.limited))
 
-    def _tell_missed(self, missed: tuple[int, int]) -> str | None:
+    def _tell_missed(self, missed: tuple[int, int, int]) -> str | None:
         now = time.monotonic()
         if missed == self._told or now - self._told_at < TELL_EVERY:
             return None
         self._told, self._told_at = missed, now
         return (
             f"since the program began, the robot had no set-point in {missed[0]} periods and went on by itself, and "
-            f"{missed[1]} set-points came too late to be played: look at the network and at the load of this machine"
+            f"{missed[1]} set-points came too late to be played (look at the network and at the load of this machine); "
+            f"{missed[2]} were cut to the joints' range or to the speed cap"
         )

@@ -17,6 +17,8 @@ from tvist_server.ur_model import series
 MODEL, REMOTE = "get robot model", "is in remote control"
 QUESTIONS = MODEL, REMOTE
 """What the dashboard is asked."""
+LEAST_MINOR = {3: 14, 5: 9}
+"""Oldest software that our program is written for, by its major version; every later major version will do."""
 NEAR = 0.01
 """Largest angle by which joints may differ from where they should be [rad]."""
 SAME_MASS = 0.05
@@ -65,6 +67,16 @@ def remote_trouble(answers: Mapping[str, str]) -> str | None:
             "and end other clients"
         )
     return None
+
+
+def version_trouble(version: Sequence[int]) -> str | None:
+    """Return why software of a version (major, minor, …) does not run our program; None if it does."""
+    major, minor = version[:2]
+    least = LEAST_MINOR.get(major, 0 if major > max(LEAST_MINOR) else None)
+    if least is not None and minor >= least:
+        return None
+    own = f"{major}.{minor}"
+    return f"its software {own} may not run our program: update it to 5.9 or later, on a CB3 robot to 3.14 or later"
 
 
 def state_trouble(wanted: Wanted, sight: Sight, *, may_play: bool = False) -> str | None:

@@ -3,6 +3,7 @@
 import contextlib
 import socket
 import threading
+from collections.abc import Callable
 
 from tvist_server.moving.configuration import PRIMARY
 from tvist_server.moving.dashboard import asked
@@ -20,14 +21,16 @@ class Upload:
     Args:
         place: The robot.
         text: The program.
+        check: Returns why the robot takes no program now, in words; None if it does.
     """
 
-    def __init__(self, place: Place, text: str) -> None:
-        self._place, self._text = place, text
+    def __init__(self, place: Place, text: str, check: Callable[[], str | None]) -> None:
+        self._place, self._text, self._check = place, text, check
         self.trouble: str | None = None
         """Why the program cannot run, in words."""
         self._closed = threading.Event()
-        threading.Thread(target=self._run, name="tvist-upload", daemon=True).start()
+        self.thread = threading.Thread(target=self._run, name="tvist-upload", daemon=True)
+        self.thread.start()
 
     def close(self) -> None:
         """Let the connection go."""
@@ -40,7 +43,8 @@ class Upload:
         where = self._place.beside(PRIMARY)
         try:
             with socket.create_connection((where.host, where.port), PATIENCE) as connection:
-                if self._closed.is_set():  # a program that comes late would end its successor's motion
+                self.trouble = self._check()  # a program that comes late would end another one's motion
+                if self.trouble is not None or self._closed.is_set():
                     return
                 connection.sendall(self._text.encode())
                 connection.settimeout(LOOK_EVERY)

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Sequence
 
-from tvist_server.moving.registers import KEPT, MOST, Order
+from tvist_server.moving.registers import KEPT, MOST
 
 
 class Window:
@@ -24,11 +24,11 @@ class Window:
         self.number = self.number % MOST + 1
         self._kept.extendleft([setpoint] * (1 if self._kept else KEPT))
 
-    def values(self, order: Order) -> tuple[float, ...]:
+    def values(self, order: int) -> tuple[float, ...]:
         """Return the values of an input package, in the order of `registers.INPUTS`.
 
         Args:
-            order: What the program is to do.
+            order: Number of the run that is to follow; 0 to end it.
         """
         assert self.number, "a package has a set-point"
         return self.number, order, *(angle for one in self._kept for angle in one)

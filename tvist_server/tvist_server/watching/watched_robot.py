@@ -59,7 +59,7 @@ class WatchedRobot:
         self._place, self._model, self.payload = place, model, payload
         self._kinematics = ForwardKinematics(description)
         self._constants = [rating.torque_constant for rating in joint_ratings(description)]
-        self._sights: deque[Sight] = deque()
+        self._sights: deque[tuple[Sight, Row]] = deque()
         self._connection: Connection | None = None
         self.looked_at: list[Row] = []
         """Rows that were read before the first tick."""
@@ -97,7 +97,7 @@ class WatchedRobot:
         """Return the next row."""
         if not self._sights:
             raise PlantError(f"the robot at {self._place} has said nothing new")
-        self._last = self._sights.popleft()
+        self._last, self.newest = self._sights.popleft()
         return self._last
 
     def wait(self, timeout: float) -> bool:
@@ -133,7 +133,8 @@ class WatchedRobot:
             while len(rows) < LOOKED_AT:
                 rows += self._rows(1.0)
             self._check(rows[-1])
-            version = self._client.version
+            self.version = self._client.version
+            """Version of its software: major, minor, bugfix, build."""
             lacking = self._client.lacking
         finally:
             self.close()
@@ -148,7 +149,7 @@ class WatchedRobot:
             )
         self._count = RowCount(self._interval)
         self._last, self.newest = self._sight(rows[-1], 0), rows[-1]
-        software = ".".join(map(str, version[:3]))
+        software = ".".join(map(str, self.version[:3]))
         rate = INTERVALS[self._interval]
         self._notes.append(
             f"the robot at {self._place} (software {software}, {rate} rows a second) is {self.done}"
@@ -225,8 +226,7 @@ class WatchedRobot:
                 "at the network and at the load of this machine"
             )
             self._told_at, self._untold = now, 0
-        self._sights.append(self._sight(row, counted.tick))
-        self.newest = row
+        self._sights.append((self._sight(row, counted.tick), row))
 
     def _sight(self, row: Row, tick: int) -> Sight:
         sight = sight_of(row, self._constants, tick, self._count.missing, self._notes)
@@ -246,11 +246,11 @@ class WatchedRobot:
         if why == before or (before and isinstance(error, UnreachableError)):
             return
         self._lost = (since if before else now), why
-        latest = self._sights[-1] if self._sights else self._last
+        latest, row = self._sights[-1] if self._sights else (self._last, self.newest)
         modes = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
         told = (*self._notes, f"{why}; the state stands still, and a connection is tried every second")
         self._notes = []
-        self._sights.append(replace(latest, tick=self._count.silence(), modes=modes, told=told))
+        self._sights.append((replace(latest, tick=self._count.silence(), modes=modes, told=told), row))
 
 
 _NEXT = (
