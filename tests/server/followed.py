@@ -131,9 +131,9 @@ class OnRobot(Followed):
 
 
 class Alone(Followed):
-    """The program with nothing but registers, on an arm that follows `LAG` periods later."""
+    """The program with nothing but registers, on an arm that follows some periods later."""
 
-    def __init__(self, *, speed=0.5, deceleration=4.0, before=None):
+    def __init__(self, *, speed=0.5, deceleration=4.0, before=None, lag=LAG):
         super().__init__(speed, deceleration, H)
         self._ints, self._doubles, self._outputs = [0] * 48, [0.0] * 48, [0] * 48
         functions = {
@@ -142,7 +142,7 @@ class Alone(Followed):
             "read_input_integer_register": lambda place: self._ints[place],
             "read_input_float_register": lambda place: self._doubles[place],
             "write_output_integer_register": self._outputs.__setitem__,
-            "get_target_joint_positions": lambda: Array(tuple(([HERE] * LAG + self.told)[-LAG].tolist())),
+            "get_target_joint_positions": lambda: Array(tuple(([HERE] * lag + self.told)[-lag].tolist())),
             "servoj": self._servoj,
             "stopj": lambda _: iter([None] * 5),
             "textmsg": lambda *_: None,

@@ -200,6 +200,22 @@ def test_a_wrong_package_ends_it_and_it_says_why(change, why):
     assert robot.ended is why
 
 
+@pytest.mark.parametrize("wrong", [float("nan"), float("-inf"), 1e300, 3.0])
+def test_a_wrong_set_point_beside_the_one_that_is_played_ends_it(wrong):
+    """After a gap the program also reads the set-point before, for the velocity."""
+    path = swings(300, 0.4)
+    robot, _ = followed(path, [[k] for k in range(150)], 300)
+    robot.steps(3)
+    package = list(packages(path, 300)[154])
+    for at in range(14, 20):  # it plays the last but one
+        package[at] = wrong
+    robot.write(*package)
+    robot.steps(2)
+    robot.until_ended().assert_kept(robot.tick)
+    assert robot.ended is r.Ended.TOO_FAST
+    assert np.isfinite(robot.told).all()
+
+
 @pytest.mark.parametrize("away", [0.0099, -0.0101])
 def test_the_first_set_point_may_be_a_hundredth_of_a_radian_away(away):
     path = np.tile(HERE, (600, 1))
@@ -223,6 +239,14 @@ def test_registers_of_before_move_nothing():
     robot.until_ended(5000)
     assert robot.ended is r.Ended.SILENCE
     assert not robot.told
+
+
+@pytest.mark.parametrize(("lag", "why"), [(40, None), (120, r.Ended.STRAYED)])
+def test_an_arm_that_does_not_follow_ends_it(lag, why):
+    path = swings(400, 0.45)
+    robot, _ = followed(path, [[k] for k in range(300)], 300, lag=lag)
+    assert robot.state is (r.State.ENDED if why else r.State.FOLLOWING)
+    assert robot.ended is (why or r.Ended.NOT)
 
 
 @pytest.mark.parametrize("how", ["pause", "stop"])

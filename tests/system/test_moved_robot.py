@@ -220,6 +220,15 @@ def test_the_robot_s_own_slider_slows_motions(arm, bridge):
             with states_of(robot) as states:
                 control.move_j(beside(robot, 0.2), velocity=0.4)
             assert max(max(map(abs, state.target_qd)) for state in states) < 0.22
+            set_slider(0.0)
+            bridge.wait_until_said("slider of the robot is at 0 %")
+            stands = robot.state().target_q
+            moving = control.move_j(beside(robot, 0.2), velocity=0.4, wait=False)
+            robot.advance(100)
+            assert robot.state().target_q == stands
+            set_slider(1.0)
+            moving.wait()
+            assert robot.state().target_q != stands
         finally:
             set_slider(1.0)
         bridge.wait_until_said("slider of the robot is at 100 %")

@@ -173,6 +173,9 @@ def $name():
       if gap != 1:
         leap = new - last
         extra = change - own
+        if not (norm(own) <= 2.5 * most): # of all joints; one that was never played is checked here alone
+          why = $ended_too_fast
+        end
       elif norm(q - get_target_joint_positions()) > near:
         why = $ended_strayed
       end
