@@ -147,5 +147,5 @@ class Run:
         return (
             f"since the program began, the robot had no set-point in {missed[0]} periods and went on by itself, and "
             f"{missed[1]} set-points came too late to be played (look at the network and at the load of this machine); "
-            f"{missed[2]} were cut to the joints' range or to the speed cap"
+            f"{missed[2]} were cut to the joints' range or the speed cap by more than 1 mrad (move more slowly)"
         )

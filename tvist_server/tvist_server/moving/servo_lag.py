@@ -16,6 +16,9 @@ before a motion ends [s]."""
 GAIN = 2000.0
 """`gain` of `servoj`: the largest, for the same reason [1/s²]."""
 
+CUT = 1e-3
+"""Distance of a set-point from where it should be that counts [rad]."""
+
 
 @dataclass(frozen=True)
 class ServoLag:
@@ -51,7 +54,7 @@ class Setpoints:
     def __init__(self, q: Floats, lag: ServoLag | None, *, fastest: float, reach: Floats) -> None:
         self._lag, self._most, self._reach = lag, fastest * PERIOD, np.array(reach)
         self.limited = 0
-        """Number of set-points that are not as the lag needs them."""
+        """Number of set-points that are clearly not where they should be."""
         self.begin(q)
 
     def begin(self, q: Floats) -> None:
@@ -69,6 +72,6 @@ class Setpoints:
         self._q, self._qd = command.q, command.qd
         within = np.clip(wanted, -self._reach, self._reach)
         sent = np.clip(within, self._sent - self._most, self._sent + self._most)
-        self.limited += bool((sent != wanted).any())
+        self.limited += bool(np.abs(sent - wanted).max() > CUT)
         self._sent = sent
         return sent
