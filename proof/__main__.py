@@ -143,6 +143,14 @@ def _add_bridge(parts: Any, part: Callable[..., argparse.ArgumentParser]) -> Non
     faults.add_argument("--moments", type=_up_to(100_000), default=200, help="Number of moments [200].")
     faults.add_argument("--seed", type=_up_to(2**31 - 1), default=7, help="Seed of robot and moments [7].")
     faults.add_argument("--speed", type=float, default=1.0, help="Speed of the robot's time [1].")
+    count = part(
+        _count,
+        "count",
+        "Count the set-points that a moving robot misses, by its program and by its rows.",
+        among,
+    )
+    count.add_argument("--minutes", type=_minutes, default=30.0, help="Minutes [30].")
+    count.add_argument("--seed", type=_up_to(2**31 - 1), default=7, help="Seed of robot and motions [7].")
     loss = part(_loss, "loss", "See how late set-points come over a cable that loses packets.", among)
     loss.add_argument("--seconds", type=_up_to(86_400), default=60, help="Seconds of each share [60].")
     loss.add_argument(
@@ -353,6 +361,14 @@ def _faults(given: argparse.Namespace) -> int:
     for one in found:
         _tell(one)
     return 1 if found else 0
+
+
+def _count(given: argparse.Namespace) -> int:
+    from proof.bridge.count import report, tables
+
+    result = report(given.minutes, given.seed, _tell)
+    _print(result, given.json, tables(result))
+    return 0 if all(run["equal"] for run in result["runs"]) else 1
 
 
 def _loss(given: argparse.Namespace) -> int:

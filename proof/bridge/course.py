@@ -4,6 +4,7 @@ import selectors
 import socket
 import threading
 import time
+from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -11,12 +12,12 @@ import numpy.typing as npt
 
 from tvist_plant.plant import PERIOD
 from tvist_protocol.modes import RuntimeState
-from tvist_server.moving.registers import ALONE, ENDED, LEFT_OUT, NUMBER, PLAYED, STATE, State
+from tvist_server.moving.registers import ALONE, ENDED, LEFT_OUT, NUMBER, PLAYED, RUN, STATE, State
 from tvist_server.rtde.client import Row, RtdeClient
 from tvist_server.rtde.wire import Wire
 
 Floats = npt.NDArray[np.float64]
-_COUNTS = tuple(f"output_int_register_{place}" for place in (STATE, PLAYED, ENDED, ALONE, LEFT_OUT))
+_COUNTS = tuple(f"output_int_register_{place}" for place in (STATE, PLAYED, ENDED, ALONE, LEFT_OUT, RUN))
 _READ: dict[str, Wire] = {
     "timestamp": Wire.DOUBLE,
     "target_q": Wire.VECTOR6D,
@@ -86,6 +87,13 @@ class Watch:
     def speed(self) -> float:
         """Present speed of the fastest joint's target [rad/s]."""
         return max(map(abs, self._rows[-1]["target_qd"]))
+
+    def taken(self) -> Sequence[Row]:
+        """Return the rows so far, and forget them."""
+        count = len(self._rows)
+        rows = self._rows[:count]
+        del self._rows[:count]
+        return rows
 
     def since(self, first: int) -> "Course":
         """Return the rows from one on."""

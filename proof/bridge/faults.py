@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 
 from proof.bridge.course import STILL, Course, Watch, wait_for
 from proof.bridge.link import LinkProcess
-from proof.bridge.processes import Server, until_done
+from proof.bridge.processes import Server, bridge_to, hidden_robot, until_done, until_held
 from tvist_client import MotionStoppedError
 from tvist_client.blocking import Robot
 from tvist_client.blocking_classes import Arm
-from tvist_protocol.modes import RobotMode
 from tvist_server.moving.registers import Ended, State
 
 ROBOT, NEAR = "127.42.7.1", "127.42.7.2"
@@ -69,23 +68,12 @@ class Faults:
 
     def run(self, moments: int, progress: Callable[[str], None]) -> Sequence[Trial]:
         """Return what the faults have led to, which take turns."""
-        real = (
-            "--ur",
-            "--ur-address",
-            ROBOT,
-            "--profile",
-            "real",
-            "--shaper",
-            "none",
-            "--speed",
-            str(self._speed),
-        )
         trials = list[Trial]()
-        with Server("arm", *real, "--hidden", str(self._seed)) as arm:
+        with hidden_robot(ROBOT, self._seed, self._speed) as arm:
             with arm.connect() as there:
                 self._centre = list(there.state().target_q)
             with LinkProcess(ROBOT, NEAR, self._seed, 1.0 / self._speed) as link, Watch(ROBOT) as watch:
-                bridge = _bridge()
+                bridge = bridge_to(NEAR)
                 try:
                     for number in range(moments):
                         fault = list(EXPECTED)[number % len(EXPECTED)]
@@ -119,7 +107,7 @@ class Faults:
                 self._go_on(robot, arm)
         if fault == "kill":
             bridge.__exit__()
-            bridge = _bridge()
+            bridge = bridge_to(NEAR)
             with bridge.connect() as robot, robot.control("faults") as arm:
                 self._go_on(robot, arm)
         return self._judged(fault, watch.since(first), waited, braking, ended, told=told), bridge
@@ -134,23 +122,13 @@ class Faults:
     def _until_moving(self, bridge: Server, watch: Watch, robot: Robot, arm: Arm) -> tuple[int, int]:
         """Move until a random moment, unless the robot stops before; return numbers of the row and letter before it."""
         while True:
-            self._hold(robot, arm)
+            until_held(robot, arm, SPEED)
             first, said = watch.count, len(bridge.said)
             self._begin_a_move(robot, arm)
             time.sleep(self._random.uniform(0.05, 1.2) / self._speed)
             if watch.state is State.FOLLOWING:
                 return first, said
             self.others += 1
-
-    def _hold(self, robot: Robot, arm: Arm) -> None:
-        """Move by nothing, after a stop for which no fault was the cause once it is over."""
-
-        def hold() -> None:
-            if robot.state().robot_mode != RobotMode.RUNNING:
-                arm.power_on()
-            arm.move_j(robot.state().target_q, velocity=SPEED)
-
-        until_done(hold)
 
     def _begin_a_move(self, robot: Robot, arm: Arm) -> None:
         goal = list(self._centre)
@@ -160,7 +138,7 @@ class Faults:
 
     def _go_on(self, robot: Robot, arm: Arm) -> None:
         while True:
-            self._hold(robot, arm)
+            until_held(robot, arm, SPEED)
             goal = list(robot.state().target_q)
             goal[0] += 0.02 if goal[0] < self._centre[0] else -0.02
             try:
@@ -190,10 +168,6 @@ class Faults:
             case _:
                 _secondary("sec stopping():\n  protective_stop()\nend\n")
                 return _unlock
-
-
-def _bridge() -> Server:
-    return Server("bridge", "--plant", f"ur://{NEAR}", "--enable-motion")
 
 
 def _dashboard(line: str) -> str:

@@ -11,7 +11,9 @@ from typing import Self
 
 from tvist_client import RefusedError
 from tvist_client.blocking import Robot
+from tvist_client.blocking_classes import Arm
 from tvist_lab.served import free_endpoint
+from tvist_protocol.modes import RobotMode
 
 BEGINS = 120.0
 """Longest start of a server, which may have to compile [s]."""
@@ -27,17 +29,8 @@ class Server:
 
     def __init__(self, name: str, *options: str) -> None:
         self.name, self.endpoint, self._lines = name, free_endpoint(), list[str]()
-        command = [
-            sys.executable,
-            "-m",
-            "tvist_cli",
-            "serve",
-            "--name",
-            name,
-            "--listen",
-            self.endpoint,
-            *options,
-        ]
+        where = "--name", name, "--listen", self.endpoint
+        command = [sys.executable, "-m", "tvist_cli", "serve", *where, *options]
         self._process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         threading.Thread(target=self._read, daemon=True).start()
 
@@ -73,6 +66,28 @@ class Server:
     def signal(self, number: signal.Signals) -> None:
         """Send it a signal."""
         self._process.send_signal(number)
+
+
+def hidden_robot(address: str, seed: int, speed: float = 1.0) -> Server:
+    """Return a robot that shapes nothing, at an IP address, with what a seed hides, and a speed of its time."""
+    real = "--profile", "real", "--shaper", "none", "--speed", f"{speed:g}"
+    return Server("arm", "--ur", "--ur-address", address, *real, "--hidden", str(seed))
+
+
+def bridge_to(address: str) -> Server:
+    """Return a bridge that moves the robot at an IP address."""
+    return Server("bridge", "--plant", f"ur://{address}", "--enable-motion")
+
+
+def until_held(robot: Robot, arm: Arm, speed: float) -> None:
+    """Move by nothing at a speed [rad/s], after a stop for which nobody was the cause once it is over."""
+
+    def hold() -> None:
+        if robot.state().robot_mode != RobotMode.RUNNING:
+            arm.power_on()
+        arm.move_j(robot.state().target_q, velocity=speed)
+
+    until_done(hold)
 
 
 def until_done(do: Callable[[], object], seconds: float = 30.0) -> None:

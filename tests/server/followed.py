@@ -167,6 +167,11 @@ class Alone(Followed):
     def output(self, place):
         return self._outputs[place]
 
+    @property
+    def newest(self):
+        """The number that has come last."""
+        return self._ints[r.NUMBER]
+
 
 def packages(path, count, order=RUN):
     """The input packages of set-points: rows of a path, from the first on."""
