@@ -74,6 +74,7 @@ class Followed:
 
     def assert_kept(self, last_came):
         """Check all that holds whatever came; `last_came` is the tick of the last new number."""
+        assert (np.diff(self.at) == 1).all(), "a period in which it tells `servoj` nothing holds the arm back"
         told = np.array([HERE, *self.told])
         assert np.abs(np.diff(told, axis=0)).max(initial=0.0) <= self.most * (1 + 1e-9)
         played = np.array(self.numbers)[np.diff([0, *self.alone]) == 0]

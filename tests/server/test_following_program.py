@@ -103,7 +103,7 @@ def test_a_bad_link_shows_by_smooth_detours_that_fade(seed, speed, jitter, stall
     told, own = np.array(robot.told), of_path(path, robot.numbers)
     ways, own_ways = np.diff(told, axis=0), own[1:] - of_path(path, np.array(robot.numbers[1:]) - 1)
     assert np.abs(ways - own_ways).max() <= 2e-3
-    assert np.abs(np.diff(ways, axis=0)).max() / H**2 <= 40.0 * speed
+    assert np.abs(np.diff(ways, axis=0)).max() / H**2 <= 25.0 * speed
     fades = np.abs(told - own).max(axis=1)
     assert fades.max() <= 0.05 * speed
     assert fades[-1] <= 1e-3 * speed

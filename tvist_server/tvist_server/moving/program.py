@@ -52,9 +52,14 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         | {"deceleration": float(deceleration), "lookahead": float(lookahead), "gain": float(gain)}
         | {"silence": SILENCE, "first": FIRST, "away": AWAY, "fade": FADE, "again": AGAIN}
         | {
+            "leaps": " and ".join(f"norm(leap[{j}]) <= far" for j in range(JOINTS)),
+            "ways": "\n".join(
+                f"        if norm(way[{j}]) > most:\n          way[{j}] = change[{j}]\n        end"
+                for j in range(JOINTS)
+            ),
             "angles": ", ".join(
                 f"read_input_float_register({at})" for at in ("at", *(f"at + {k}" for k in range(1, JOINTS)))
-            )
+            ),
         }
     )
 
@@ -150,6 +155,7 @@ def $name():
     end
     newest = now
 
+    lone = blind
     blind = now < number
     if not blind:
       at = $SETPOINTS + 6 * (now - number)
@@ -170,7 +176,7 @@ def $name():
     else:
       own = new - previous # change of the set-points in this period
       leap = own
-      if gap != 1:
+      if gap != 1 or lone:
         leap = new - last
         extra = change - own
         if not (norm(own) <= 2.5 * most): # of all joints; one that was never played is checked here alone
@@ -181,14 +187,11 @@ def $name():
       end
       way = own + extra * keep - (q - previous) * pull
       far = most * gap
-      i = 0
-      while i < 6:
-        if not (norm(leap[i]) <= far): # nor is what is no number
+      if not (norm(leap) <= far and norm(way) <= most): # of all joints; only then a tick is to look at each
+        if not ($leaps): # nor is what is no number
           why = $ended_too_fast
-        elif norm(way[i]) > most:
-          way[i] = change[i]
         end
-        i = i + 1
+$ways
       end
       extra = way - own
       last = new
