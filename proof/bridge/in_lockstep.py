@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import structs
 
 from tvist_controller.api.line import Setup, body, load_calibration
-from tvist_controller.api.robot import Controller
+from tvist_controller.api.robot import Controller, Experience, Host, MotionStudent, Sink
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
@@ -75,6 +75,17 @@ class Way:
         return self._last
 
 
+class Heard(Sink):
+    """Keeps the events of a controller."""
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+
+    def event(self, event: Event) -> None:
+        """Keep one."""
+        self.events.append(event)
+
+
 class HiddenRobot:
     """A hidden robot with our controller.
 
@@ -84,18 +95,26 @@ class HiddenRobot:
         q: Joint angles at which it rests at first, shape (n,) [rad].
         payload: Declared payload.
         shaper: Its shaper.
+        learns: Whether it corrects motions that it makes again.
     """
 
     late = 0
     """Ticks by which its target is later than `wanted`."""
 
     def __init__(
-        self, description: RobotDescription, seed: int, q: Floats, payload: Payload, shaper: str = "none"
+        self,
+        description: RobotDescription,
+        seed: int,
+        q: Floats,
+        payload: Payload,
+        shaper: str = "none",
+        *,
+        learns: bool = False,
     ) -> None:
         self.plant = hidden_variant(seed).make(description, body(payload), seed)
         self.controller = Controller(setup_of(description, q, payload, shaper, seed), self.plant)
-        self._token = control(self.controller)
-        self.events: list[Event] = []
+        self._token, heard = control(self.controller), Heard()
+        self.events, self._host = heard.events, host_of(self.controller, heard, learns=learns)
 
     @property
     def robot(self) -> "HiddenRobot":
@@ -120,9 +139,8 @@ class HiddenRobot:
 
     def tick(self) -> State:
         """Advance by a control period."""
-        state, events = self.controller.tick()
-        self.events += events
-        return state
+        self._host.tick()
+        return self.controller.latest
 
 
 @dataclass
@@ -229,6 +247,7 @@ class Bridge:
         lag: Lag to compensate; None to send positions as they are. The robot's own if it is not given.
         lookahead: `lookahead_time` of `servoj` [s].
         gain: `gain` of `servoj`.
+        learns: Whether the controller in front corrects motions that it makes again.
     """
 
     def __init__(
@@ -242,6 +261,8 @@ class Bridge:
         lag: ServoLag | str | None = "own",
         lookahead: float = LOOKAHEAD,
         gain: float = GAIN,
+        *,
+        learns: bool = False,
     ) -> None:
         self.robot = HiddenRobot(description, seed, q, payload)
         speed = min(description.limits.velocity)
@@ -256,8 +277,8 @@ class Bridge:
             description, drives=structs.replace(description.drives, windup_feedforward=leads)
         )
         self.controller = Controller(setup_of(plain, q, payload, shaper, seed), self.port)
-        self._token = control(self.controller)
-        self.events: list[Event] = []
+        self._token, heard = control(self.controller), Heard()
+        self.events, self._host = heard.events, host_of(self.controller, heard, learns=learns)
         while self.port.output(r.STATE) != r.State.FOLLOWING:
             self.tick()
 
@@ -277,9 +298,8 @@ class Bridge:
 
     def tick(self) -> State:
         """Advance by a control period."""
-        state, events = self.controller.tick()
-        self.events += events
-        return state
+        self._host.tick()
+        return self.controller.latest
 
 
 def setup_of(description: RobotDescription, q: Floats, payload: Payload, shaper: str, seed: int) -> Setup:
@@ -288,6 +308,12 @@ def setup_of(description: RobotDescription, q: Floats, payload: Payload, shaper:
         description=description, q=tuple(q.tolist()), payload=payload, shaper=shaper, clock="free", seed=seed,
         calibration=load_calibration(f"{description.robot.name}_modal"),
     )  # fmt: skip
+
+
+def host_of(controller: Controller, sink: Sink, *, learns: bool) -> Host:
+    """Return what lets a controller tick, and learn from its motions if it is to."""
+    student = MotionStudent(controller.cycle.description)
+    return Host(controller, sink, experience=Experience([student]) if learns else None)
 
 
 def control(controller: Controller) -> str:
