@@ -15,6 +15,8 @@ AWAY = 0.01
 """Largest distance of a joint from the first set-point [rad]."""
 AGAIN = 0.016
 """Longest time from the arrival of the last set-point in which the next is expected to be on its way again [s]."""
+LATER = 3
+"""Number of periods in which set-points come too late until the program waits for them longer."""
 FADE = 0.05
 """Time constant with which a distance from the set-points fades [s]."""
 MARGIN = 1.05
@@ -50,7 +52,7 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         | {f"state_{one.name.lower()}": int(one) for one in State}
         | {"name": NAME, "run": run, "speed": float(MARGIN * speed)}
         | {"deceleration": float(deceleration), "lookahead": float(lookahead), "gain": float(gain)}
-        | {"silence": SILENCE, "first": FIRST, "away": AWAY, "fade": FADE, "again": AGAIN}
+        | {"silence": SILENCE, "first": FIRST, "away": AWAY, "fade": FADE, "again": AGAIN, "later": LATER}
         | {
             "leaps": " and ".join(f"norm(leap[{j}]) <= far" for j in range(JOINTS)),
             "ways": "\n".join(
@@ -117,6 +119,7 @@ def $name():
   alone = 0
   left_out = 0
   silence = 0.0
+  later = 0 # periods in which set-points came, but too late, since one had been early
   blind = True # whether the last period was without a set-point that had come
 
   why = $ended_not
@@ -142,8 +145,9 @@ def $name():
     end
     number = number + 1
     behind = now - number
-    if behind > 2 or (behind <= 0 and blind and now > newest): # set-points come later than at first, or less late
+    if behind > 2 or later > $later: # set-points come less late than at first, or later, and not for once
       number = now - 1
+      later = 0
     end
 
     if read_input_integer_register($ORDER) != $run:
@@ -173,7 +177,13 @@ def $name():
         way = change
       end
       alone = alone + 1
+      if silence == 0.0:
+        later = later + 1
+      end
     else:
+      if behind > 0:
+        later = 0
+      end
       own = new - previous # change of the set-points in this period
       leap = own
       if gap != 1 or lone:
