@@ -9,7 +9,6 @@ import msgspec
 from proof.bench.figure import Figure, figure
 from proof.bench.line import line, whole_motion
 from proof.bench.many_robots import memory, us_per_robot_and_tick
-from proof.bench.observed import observed
 from proof.bench.one_reader import one_reader
 from proof.bench.programs import programs
 from proof.bench.rtde import rtde
@@ -48,7 +47,7 @@ COMPUTED: Mapping[str, Callable[[Tell], dict[str, Figure]]] = {
 }
 """The parts that serve no robot, in the order in which they are measured."""
 SERVED: Mapping[str, Callable[[float, Tell], Coroutine[Any, Any, dict[str, Any]]]] = {
-    "served": one_robot, "reader": one_reader, "ur": rtde, "observers": observed, "memory": memory, "robots": _robots,
+    "served": one_robot, "reader": one_reader, "ur": rtde, "memory": memory, "robots": _robots,
 }  # fmt: skip
 """The parts that serve robots in real time, after `start`, which does so, too."""
 PARTS = (*COMPUTED, "start", *SERVED)
