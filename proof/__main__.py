@@ -45,18 +45,9 @@ def _parser() -> argparse.ArgumentParser:
         return one
 
     bench = part(_bench, "bench", "Measure speed, each figure beside a reference from the same run.")
-    bench.add_argument(
-        "--seconds",
-        type=_up_to(86_400),
-        default=10,
-        help="Seconds of each measurement of a robot in real time; 0 serves none [10].",
-    )
     bench.add_argument("--only", nargs="+", metavar="NAME", help="Parts to measure [all].")
     soak = part(_soak, "soak", "Serve a robot under load, and tell whether memory and timing stay stable.")
     soak.add_argument("minutes", type=_minutes)
-    late = part(_lateness, "lateness", "Compare the ticks that a robot misses with a bare thread's.")
-    late.add_argument("minutes", type=_minutes, help="for each: alone, with ten clients, with priority too")
-    late.add_argument("--only", nargs="+", metavar="NAME", help="Which of these to measure [all].")
     search = part(_search, "search", "Search for cases in which a robot breaks its promises.")
     for name, default, what in (
         ("stops", 100, "stops of every kind, at random moments of accepted moves"),
@@ -240,7 +231,7 @@ def _bench(given: argparse.Namespace) -> int:
 
     if unknown := set(given.only or ()) - set(PARTS):
         given.refuse(f"there is no part {min(unknown)}: the parts are {' '.join(PARTS)}")
-    result = bench(given.seconds, _tell, given.only or PARTS)
+    result = bench(_tell, given.only or tuple(PARTS))
     _print(result, given.json, tables(result))
     return 0
 
@@ -252,21 +243,6 @@ def _soak(given: argparse.Namespace) -> int:
     _print(
         result, given.json, [(("what", "figure"), [[key, f"{value:.6g}"] for key, value in result.items()])]
     )
-    return 0
-
-
-def _lateness(given: argparse.Namespace) -> int:
-    from proof.bench.on_time import STUDIES, on_time
-
-    if unknown := set(given.only or ()) - set(STUDIES):
-        given.refuse(f"there is no {min(unknown)}: there are {' '.join(STUDIES)}")
-    result: dict[str, dict[str, float]] = {}
-    try:
-        asyncio.run(on_time(given.minutes, _tell, result, given.only or tuple(STUDIES)))
-    finally:  # what was measured until Control+C counts
-        if result:
-            rows = [[name, *(f"{value:.4g}" for value in found.values())] for name, found in result.items()]
-            _print(result, given.json, [(("missed ticks", *next(iter(result.values()))), rows)])
     return 0
 
 

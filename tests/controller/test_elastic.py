@@ -336,7 +336,7 @@ def test_rounded_setpoints_make_little_torque_ripple(name, ticks, jitter):
         for tick in range(len(q)):
             for number, sent in due.get(tick, ()):
                 stream.offer(number + 1, sent)
-            found.append(cycle.step().fed_forward)
+            found.append(cycle.step().command.torque)
         torques.append(np.array(found))
     assert (np.abs(torques[1] - torques[0]) / LIMIT).max() <= 0.05
 

@@ -47,7 +47,7 @@ class Watched:
 
     def step(self):
         sample = self.cycle.step()
-        said = self.monitor.update(sample.signals, sample.fed_forward, sample.measured.moment)
+        said = self.monitor.update(sample.signals, sample.command.torque, sample.measured.moment)
         mass, bound = self.monitor.excess
         if self.monitor._time > 1.0 and np.isfinite(bound):
             self.worst = max(self.worst, abs(mass) / (TOLERATED + bound))

@@ -33,7 +33,7 @@ def test_pose_jacobian_and_bias_are_pinocchio_s():
 
 def test_a_pose_is_reached_near_the_posture_that_it_came_from():
     inverse, tool = InverseKinematics(SEVEN), ToolKinematics(SEVEN)
-    assert not inverse.closed_form
+    assert not inverse._closed
     random = np.random.default_rng(1)
     for q in random.uniform(-1.5, 1.5, (3, 7)):
         rotation, position = tool.pose(q)

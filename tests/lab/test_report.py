@@ -10,7 +10,7 @@ from tests.lab.synthetic_logs import SyntheticLog
 
 from tvist_lab.metrics import MotionResult
 from tvist_lab.recordings import RecordingError
-from tvist_lab.report import recordings_page, recordings_verdict, render
+from tvist_lab.report import of_recordings, recordings_page, render
 from tvist_lab.report.verdict import shaping_of, verdict_on_one
 
 LOUD, QUIET = ((9.0, 0.12, 1.0),), ((9.0, 0.12, 0.2),)
@@ -28,6 +28,13 @@ def log(tmp_path, name, modes, *, shaped_by=None, seed=1, motions=1):
         if ticks:
             early[-ticks:] = early[-ticks - 1]
     return made.csv(tmp_path / name)
+
+
+def recordings_verdict(paths):
+    """The sentences of the report's verdict, without its tables and figures."""
+    base, *others = of_recordings._files(paths)
+    compared = [(other, of_recordings.compare(base.measured, other.measured)) for other in others]
+    return of_recordings._verdict(base, compared)
 
 
 def test_less_vibration_is_said_with_its_figures_and_that_it_was_shaped(tmp_path):

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
@@ -86,7 +86,9 @@ class ServedRobot:
         info_of(self.controller)  # computes the slowest part of the description once, before the first tick
         self.recorder: Recorder | None = None
         if record is not None:
-            self.recorder = _recorder(
+            from tvist_server.recording import recorder  # with the library that writes
+
+            self.recorder = recorder.Recorder(
                 record,
                 info_of(self.controller),
                 setup.to_builtins(),
@@ -321,12 +323,6 @@ class ServedRobot:
     def warn(self, why: str) -> None:
         """Publish a warning to clients and the console."""
         self.driven.post(lambda: self._host.warn(why))
-
-
-def _recorder(*given: Any, **how: Any) -> "Recorder":
-    from tvist_server.recording.recorder import Recorder  # with the library that writes
-
-    return Recorder(*given, **how)
 
 
 def _planner(setup: Setup) -> Planner:

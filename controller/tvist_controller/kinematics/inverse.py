@@ -79,11 +79,6 @@ class InverseKinematics:
         _compile(*(CLOSED_FORM if self._closed else NUMERICAL))
         self._prepared = True
 
-    @property
-    def closed_form(self) -> bool:
-        """Whether the arm is solved in closed form."""
-        return self._closed
-
     def solve(self, rotation: Floats, position: Floats, near: Floats) -> Floats:
         """Return the posture nearest to another one, of all that have a pose.
 

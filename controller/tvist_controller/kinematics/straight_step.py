@@ -12,8 +12,6 @@ FOUND, IMPOSSIBLE, SINGULAR = 0, 1, 2
 
 BENT_SHARE = 0.5
 """Share of the joints' acceleration that the curvature of their way may use up at a constant speed [-]."""
-USED = 0.95
-"""Share of the joints' acceleration that is planned with; the rest is for the curvature within a tick [-]."""
 MORE = 1e-6
 """Share by which rounding may exceed a limit [-]."""
 LOOK = 5.0

@@ -54,8 +54,3 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
         """τ* of the rigid arm for the target, shape (n,) [N m]."""
         torque: Floats = self.signals[TORQUE]
         return torque
-
-    @property
-    def fed_forward(self) -> Floats:
-        """Torque with rotors and friction, as the drives receive it, shape (n,) [N m]."""
-        return self.command.torque

@@ -16,8 +16,6 @@ GUESS = (0.008, 0.04, 1500.0)
 """Delay [s], T [s] and k [1/s²] at which the search begins."""
 LATEST = 0.2
 """Longest delay that is searched [s]."""
-SETTLING = 0.25
-"""Time after a move in which it is compared [s]."""
 FOLLOWS = 0.02
 """Largest rms distance of an arm that follows so, as a share of its way [-]."""
 SURE = 0.3

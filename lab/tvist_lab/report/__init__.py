@@ -2,7 +2,7 @@
 
 from tvist_lab.report.of_advice import advice_page
 from tvist_lab.report.of_programs import programs_page
-from tvist_lab.report.of_recordings import recordings_page, recordings_verdict
+from tvist_lab.report.of_recordings import recordings_page
 from tvist_lab.report.of_studies import evaluation_page, shaperbench_page, study_page
 from tvist_lab.report.page import Page, PageTable, Picture, Section, render
 
@@ -15,7 +15,6 @@ __all__ = [
     "evaluation_page",
     "programs_page",
     "recordings_page",
-    "recordings_verdict",
     "render",
     "shaperbench_page",
     "study_page",

@@ -91,16 +91,6 @@ def recordings_page(
     return Page(title, _verdict(base, compared), sections)
 
 
-def recordings_verdict(paths: Sequence[Path]) -> list[str]:
-    """Return the sentences of the report's verdict, without its tables and figures.
-
-    Raises:
-        RecordingError: A file cannot be read, or has no joint angles; the message names it.
-    """
-    base, *others = _files(paths)
-    return _verdict(base, [(other, compare(base.measured, other.measured)) for other in others])
-
-
 def _verdict(base: _File, compared: Sequence[tuple[_File, Comparison]]) -> list[str]:
     if not compared:
         results = base.measured.results
