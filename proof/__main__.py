@@ -45,6 +45,12 @@ def _parser() -> argparse.ArgumentParser:
         return one
 
     bench = part(_bench, "bench", "Measure speed, each figure beside a reference from the same run.")
+    bench.add_argument(
+        "--seconds",
+        type=_up_to(86_400),
+        default=10,
+        help="Seconds of each measurement of a robot in real time; 0 serves none [10].",
+    )
     bench.add_argument("--only", nargs="+", metavar="NAME", help="Parts to measure [all].")
     soak = part(_soak, "soak", "Serve a robot under load, and tell whether memory and timing stay stable.")
     soak.add_argument("minutes", type=_minutes)
@@ -231,7 +237,7 @@ def _bench(given: argparse.Namespace) -> int:
 
     if unknown := set(given.only or ()) - set(PARTS):
         given.refuse(f"there is no part {min(unknown)}: the parts are {' '.join(PARTS)}")
-    result = bench(_tell, given.only or tuple(PARTS))
+    result = bench(given.seconds, _tell, given.only or PARTS)
     _print(result, given.json, tables(result))
     return 0
 

@@ -1,4 +1,4 @@
-"""Clients that read every state, each over its own connection, all in a process of their own.
+"""Clients that read every state, each over its own connection, all in this process.
 
     python -m proof.bench.observers ENDPOINT ROBOT COUNT
 
@@ -8,9 +8,6 @@ states that each received and missed.
 
 import json
 import sys
-from asyncio.subprocess import PIPE, create_subprocess_exec
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from functools import partial
 
 import zenoh
@@ -19,29 +16,6 @@ from zenoh.handlers import Callback
 from tvist_client.transports.session import close_session, open_session
 from tvist_protocol import keys
 from tvist_protocol.codec import decode_state
-
-
-@asynccontextmanager
-async def observed(endpoint: str, robot: str, count: int) -> AsyncIterator[list[dict[str, int]]]:
-    """Let clients read in a process of their own.
-
-    Yields:
-        A list, which at the end contains the numbers received and lost of each client.
-    """
-    said: list[dict[str, int]] = []
-    command = [sys.executable, "-m", "proof.bench.observers", endpoint, robot, str(count)]
-    # In a session of its own, Control+C leaves it to whoever measures.
-    process = await create_subprocess_exec(*command, stdin=PIPE, stdout=PIPE, start_new_session=True)
-    try:
-        assert process.stdout is not None
-        await process.stdout.readline()  # all clients are reading
-        yield said
-        out, _ = await process.communicate(b"")
-        said += json.loads(out)
-    finally:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()
 
 
 class Observer:

@@ -9,13 +9,14 @@ import math
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 from mcap.reader import make_reader
 
-from proof.bench.observers import observed
+from proof.bench.readers import readers
 from tvist_client.arm import Arm
 from tvist_client.errors import StreamStoppedError
 from tvist_client.servo import Servo
@@ -48,11 +49,11 @@ async def soak(minutes: float, tell: Callable[[str], None]) -> dict[str, Any]:
         path = Path(folder) / "soak.mcap"
         async with (
             served(["--record", str(path)]) as server,
-            observed(server.endpoint, "ur5e", OBSERVERS) as read,
+            _observed(server) as observed,
         ):
             watch = _Watch(server, 60.0 * minutes, tell)
             result = await watch.run()
-        return result | _observers(read) | _recording(path)
+        return result | _observers(observed) | _recording(path)
 
 
 class _Watch:
@@ -136,6 +137,11 @@ class _Watch:
         while True:
             await asyncio.sleep(1.0)
             await arm.keep_alive()
+
+
+def _observed(server: Served) -> AbstractAsyncContextManager[list[dict[str, int]]]:
+    """Run observers in a process; the list contains their final counts."""
+    return readers("observers", server.endpoint, "ur5e", str(OBSERVERS))
 
 
 def _observers(observed: list[dict[str, int]]) -> dict[str, int]:
