@@ -54,6 +54,9 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument("--only", nargs="+", metavar="NAME", help="Parts to measure [all].")
     soak = part(_soak, "soak", "Serve a robot under load, and tell whether memory and timing stay stable.")
     soak.add_argument("minutes", type=_minutes)
+    late = part(_lateness, "lateness", "Compare the ticks that a robot misses with a bare thread's.")
+    late.add_argument("minutes", type=_minutes, help="for each: alone, with ten clients, with priority too")
+    late.add_argument("--only", nargs="+", metavar="NAME", help="Which of these to measure [all].")
     search = part(_search, "search", "Search for cases in which a robot breaks its promises.")
     for name, default, what in (
         ("stops", 100, "stops of every kind, at random moments of accepted moves"),
@@ -249,6 +252,21 @@ def _soak(given: argparse.Namespace) -> int:
     _print(
         result, given.json, [(("what", "figure"), [[key, f"{value:.6g}"] for key, value in result.items()])]
     )
+    return 0
+
+
+def _lateness(given: argparse.Namespace) -> int:
+    from proof.bench.on_time import STUDIES, on_time
+
+    if unknown := set(given.only or ()) - set(STUDIES):
+        given.refuse(f"there is no {min(unknown)}: there are {' '.join(STUDIES)}")
+    result: dict[str, dict[str, float]] = {}
+    try:
+        asyncio.run(on_time(given.minutes, _tell, result, given.only or tuple(STUDIES)))
+    finally:  # what was measured until Control+C counts
+        if result:
+            rows = [[name, *(f"{value:.4g}" for value in found.values())] for name, found in result.items()]
+            _print(result, given.json, [(("missed ticks", *next(iter(result.values()))), rows)])
     return 0
 
 

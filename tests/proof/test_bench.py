@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from proof.__main__ import main
 from proof.bench.figure import figure, in_alternation, median_interval
+from proof.bench.on_time import Pair, compared, mean_interval
 
 
 def test_the_interval_of_a_median_holds_it_as_often_as_it_says():
@@ -33,13 +34,38 @@ def test_repetitions_alternate_forwards_and_backwards_after_a_first_one_that_doe
     assert taken == {"a": [3, 6], "b": [4, 5]}
 
 
+@pytest.mark.parametrize(("often", "ticks"), [(0.02, 1.0), (0.3, 5.0)])
+def test_the_interval_of_rare_misses_holds_their_mean(often, ticks):
+    chance, held = np.random.default_rng(0), []
+    for _ in range(60):
+        missed = 0.05 * chance.poisson(often, 200) * chance.geometric(1.0 / ticks, 200)
+        low, high = mean_interval(missed, 0.05)
+        held.append(low <= 0.05 * often * ticks <= high)
+    assert np.mean(held) >= 0.85
+
+
+def test_that_nothing_was_missed_proves_only_what_the_rule_of_three_says():
+    low, high = mean_interval([0.0] * 300, 0.05)
+    assert -low == pytest.approx(high)
+    assert high == pytest.approx(0.05 * 3 / 300, rel=0.01)
+
+
+def test_pairs_with_stolen_time_are_dropped_and_counted():
+    found = compared([Pair(0.2, 0.1, 0.0), Pair(0.1, 0.1, 1.0), Pair(40.0, 0.0, 1.1)])
+    assert (found["pairs"], found["dropped"], found["stolen_percent"]) == (2, 1, pytest.approx(0.7))
+    assert (found["robot_percent"], found["bare_percent"]) == pytest.approx((0.15, 0.1))
+    assert found["difference_points"] == pytest.approx(0.05)
+    assert found["lower_end_points"] <= 0.05 <= found["upper_end_points"]
+
+
 @pytest.mark.parametrize(
     ("words", "why"),
     [
         (["bench", "--only", "lines"], "no part lines: the parts are line motion"),
         (["bench", "--seconds", "-1"], "is -1"),
         (["soak", "0"], "is 0: must be more than 0"),
-        (["soak", "nan"], "is nan"),
+        (["lateness", "nan"], "is nan"),
+        (["lateness", "1", "--only", "eleven"], "there is no eleven: there are alone ten_clients"),
     ],
 )
 def test_what_cannot_be_measured_is_refused(words, why, capsys):
