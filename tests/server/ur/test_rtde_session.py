@@ -500,14 +500,22 @@ class TestOutputs:
         assert command.standard_analog_output_mask == 0b10
         assert b"standard_analog_output_0" in one.texts()[0]
 
-    def test_a_force_sensors_values_reach_the_robot_when_they_change(self, one):
+    def test_a_force_sensors_values_reach_the_robot_also_if_they_stay_the_same(self, one):
         names = ("external_force_torque",)
         one.started().with_inputs(names)
-        for force in (1.0, 2.0):
+        for force in (1.0, 2.0, 2.0):
             (command,) = one.put(1, names, (force,) * 6)
-            assert command.wrench == (force,) * 6
-            assert one.put(1, names, (force,) * 6) == []
+            assert (command.wrench, command.token) == ((force,) * 6, "the-token")
         assert one.texts() == []
+
+    def test_a_force_sensors_values_without_control_are_not_read_and_take_none(self, one, control):
+        names = ("external_force_torque",)
+        one.started().with_inputs(names)
+        control.has_control = False
+        for force in (1.0, 2.0):
+            assert one.put(1, names, (force,) * 6) == []
+        (text,) = one.texts()
+        assert b"external_force_torque is not read" in text
 
 
 CONVERSATION = [

@@ -87,22 +87,19 @@ class ForceFunctions:
         sensor_mass: object = 0,
         sensor_measuring_offset: object = NOWHERE,
         sensor_cog: object = NOWHERE,
-    ) -> None:
+    ) -> Turns:
         """Use the force sensor whose values clients write by RTDE; its mass is part of the payload to declare."""
         number("sensor_mass", sensor_mass, 0.0)
         numbers("sensor_cog", sensor_cog, 3)
         offset = numbers("sensor_measuring_offset", sensor_measuring_offset, 3)
-        self._access.force.use_external(offset if flag("enable", enable) else None)
+        if self._access.force.compliant is not None:
+            raise Fault(
+                "the force sensor stays the same in force mode and freedrive: call end_force_mode before"
+            )
+        self._access.force.external.use(offset if flag("enable", enable) else None)
+        yield  # what the program asks for next is told by that sensor
 
-    def enable_external_ft_sensor(
-        self,
-        enable: object,
-        sensor_mass: object = 0,
-        sensor_measuring_offset: object = NOWHERE,
-        sensor_cog: object = NOWHERE,
-    ) -> None:
-        """Do what `ft_rtde_input_enable` does; its older name."""
-        self.ft_rtde_input_enable(enable, sensor_mass, sensor_measuring_offset, sensor_cog)
+    enable_external_ft_sensor = ft_rtde_input_enable
 
     @costs(60)
     def tool_contact(self, direction: object = None) -> int:

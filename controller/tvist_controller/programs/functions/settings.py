@@ -104,6 +104,10 @@ class SettingFunctions:
     @costs(80)
     def zero_ftsensor(self) -> None:
         """Take the present force and torque at the tool as zero."""
+        try:
+            self._access.force.check_sensor()
+        except RefusalError as refusal:
+            raise Fault(refusal.reply.why) from refusal
         self._access.forces.zero()
 
     def _declare(

@@ -39,7 +39,6 @@ class InputWriter:
         self._complain = complain
         self._ledger = robot.inputs.ledger
         self._held: dict[str, Value] = {}
-        self._wrench: Value | None = None
 
     def write(self, values: dict[str, Value]) -> None:
         """Set the variables of one package; values that are not finite are refused one by one."""
@@ -55,10 +54,8 @@ class InputWriter:
         if len(registers) == len(values):
             return
         wrench = values.get("external_force_torque")
-        if isinstance(wrench, tuple) and wrench != self._wrench:
-            self._wrench = wrench
-            a, b, c, d, e, f = (float(number) for number in wrench)
-            self._control.ask(SetExternalWrench(wrench=(a, b, c, d, e, f)), self._answer_of({}))
+        if isinstance(wrench, tuple):
+            self._tell(wrench)
         if "speed_slider_mask" in values or "speed_slider_fraction" in values:
             self._set_speed()
         if any("_output" in name for name in values):
@@ -185,6 +182,19 @@ class InputWriter:
             return True
         self._complain(f"{name} is {value:g}: must be between 0 and 1")
         return False
+
+    def _tell(self, wrench: tuple[Number, ...]) -> None:
+        """Tell what a force sensor measures, also if that has not changed, since a silent one ends force mode.
+
+        Only a program of the client in control reads it, so nobody gets control by telling it.
+        """
+        if not self._control.has_control:
+            self._complain("external_force_torque is not read: only that of the client in control is")
+            return
+        a, b, c, d, e, f = (float(number) for number in wrench)
+        self._control.change(
+            lambda token: SetExternalWrench(token=token, wrench=(a, b, c, d, e, f)), self._answer_of({})
+        )
 
     def _change(self, values: dict[Hashable, object], command: Callable[[str], Command]) -> None:
         if self._control.held_by_other:
