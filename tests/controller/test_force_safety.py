@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import load
@@ -11,14 +13,25 @@ from tvist_protocol import commands as c
 from tvist_protocol import forces as f
 from tvist_protocol import motions as m
 from tvist_protocol.io import SetTcp
-from tvist_protocol.programs import ProgramPause, ProgramPlay
+from tvist_protocol.programs import ProgramPause, ProgramPlay, ProgramRun, ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.transitions import Activity
 
-from .forces import KINEMATICS, NOTHING, Feeling, feeling, force_mode, places, pressed, protective, touching
+from .forces import (
+    KINEMATICS,
+    NOTHING,
+    UR5E_IN_AIR,
+    Feeling,
+    feeling,
+    force_mode,
+    places,
+    pressed,
+    protective,
+    touching,
+)
 from .robots import H
-from .scripts import URSIM, failure, playing, said, start
+from .scripts import URSIM, failure, playing, said, script, start
 
 DOWN = "force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,-20,0,0,0], 2, [2,2,1.5,1,1,1])"
 ENABLE = "ft_rtde_input_enable(True, 0.3, [0.1, 0, 0], [0, 0, 0])"
@@ -309,3 +322,79 @@ def test_a_contact_is_judged_anew_when_the_force_is_taken_as_zero():
     plant.pushed[2] = 45.0
     robot.tick(50)
     assert robot.controller.io().output_int_register[0] > 0
+
+
+# ---------------------------------------------------------------- whatever happens
+
+OFFSETS = st.tuples(*[st.floats(-0.2, 0.2)] * 3, *[st.floats(-1.0, 1.0)] * 3)
+PROGRAMS = (
+    (DOWN, "movel(pose_trans(p[0.02,0,0.01,0,0,0], get_target_tcp_pose()), a=1, v=.1)", "end_force_mode()"),
+    ("thread keep():", "while True:", DOWN, "sync()", "end", "end", "t = run keep()",
+     "movel(pose_trans(p[0.02,0,0,0,0,0], get_target_tcp_pose()), a=1, v=.1, r=.005)", "sleep(.02)",
+     "movej(get_inverse_kin(pose_trans(p[0,0,0.02,0,0,0], get_target_tcp_pose())), a=1, v=.1)", "kill t", "stopl(5)"),
+    (ENABLE, "sync()", "zero_ftsensor()", DOWN, "set_tcp(p[0,0,.1,0,0,0])", "sleep(.1)"),
+    ("freedrive_mode([1,1,0,0,0,1])", "sleep(.1)", "end_freedrive_mode()", "speedl([0,0,.05,0,0,0], 1, .05)"),
+    (ENABLE, "sleep(1)"),
+)  # fmt: skip
+COMMANDS = st.one_of(
+    st.builds(
+        lambda compliant, wrench, kind, damping: (f.ForceMode, {
+            "compliant": compliant, "wrench": wrench, "limits": (0.2,) * 3 + (1e3,) * 3, "frame_type": kind,
+            "damping": damping}),
+        st.tuples(*[st.booleans()] * 6), st.tuples(*[st.floats(-60.0, 60.0)] * 3, *[st.floats(-8.0, 8.0)] * 3),
+        st.sampled_from([1, 2, 3]), st.floats(0.0, 1.0)),
+    st.builds(lambda free, frame: (f.Freedrive, {"free": free, "frame": frame}), st.tuples(*[st.booleans()] * 6),
+              st.sampled_from(["base", "tool"])),
+    st.builds(lambda xd: (m.SpeedL, {"xd": xd}), st.tuples(*[st.floats(-0.2, 0.2)] * 6)),
+    st.builds(lambda offset: (SetTcp, {"offset": offset}), OFFSETS),
+    st.builds(lambda mass: (c.SetPayload, {"mass": mass, "com": (0.0, 0.0, 0.05), "inertia": (0.0,) * 6}),
+              st.floats(0.0, 5.0)),
+    st.builds(lambda wrench: (f.SetExternalWrench, {"wrench": wrench}), st.tuples(*[st.floats(-90.0, 90.0)] * 6)),
+    st.builds(lambda lines: (ProgramRun, {"text": script(*lines)}), st.sampled_from(PROGRAMS)),
+    st.builds(lambda push: ("push", push), st.tuples(*[st.floats(-160.0, 160.0)] * 3)),
+    st.sampled_from([(one, {}) for one in (
+        f.EndForceMode, f.ZeroFtsensor, m.StopJ, ProgramPause, ProgramPlay, ProgramStop, c.Pause, c.PowerOff, c.PowerOn,
+        c.UnlockProtectiveStop, SimulationReset)]),
+    st.sampled_from([("protective stop", ()), ("safeguard", (True,)), ("safeguard", (False,))]),
+)  # fmt: skip
+
+
+@given(st.lists(st.tuples(COMMANDS, st.integers(1, 60)), min_size=1, max_size=12), st.booleans())
+def test_whatever_comes_in_between_force_control_keeps_to_its_limits_and_tells_how_it_ended(
+    sequence, lockstep
+):
+    robot, plant = feeling(clock="free" if lockstep else "realtime", lease_s=3600.0)
+    control, motion = robot.controller._force_control, robot.controller.motion
+    limits, started, reference = UR5E_IN_AIR.limits, None, [robot.states[-1].reference_q] * 2
+    for (kind, given_), ticks in [*sequence, ((m.StopJ, {}), 1500)]:
+        placements = robot.controller.cycle.placements
+        if kind == "push":
+            plant.pushed[:3] = given_
+        elif kind == "protective stop":
+            motion.protect("a test")
+        elif kind == "safeguard":
+            robot.controller._safety.safeguard(stopped=given_[0])
+        else:
+            robot.send(kind, **given_)
+        for _ in range(ticks):
+            told = len(robot.events)
+            state = robot.tick()
+            if robot.controller.cycle.placements != placements:
+                placements, reference = robot.controller.cycle.placements, [state.reference_q] * 2
+            reference = [*reference[-2:], state.reference_q]
+            steps = np.diff(reference, axis=0) / H
+            assert np.abs(steps).max() <= min(limits.velocity) * (1.0 + 1e-6)
+            assert np.abs(np.diff(steps, axis=0)).max() / H <= min(limits.acceleration) * (1.0 + 1e-6) + 1e-6
+            gives = control.compliant is not None
+            if gives:
+                assert motion.activity is Activity.GUIDED
+                assert (state.robot_mode, state.safety_mode) == (7, 1)
+            number = motion.motions._started if gives else None
+            if started not in {None, number}:
+                ends = [event for event in robot.events[told:] if event.kind == "motion_stopped"]
+                assert started in [event.id for event in ends]
+                assert all(event.why for event in ends)
+            started = number
+    ends = [event for event in robot.events if event.kind in {"motion_done", "motion_stopped"}]
+    assert len(ends) == robot.kinds().count("motion_started")
+    assert control.compliant is None

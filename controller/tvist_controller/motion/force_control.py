@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from tvist_controller.commands.events import Emit
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.kinematics.tool import turn, turned
+from tvist_controller.kinematics.tool import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.contact import ContactWatch
@@ -183,7 +183,7 @@ class ForceControl:
             stop.aim(np.zeros_like(state[0]), guidance.limits.acceleration)
         return Compliant(
             state, guidance.limits, guidance.reach, guidance.torque, PERIOD, tool=lambda: guidance.tool, inner=inner,
-            felt=self._felt, turn=turn, turned=turned,
+            felt=self._felt,
         )  # fmt: skip
 
     def _felt(self) -> Floats:

@@ -1,7 +1,6 @@
 """A reference that gives way to forces at the tool, while another one moves it in the other directions."""
 
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from tvist_controller.trajectory.force_law import ForceTask, compliant_velocity
 from tvist_controller.trajectory.guided import Guided, StuckError
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
+from tvist_controller.trajectory.tool_speed import ToolKinematics
 
 NEWTON = 3
 """Newton steps from the tool's pose to the joints' angles; two suffice for what the tool moves in a tick."""
@@ -24,20 +24,8 @@ CRAWL = 0.05
 """Share of it below which giving way counts as hindered by a singular posture [-]."""
 
 
-class Pose(Protocol):
-    """Kinematics of the tool centre point, in the base frame."""
-
-    def pose(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return its rotation matrix, shape (3, 3), and its position, shape (3,) [m]."""
-
-    def inverse(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return the Jacobian, and its pseudo-inverse without the directions that are lost, shape (n, 6)."""
-
-
 Frame = Callable[[tuple[Floats, Floats], Floats], Floats]
 """Axes of the task as columns in the base frame, shape (3, 3), from the tool's pose and its velocity, shape (3,)."""
-Turn = Callable[[Floats, Floats], Floats]
-"""Rotation vector from one rotation matrix to another, see `turn`."""
 
 
 class Compliant(Following):
@@ -54,8 +42,6 @@ class Compliant(Following):
         tool: Returns the kinematics of the tool centre point, which another one may replace at any time.
         inner: The reference that moves the tool otherwise, which continues from the same state.
         felt: Returns force and torque on the tool centre point in the last tick, base frame, shape (6,) [N, N m].
-        turn: Rotation vector from one rotation matrix to another.
-        turned: Turns a rotation matrix by a rotation vector.
     """
 
     def __init__(
@@ -66,16 +52,14 @@ class Compliant(Following):
         torque: TorqueRoom,
         period: float,
         *,
-        tool: Callable[[], Pose],
+        tool: Callable[[], ToolKinematics],
         inner: Guided | Rest,
         felt: Callable[[], Floats],
-        turn: Turn,
-        turned: Turn,
     ) -> None:
         super().__init__(state, _abrupt(limits, period), reach, torque, period)
         self._tool, self.inner = tool, inner
         """The reference that moves the tool otherwise."""
-        self._felt, self._turn, self._turned = felt, turn, turned
+        self._felt = felt
         self._speed: tuple[float, float | None] = (1.0, None)
         self._task: ForceTask | None = None
         self._frame: Frame = lambda _pose, _velocity: np.eye(3)
@@ -85,7 +69,7 @@ class Compliant(Following):
         """Share of the law's velocity that a singular posture permits, of the last tick [-]."""
         self._begin(tool())
 
-    def _begin(self, kinematics: Pose) -> None:
+    def _begin(self, kinematics: ToolKinematics) -> None:
         """Let a tool centre point give way from the joints' present motion on."""
         q, qd, _ = self.state
         self.kinematics = kinematics
@@ -183,17 +167,17 @@ class Compliant(Following):
             return self._moved
         rotation, position = self._nominal
         self._nominal = there = self.kinematics.pose(self.inner.next())
-        way = np.concatenate((there[1] - position, self._turn(rotation, there[0])))
+        way = np.concatenate((there[1] - position, self.kinematics.turn(rotation, there[0])))
         self._moved = way / self._period
         return self._moved
 
     def _shifted(self, pose: tuple[Floats, Floats], way: Floats) -> tuple[Floats, Floats]:
-        return self._turned(pose[0], way[3:]), pose[1] + way[:3]
+        return self.kinematics.turned(pose[0], way[3:]), pose[1] + way[:3]
 
     def _off(self, q: Floats) -> Floats:
         """What the pose lacks to the one that is followed, shape (6,) [m, rad]."""
         rotation, position = self.kinematics.pose(q)
-        return np.concatenate((self._pose[1] - position, self._turn(rotation, self._pose[0])))
+        return np.concatenate((self._pose[1] - position, self.kinematics.turn(rotation, self._pose[0])))
 
     def _joints(self, q: Floats, inverse: Floats) -> tuple[Floats, Floats]:
         """Joints that reach the pose, from those nearby, and what is lacking then."""

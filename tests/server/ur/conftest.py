@@ -37,7 +37,6 @@ class FakeControl:
         self.commands = []
         self.reply = Done()
         self.held_by_other = False
-        self.has_control = True
         self.left = 0
         self._waiting = None
 

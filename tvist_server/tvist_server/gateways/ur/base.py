@@ -41,10 +41,6 @@ class ControllerAccess(Protocol):
         """Give back control, if this access held it."""
 
     @property
-    def has_control(self) -> bool:
-        """Whether the client's host is known to have control."""
-
-    @property
     def held_by_other(self) -> bool:
         """Whether another client is known to have control, so that commands that change something are refused."""
 

@@ -93,11 +93,6 @@ class HostLease:
             self.ask(KeepAlive(token=self._token), _nothing)
 
     @property
-    def has_control(self) -> bool:
-        """Whether this host has control."""
-        return self._desk.holder() == self.client
-
-    @property
     def held_by_other(self) -> bool:
         """Whether another client has control."""
         return self._desk.holder() not in {None, self.client}
@@ -161,10 +156,6 @@ class ConnectionControl(ControllerAccess):
             self.hear(lambda: then(reply))
 
         return counted
-
-    @property
-    def has_control(self) -> bool:
-        return self._lease.has_control
 
     @property
     def held_by_other(self) -> bool:

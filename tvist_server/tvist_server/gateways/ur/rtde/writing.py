@@ -54,8 +54,12 @@ class InputWriter:
         if len(registers) == len(values):
             return
         wrench = values.get("external_force_torque")
-        if isinstance(wrench, tuple):
-            self._tell(wrench)
+        io = self._io
+        if (
+            isinstance(wrench, tuple) and io is not None and io.program_state != "STOPPED"
+        ):  # else nobody reads it
+            a, b, c, d, e, f = (float(number) for number in wrench)
+            self._change({}, lambda token: SetExternalWrench(token=token, wrench=(a, b, c, d, e, f)))
         if "speed_slider_mask" in values or "speed_slider_fraction" in values:
             self._set_speed()
         if any("_output" in name for name in values):
@@ -183,22 +187,11 @@ class InputWriter:
         self._complain(f"{name} is {value:g}: must be between 0 and 1")
         return False
 
-    def _tell(self, wrench: tuple[Number, ...]) -> None:
-        """Tell what a force sensor measures, also if that has not changed, since a silent one ends force mode.
-
-        Only a program of the client in control reads it, so nobody gets control by telling it.
-        """
-        if not self._control.has_control:
-            self._complain("external_force_torque is not read: only that of the client in control is")
-            return
-        a, b, c, d, e, f = (float(number) for number in wrench)
-        self._control.change(
-            lambda token: SetExternalWrench(token=token, wrench=(a, b, c, d, e, f)), self._answer_of({})
-        )
-
     def _change(self, values: dict[Hashable, object], command: Callable[[str], Command]) -> None:
         if self._control.held_by_other:
-            self._complain("another client has control: speed and outputs stay as they are")
+            self._complain(
+                "another client has control: speed and outputs stay as they are, and forces are not read"
+            )
             return
         self._ledger.ask(values)
         self._control.change(command, self._answer_of(values))
