@@ -129,6 +129,16 @@ def test_a_sensor_of_ones_own_does_not_hide_that_the_arms_own_feels_too_much():
     assert "force at the tool is 260 N, above 250 N" in protective(robot)[0]
 
 
+def test_the_end_of_the_program_that_uses_a_sensor_ends_a_clients_force_mode_with_it():
+    robot, _ = feeling()
+    start(robot, ENABLE, "sleep(.1)")
+    sensed(robot, 10)
+    assert force_mode(robot) == Accepted(id=1)
+    sensed(robot, 60)
+    (stopped,) = [event for event in robot.events if event.kind == "motion_stopped"]
+    assert stopped.why == "forces are now those of the arm's force sensor"
+
+
 def test_the_sensor_cannot_be_changed_in_force_mode():
     robot, _ = feeling()
     sense(robot)
@@ -352,10 +362,12 @@ COMMANDS = st.one_of(
     st.builds(lambda wrench: (f.SetExternalWrench, {"wrench": wrench}), st.tuples(*[st.floats(-90.0, 90.0)] * 6)),
     st.builds(lambda lines: (ProgramRun, {"text": script(*lines)}), st.sampled_from(PROGRAMS)),
     st.builds(lambda push: ("push", push), st.tuples(*[st.floats(-160.0, 160.0)] * 3)),
+    st.just(("push", (np.nan, 0.0, 0.0))),
     st.sampled_from([(one, {}) for one in (
         f.EndForceMode, f.ZeroFtsensor, m.StopJ, ProgramPause, ProgramPlay, ProgramStop, c.Pause, c.PowerOff, c.PowerOn,
         c.UnlockProtectiveStop, SimulationReset)]),
     st.sampled_from([("protective stop", ()), ("safeguard", (True,)), ("safeguard", (False,))]),
+    st.builds(lambda fraction: (c.SetSpeed, {"fraction": fraction}), st.floats(0.05, 1.0)),
 )  # fmt: skip
 
 
