@@ -51,13 +51,7 @@ class Forces(Protocol):
         """Return force and torque at the tool centre point in a tick, base frame, shape (6,) [N, N m]."""
 
     def unexplained(self, sample: Sample, wrench: Floats, *, zeroed: bool) -> Floats:
-        """Return the force in a sensor's wrench that is neither weight nor inertia of the payload, shape (3,) [N].
-
-        Args:
-            sample: The tick.
-            wrench: What the sensor measured, see `Measurement.wrench`.
-            zeroed: Whether what was taken as zero is of this sensor.
-        """
+        """Return the force in a sensor's wrench that is neither weight nor inertia of the payload, shape (3,) [N]."""
 
     def forget_zero(self) -> None:
         """Take nothing as zero any longer."""
@@ -129,15 +123,8 @@ class ForceControl:
     def free(self, axes: Floats, feature: Feature) -> int:
         """Let the arm be moved by hand along and about some axes, shape (6,), each 0 or 1; else as `begin`."""
         mass, damping = HEAVY if self._cycle.sample.measured.wrench is None else LIGHT
-        task = ForceTask(
-            axes,
-            np.zeros(6),
-            np.where(axes > 0.0, HAND_SPEED, np.inf),
-            (damping / FREE_DAMPING) ** 4,
-            1.0,
-            mass,
-            damping,
-        )
+        speeds = np.where(axes > 0.0, HAND_SPEED, np.inf)
+        task = ForceTask(axes, np.zeros(6), speeds, (damping / FREE_DAMPING) ** 4, 1.0, mass, damping)
         return self.begin(task, feature, 2, "freedrive")
 
     def end(self) -> None:
@@ -216,14 +203,15 @@ class ForceControl:
         ]
         if self._contact.awake:
             self._contact.note(pressed[0] if pressed else self._forces.felt(sample)[:3])
-        why = self._excess(sample, max((float(np.linalg.norm(force)) for force in pressed), default=0.0))
+        why = self._excess(sample, float(np.max([np.linalg.norm(force) for force in pressed], initial=0.0)))
         self._beyond = 0 if why is None else self._beyond + 1
         if why is not None and self._beyond > TICKS:
             self._beyond = 0
             self._motion.protect(why, "limit_force")
         return sample
 
-    def _source_of(self, sample: Sample, external: Floats | None) -> str:
+    @staticmethod
+    def _source_of(sample: Sample, external: Floats | None) -> str:
         if external is not None:
             return "the external force sensor"
         return "the drives' torques" if sample.measured.wrench is None else "the arm's force sensor"

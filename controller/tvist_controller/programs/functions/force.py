@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tvist_controller.line.differentiator import Floats
 from tvist_controller.motion.task_frame import Feature
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number, numbers, pose, shown
@@ -108,13 +109,13 @@ class ForceFunctions:
         return self._access.force.touched(way)
 
 
-def _choice(name: str, value: object) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _choice(name: str, value: object) -> Floats:
     return np.array(
         [integer(f"{name}[{k}]", one, 0, 1) for k, one in enumerate(numbers(name, value, 6))], float
     )
 
 
-def _limits(value: object) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _limits(value: object) -> Floats:
     found = [number(f"limits[{k}]", one, 0.0) for k, one in enumerate(numbers("limits", value, 6))]
     return np.minimum(found, MOST_LIMIT)
 
