@@ -121,7 +121,9 @@ class Controller(WholeRobot):
             else LiveCell(setup.cell, setup.description, self.cycle.line.plant, self.peripherals, self._emit)
         )
         """What stands around the robot; None for nothing."""
-        self._force_control = ForceControl(Guidance(self.motion), self.forces.felt)
+        self._force_control = ForceControl(
+            Guidance(self.motion), self.forces, self._emit, timeouts=setup.clock == "realtime"
+        )
         self.programs = ProgramPlayer(self._access(), safety)
         self._told_program = self.programs.progress
         self.filters = Filters(self.motion, first.source, setup.payload, self._emit)
@@ -295,7 +297,7 @@ class Controller(WholeRobot):
                 raise failed
             sample = self.motion.step()
             self._safety.watch(sample)
-            self._force_control.watch(sample)
+            sample = self._force_control.watch(sample)
             if self.cell is not None:
                 self.cell.tick(self.tick_number + 1, sample.measured.q)
         except PlantError as error:
@@ -462,6 +464,7 @@ class Controller(WholeRobot):
         self.modes.update()
         self.report = self._report(self.cycle.sample)
         self._payload.begin_anew()
+        self._force_control.begin_anew()
         self.programs.steadiness.forget()
         return Done(tick=self.tick_number)
 

@@ -75,7 +75,12 @@ class ZeroFtsensor(ClientMessage, frozen=True, kw_only=True, tag="zero_ftsensor"
 
 
 class SetExternalWrench(ClientMessage, frozen=True, kw_only=True, tag="set_external_wrench"):
-    """Tell what a force sensor of one's own measures; it counts once a program has called `ft_rtde_input_enable`."""
+    """Tell what a force sensor of one's own measures; it counts once a program has called `ft_rtde_input_enable`.
 
+    Force mode does not begin before the first value, and ends when none comes for 100 ms, unless a client steps time.
+    """
+
+    token: Token
+    """Token of the lease."""
     wrench: Wrench
     """Force [N] and torque [N m] in the directions of the flange frame, with the weight of what the sensor carries."""

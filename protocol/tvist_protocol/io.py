@@ -77,7 +77,7 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     tool_digital_output1_mode: int = 1
     """What the second digital output of the tool does."""
     tcp_force_zero: list[float] | None = None
-    """Force and torque that count as zero since a program zeroed them, in the base frame [N, N m]; null: none."""
+    """Force and torque that count as zero: of a sensor in its frame, else at the tool in the base frame [N, N m]."""
     assumed_payload: Payload | None = None
     """Payload that the robot has found and moves with, instead of the declared one; null while that is assumed."""
     actual_TCP_force: list[float] | None = None

@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.touching_arm import TouchingArm
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.trajectory.force_law import ForceTask, compliant_velocity
-from tvist_plant.description import Payload as Body
-from tvist_plant.plant import GRAVITY, PERIOD, Measurement
+from tvist_plant.plant import PERIOD
 from tvist_protocol import forces as f
 from tvist_protocol import motions as m
 from tvist_protocol.io import SetTcp
@@ -18,64 +15,9 @@ from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
-from .robots import UR5E, H, NoArm, Robot
+from .forces import KINEMATICS, UR5E_IN_AIR, feeling, force_mode, places, pressed, touching
+from .robots import UR5E, H, Robot
 from .scripts import URSIM, failure, playing, said, start
-
-KINEMATICS = ToolKinematics(UR5E)
-NOTHING = Payload(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
-LIMITS = (0.1, 0.1, 0.1, 0.5, 0.5, 0.5)
-Z = (False, False, True, False, False, False)
-ALL = (True,) * 6
-UR5E_IN_AIR = UR5E.quiet().without_floor()
-
-
-class Feeling(NoArm):
-    """Follows its commands, and has a force sensor that feels a push in the base frame, and a weight."""
-
-    def __init__(self):
-        self.push, self.weight, self.com = np.zeros(6), 0.0, np.zeros(3)
-
-    def step(self, command):
-        measured = super().step(command)
-        rotation = KINEMATICS.pose(command.q)[0]
-        weight = rotation.T @ np.array([0.0, 0.0, -GRAVITY * self.weight])
-        push = np.concatenate((rotation.T @ self.push[:3], rotation.T @ self.push[3:]))
-        wrench = push + np.concatenate((weight, np.cross(self.com, weight)))
-        return Measurement(measured.q, measured.qd, measured.moment, measured.accelerometer, wrench=wrench)
-
-
-def feeling(**changes):
-    plant = Feeling()
-    robot = Robot(**({"q": URSIM, "plant": plant, "description": UR5E_IN_AIR, "payload": NOTHING} | changes))
-    robot.tick(2)
-    return robot, plant
-
-
-def touching(stiffness, *, gap=0.002, sensor=True, q=URSIM):
-    damping = 0.1 * np.sqrt(5.0 * stiffness)
-    plant = TouchingArm(UR5E_IN_AIR, Body(), stiffness=stiffness, damping=damping, sensor=sensor)
-    robot = Robot(q=q, plant=plant, description=UR5E_IN_AIR, payload=NOTHING, shaper="none")
-    robot.tick(2)
-    plant.height = robot.states[-1].actual_TCP_pose[2] - gap if stiffness else -1e9
-    return robot, plant
-
-
-def pressed(robot, plant, ticks):
-    """Force of the surface in each tick [N]."""
-    forces = []
-    for _ in range(ticks):
-        robot.tick()
-        forces.append(plant.force[2])
-    return np.array(forces)
-
-
-def places(robot):
-    return np.array([KINEMATICS.pose(np.array(state.reference_q))[1] for state in robot.states])
-
-
-def force_mode(robot, compliant=Z, wrench=(0.0,) * 6, **fields):
-    return robot.send(f.ForceMode, compliant=compliant, wrench=wrench, **fields)
-
 
 # ---------------------------------------------------------------- the law
 
@@ -115,7 +57,7 @@ def test_axes_that_do_not_give_way_feel_nothing_and_lose_the_speed_they_had(forc
 def test_a_sensor_is_read_without_the_weight_of_the_payload_however_the_tool_turns():
     payload = Payload(mass=2.0, com=(0.01, -0.02, 0.05), inertia=(0.0,) * 6)
     robot, plant = feeling(payload=payload)
-    plant.weight, plant.com, plant.push = (
+    plant.weight, plant.com, plant.pushed = (
         2.0,
         np.array(payload.com),
         np.array([4.0, -3.0, 12.0, 0.0, 0.0, 0.0]),
@@ -142,7 +84,7 @@ def test_zeroing_a_sensor_takes_away_an_offset_of_its_own_frame():
     robot.tick()
     assert robot.send(f.ZeroFtsensor) == Done()
     assert robot.controller.forces.wrench() == pytest.approx([0.0] * 6, abs=1e-12)
-    plant.weight, plant.push = 0.0, np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.0])
+    plant.weight, plant.pushed = 0.0, np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.0])
     state = robot.tick()
     rotation = KINEMATICS.pose(np.array(state.actual_q))[0]
     zero = rotation @ np.array(robot.controller.io().tcp_force_zero[:3])
@@ -330,7 +272,7 @@ def test_whatever_is_commanded_and_pushes_the_joints_keep_their_limits_and_come_
         elif kind == "servo_j":
             robot.send(m.ServoJ, q=tuple(np.array(URSIM) + given_[0]))
         elif kind == "push":
-            plant.push[:3] = given_[0]
+            plant.pushed[:3] = given_[0]
         else:
             robot.send(f.EndForceMode if kind == "end_force_mode" else m.StopJ)
         robot.tick(ticks)
@@ -348,7 +290,7 @@ def test_a_compliant_axis_keeps_its_speed_limit_and_the_others_their_place():
     robot, plant = feeling()
     limits = (0.1, 0.1, 0.02, 0.5, 0.5, 0.5)
     force_mode(robot, wrench=(0.0, 0.0, -100.0, 0.0, 0.0, 0.0), limits=limits, damping=0.0)
-    plant.push[:2] = 60.0, -80.0
+    plant.pushed[:2] = 60.0, -80.0
     robot.tick(500)
     way = np.diff(places(robot), axis=0) / H
     assert np.abs(way[:, 2]).max() == pytest.approx(0.02, abs=1e-6)
@@ -358,7 +300,7 @@ def test_a_compliant_axis_keeps_its_speed_limit_and_the_others_their_place():
 @pytest.mark.parametrize("push", [(0.0, 0.0, 260.0), (200.0, 200.0, 0.0)])
 def test_a_force_beyond_what_a_robot_bears_is_a_protective_stop(push):
     robot, plant = feeling()
-    plant.push[:3] = push
+    plant.pushed[:3] = push
     robot.tick(5)
     assert "protective_stop" not in robot.kinds()
     robot.tick(5)
@@ -399,12 +341,12 @@ def test_end_force_mode_needs_something_to_end_and_force_mode_an_arm_that_may_be
 def test_the_arm_follows_a_hand_along_the_free_axes_and_stops_when_it_lets_go():
     robot, plant = feeling()
     assert robot.send(f.Freedrive, free=(True, False, True, False, False, False)) == Accepted(id=1)
-    plant.push[:3] = 20.0, 20.0, 0.0
+    plant.pushed[:3] = 20.0, 20.0, 0.0
     robot.tick(500)
     way = places(robot)[-1] - places(robot)[0]
     assert way[0] > 0.08
     assert abs(way[1]) < 1e-6
-    plant.push[:] = 0.0
+    plant.pushed[:] = 0.0
     robot.tick(600)
     assert np.abs(np.diff(places(robot)[-2:], axis=0)).max() / H < 5e-3
 
@@ -414,7 +356,7 @@ def test_a_hand_cannot_push_the_arm_through_a_singular_posture():
     robot, plant = feeling()
     start(robot, "freedrive_mode()", "while True:", "write_output_integer_register(0, get_freedrive_status())",
           "sync()", "end")  # fmt: skip
-    plant.push[:3] = 0.0, -60.0, 20.0
+    plant.pushed[:3] = 0.0, -60.0, 20.0
     robot.tick(3000)
     assert robot.controller.io().output_int_register[0] > 0
     assert playing(robot)

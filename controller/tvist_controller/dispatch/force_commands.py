@@ -47,15 +47,16 @@ class ForceCommands:
         self._control.end()
 
     def _zero(self, _: Call[m.ZeroFtsensor]) -> None:
+        self._control.check_sensor()
         self._forces.zero()
 
     def _sense(self, call: Call[m.SetExternalWrench]) -> None:
-        self._control.sense(np.array(call.command.wrench, dtype=float))
+        self._control.external.sense(np.array(call.command.wrench, dtype=float))
 
     rows: ClassVar[tuple[Row, ...]] = (
         Row(m.ForceMode, _force_mode),
         Row(m.Freedrive, _freedrive),
         Row(m.EndForceMode, _end, stops=True),
         Row(m.ZeroFtsensor, _zero, changes_io=True),
-        Row(m.SetExternalWrench, _sense, lease="none"),
+        Row(m.SetExternalWrench, _sense),
     )

@@ -183,8 +183,8 @@ class Peripherals:
         """Set the supply of the tool [V]."""
         self._tool_voltage, self.changed = voltage, True
 
-    def zero_wrench(self, wrench: list[float]) -> None:
-        """Take a force and torque at the tool as zero, base frame [N, N m]."""
+    def zero_wrench(self, wrench: list[float] | None) -> None:
+        """Take a force and torque as zero, see `wrench_zero`; None for nothing [N, N m]."""
         self.wrench_zero, self.changed = wrench, True
 
     def bit(self, bank: Bank, place: int) -> bool:

@@ -13,6 +13,7 @@ from tvist_controller.line.line_tick import QDD, TORQUE, Q
 from tvist_controller.line.sample import Sample
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
+from tvist_plant.plant import GRAVITY
 from tvist_protocol.stream import State
 from tvist_protocol.values import Payload
 
@@ -70,6 +71,36 @@ class ToolForces:
         motion[ACTUAL_Q:] = measured.q, measured.qd, measured.moment
         found = self._wrench.estimate(motion, self._peripherals.tcp_offset)[:6]
         return found if zero is None else found - zero
+
+    @property
+    def basis(self) -> tuple[object, ...]:
+        """What forces are reckoned from: what counts as zero, and the declared payload."""
+        zero = self._peripherals.wrench_zero
+        return None if zero is None else tuple(zero), self._declared()
+
+    def forget_zero(self) -> None:
+        """Take nothing as zero any longer."""
+        if self._peripherals.wrench_zero is not None:
+            self._peripherals.zero_wrench(None)
+
+    def unexplained(self, sample: Sample, wrench: Floats, *, zeroed: bool) -> Floats:
+        """Return the force in a sensor's wrench that is neither weight nor inertia of the payload, shape (3,) [N].
+
+        The payload is taken to be accelerated as the flange is, whose accelerometer also feels that the arm bends; of a
+        plant without one, which measures zeros, only the weight is taken away.
+
+        Args:
+            sample: Signals of the tick.
+            wrench: What the sensor measured, see `Measurement.wrench`.
+            zeroed: Whether what was taken as zero is of this sensor.
+        """
+        measured, zero = sample.measured, self._peripherals.wrench_zero
+        rotation, specific = self._rigid.flange_rotation(measured.q), measured.accelerometer
+        if not specific.any():
+            specific = GRAVITY * rotation[2]
+        force = wrench[:3] - zero[:3] if zeroed and zero is not None else wrench[:3]
+        found: Floats = rotation @ (force + self._declared().mass * specific)
+        return found
 
     def _sensed(self, raw: Floats, q: Floats) -> Floats:
         rotation, zero = self._rigid.flange_rotation(q), self._peripherals.wrench_zero

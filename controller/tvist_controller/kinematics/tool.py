@@ -48,6 +48,8 @@ class ToolKinematics:
         """Return the kinematics of another tool on the same arm."""
         return type(self)(self._description, tcp)
 
+    turn, turned = staticmethod(turn), staticmethod(turned)
+
     def pose(self, q: Floats) -> tuple[Floats, Floats]:
         """Return the rotation matrix, shape (3, 3), and the position, shape (3,) [m]."""
         rotation, position, _ = kinematics(self._dh, *self._tool, q)

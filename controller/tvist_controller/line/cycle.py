@@ -71,8 +71,6 @@ class ControlCycle:
         """Number of times that the arm was put at rest somewhere, which breaks off what it did."""
         self.guard: Guard | None = None
         """What checks the references and the stops of a guarded motion; None without one."""
-        self.external: Floats | None = None
-        """What a force sensor that is not the plant's measures, see `Measurement.wrench`; None without one."""
         self.sample = self.reset(q, carried=carried, seed=seed)
         """Signals of the last tick, or of the arm where it was put at rest since."""
         check_measurement(self.sample.measured, description.joints, self.line.plant)
@@ -99,8 +97,6 @@ class ControlCycle:
             if motors is not None and command is not plain:
                 motors = motors.corrected(command, corrections.acceleration)
         measured = line.plant.step(command)
-        if self.external is not None:
-            measured.wrench = self.external
         self.sample = Sample(
             mode, reference, line.shaped.references, line.shaped.joints.window, signals, command, measured, motors,
             refused,

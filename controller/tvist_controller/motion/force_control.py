@@ -1,14 +1,19 @@
 """Force mode and freedrive: guided motions that give way to the force at the tool, and what ends them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from copy import copy
+from typing import Protocol
 
 import numpy as np
+from msgspec.structs import replace
 
+from tvist_controller.commands.events import Emit
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.kinematics.tool import turn, turned
+from tvist_controller.kinematics.tool import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.contact import ContactWatch
+from tvist_controller.motion.external_sensor import SILENT, ExternalSensor
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.task_frame import Feature, frame_of
 from tvist_controller.trajectory import Compliant, ForceTask, Guided, JointSpeed, Rest
@@ -35,22 +40,44 @@ GENTLE = 1.0
 """Deceleration of the fastest joint where force mode ends, the lowest of any stop [rad/s^2]."""
 
 
+class Forces(Protocol):
+    """What acts on the arm from outside."""
+
+    @property
+    def basis(self) -> object:
+        """What forces are reckoned from: one that changes makes them jump."""
+
+    def felt(self, sample: Sample) -> Floats:
+        """Return force and torque at the tool centre point in a tick, base frame, shape (6,) [N, N m]."""
+
+    def unexplained(self, sample: Sample, wrench: Floats, *, zeroed: bool) -> Floats:
+        """Return the force in a sensor's wrench that is neither weight nor inertia of the payload, shape (3,) [N]."""
+
+    def forget_zero(self) -> None:
+        """Take nothing as zero any longer."""
+
+
 class ForceControl:
     """Begins and ends force mode, and watches the limits that go with it.
 
     Args:
         guidance: Guided motions.
-        felt: Returns force and torque at the tool centre point of a tick, base frame, shape (6,) [N, N m].
+        forces: The force at the tool.
+        emit: Emits events.
+        timeouts: See `ExternalSensor`.
     """
 
-    def __init__(self, guidance: Guidance, felt: Callable[[Sample], Floats]) -> None:
+    def __init__(self, guidance: Guidance, forces: Forces, emit: Emit, *, timeouts: bool) -> None:
         self.guidance = self._guidance = guidance
         """Guided motions."""
-        self._measure = felt
+        self._forces, self._emit = forces, emit
+        self.external = ExternalSensor(timeouts=timeouts)
+        """A force sensor of the user's own."""
         self._motion, self._cycle = guidance.motion, guidance.motion.cycle
-        self._smooth = self._external = np.zeros(6)
-        self._offset: Sequence[float] | None = None
+        self._smooth = np.zeros(6)
         self._by_hand, self._beyond, self._contact = False, 0, ContactWatch()
+        self._source = self._source_of(self._cycle.sample, None)
+        self._basis: object = None
 
     @property
     def compliant(self) -> Compliant | None:
@@ -86,6 +113,7 @@ class ForceControl:
         if isinstance(self._cycle.line.plant, Supervised):
             why = "this arm follows positions with a lag, and its force is a guess: forces cannot move it"
             raise RefusalError("wrong_mode", "", why)
+        self.check_sensor()
         self._guidance.check(trigger)
         lead = self.compliant or self._new()
         lead.aim(task, frame_of(feature, kind))
@@ -95,15 +123,8 @@ class ForceControl:
     def free(self, axes: Floats, feature: Feature) -> int:
         """Let the arm be moved by hand along and about some axes, shape (6,), each 0 or 1; else as `begin`."""
         mass, damping = HEAVY if self._cycle.sample.measured.wrench is None else LIGHT
-        task = ForceTask(
-            axes,
-            np.zeros(6),
-            np.where(axes > 0.0, HAND_SPEED, np.inf),
-            (damping / FREE_DAMPING) ** 4,
-            1.0,
-            mass,
-            damping,
-        )
+        speeds = np.where(axes > 0.0, HAND_SPEED, np.inf)
+        task = ForceTask(axes, np.zeros(6), speeds, (damping / FREE_DAMPING) ** 4, 1.0, mass, damping)
         return self.begin(task, feature, 2, "freedrive")
 
     def end(self) -> None:
@@ -111,21 +132,20 @@ class ForceControl:
         if self.compliant is not None:
             self._guidance.stop_joints(GENTLE, "end_force_mode")
 
-    def sense(self, wrench: Floats) -> None:
-        """Take what an external force sensor measures, in the directions of the flange frame, shape (6,) [N, N m]."""
-        self._external = wrench
-        if self._offset is not None:
-            lever = np.cross(self._offset, wrench[:3])
-            self._cycle.external = np.concatenate((wrench[:3], wrench[3:] + lever))
+    def check_sensor(self) -> None:
+        """Refuse what needs the force at the tool while a sensor of the user's own has not told it.
 
-    def use_external(self, offset: Sequence[float] | None) -> None:
-        """Use an external force sensor; None for the plant's own, if it has one.
-
-        Args:
-            offset: Where it measures, in the flange frame, shape (3,) [m].
+        Raises:
+            RefusalError: It has told nothing yet, or nothing for too long.
         """
-        self._offset, self._cycle.external = offset, None
-        self.sense(self._external)
+        if self.external.awaited:
+            why = "the external force sensor has told nothing yet: send its values, every 100 ms at least"
+            raise RefusalError("wrong_mode", "", why)
+
+    def begin_anew(self) -> None:
+        """Use the arm's own sensor, and take nothing as zero, since the arm was placed somewhere."""
+        self.external.use(None)
+        self._forces.forget_zero()
 
     def touched(self, direction: Sequence[float]) -> int:
         """Return the number of ticks since just before the tool touched something; 0 if it does not.
@@ -139,7 +159,7 @@ class ForceControl:
     def _new(self) -> Compliant:
         guidance = self._guidance
         state, present = guidance.state, guidance.guided
-        self._smooth = self._measure(self._cycle.sample)
+        self._smooth = self._forces.felt(self._cycle.sample)
         inner: Guided | Rest
         if present is not None and not self._cycle.mode.shaped:
             inner = present
@@ -149,37 +169,70 @@ class ForceControl:
             inner = stop = JointSpeed(state, guidance.limits, guidance.torque, PERIOD)
             stop.aim(np.zeros_like(state[0]), guidance.limits.acceleration)
         return Compliant(
-            state, guidance.limits, guidance.reach, guidance.torque, PERIOD, kinematics=guidance.tool, inner=inner,
-            felt=self._felt, turn=turn, turned=turned,
+            state, guidance.limits, guidance.reach, guidance.torque, PERIOD, tool=lambda: guidance.tool, inner=inner,
+            felt=self._felt,
         )  # fmt: skip
 
     def _felt(self) -> Floats:
         """Force and torque of the last tick."""
         sample = self._cycle.sample
-        found = self._measure(sample)
+        found = self._forces.felt(sample)
         if sample.measured.wrench is None:
             found = self._smooth = self._smooth + PERIOD / (PERIOD + SMOOTHED) * (found - self._smooth)
         return found
 
-    def watch(self, sample: Sample) -> None:
-        """Make a protective stop if the arm presses too hard, or leaves its way in an axis that does not give way."""
+    def watch(self, sample: Sample) -> Sample:
+        """Make a protective stop if the arm presses too hard, or leaves its way in an axis that does not give way.
+
+        Returns:
+            The signals, with the wrench of the sensor that counts.
+        """
+        own, external = sample.measured.wrench, self.external.next()
+        if external is not None:
+            measured = copy(sample.measured)
+            measured.wrench = external
+            self._cycle.sample = sample = replace(sample, measured=measured)
+        self._follow_source(self._source_of(sample, external))
+        basis = self._forces.basis
+        if basis != self._basis:
+            self._basis, self._contact = basis, ContactWatch()
+        pressed = [
+            self._forces.unexplained(sample, wrench, zeroed=wrench is sample.measured.wrench)
+            for wrench in (external, own)
+            if wrench is not None
+        ]
         if self._contact.awake:
-            self._contact.note(self._measure(sample)[:3])
-        why = (
-            self._excess(sample)
-            if self._motion.activity.moving or sample.measured.wrench is not None
-            else None
-        )
+            self._contact.note(pressed[0] if pressed else self._forces.felt(sample)[:3])
+        why = self._excess(sample, float(np.max([np.linalg.norm(force) for force in pressed], initial=0.0)))
         self._beyond = 0 if why is None else self._beyond + 1
         if why is not None and self._beyond > TICKS:
             self._beyond = 0
             self._motion.protect(why, "limit_force")
+        return sample
 
-    def _excess(self, sample: Sample) -> str | None:
-        if sample.measured.wrench is not None:
-            force = float(np.linalg.norm(self._measure(sample)[:3]))
-            if force > MOST:
-                return f"force at the tool is {force:.0f} N, above {MOST:g} N for more than 10 ms"
+    @staticmethod
+    def _source_of(sample: Sample, external: Floats | None) -> str:
+        if external is not None:
+            return "the external force sensor"
+        return "the drives' torques" if sample.measured.wrench is None else "the arm's force sensor"
+
+    def _follow_source(self, source: str) -> None:
+        """End what relies on the force if it comes from elsewhere; what was taken as zero then means nothing."""
+        if source == self._source:
+            return
+        self._source, self._contact = source, ContactWatch()
+        self._forces.forget_zero()
+        why = f"forces are now those of {source}"
+        if self.external.awaited:
+            why = f"the external force sensor has told nothing for {1e3 * SILENT:g} ms: {why}"
+        if self.compliant is not None:
+            self._motion.interrupt(why)
+        elif self.external.awaited:
+            self._emit("warning", why=why)
+
+    def _excess(self, sample: Sample, force: float) -> str | None:
+        if not force <= MOST:
+            return f"force at the tool is {force:.0f} N, above {MOST:g} N for more than 10 ms"
         lead = self.compliant
         if lead is None or self._by_hand:
             return None

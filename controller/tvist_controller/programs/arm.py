@@ -15,6 +15,12 @@ from tvist_urscript import Fault
 
 BRAKING = 2.0
 """Deceleration of the fastest joint where a move follows a motion that has not ended [rad/s^2]."""
+AGAIN = 10
+"""Ticks in which a thread may begin force mode again that a pause or a protective stop has ended."""
+LOST = (
+    "force mode has ended, by a pause or a protective stop, and the arm does not move on without it: call force_mode "
+    "again, or end_force_mode, before it moves"
+)
 STREAMED = "a client streams set-points to the arm, so the program cannot move it"
 TAKEN = "another thread is controlling the robot: only one thread of a program can move it at a time"
 
@@ -24,7 +30,7 @@ class ProgramArm:
 
     Args:
         access: The robot.
-        thread: Returns what identifies the thread that runs now.
+        thread: Returns the program that runs now and the number of its thread.
         lives: Returns whether a thread still runs.
         spend: Takes evaluations from the budget of the program that runs.
     """
@@ -32,7 +38,7 @@ class ProgramArm:
     def __init__(
         self,
         access: Access,
-        thread: Callable[[], object],
+        thread: Callable[[], tuple[object, int]],
         lives: Callable[[object], bool],
         spend: Callable[[int], None],
     ) -> None:
@@ -50,6 +56,12 @@ class ProgramArm:
         self._guided: int | None = None
         self._abandoned = False
         self._own = False
+        self._asked = 0
+        """Number of threads that wait for the arm to give way."""
+        self._gives: object | None = None
+        """Program that lets the arm give way, until it ends that itself."""
+        self.lead: Callable[[Segment], Turns] | None = None
+        """Makes a move while the arm gives way."""
         self.waypoint: Segment | None = None
         """Target of the present move, or of the last one."""
 
@@ -96,9 +108,20 @@ class ProgramArm:
         """Carry out a journey until it is over or something is done."""
         with self._moving():
             self._begin(journey)
-            while not (journey.over or done()):
+            while not (journey.over or done() or self._led(journey)):
                 yield
+        if self._led(journey):
+            assert self.lead is not None, "who makes moves can lead them"
+            for segment, effects in journey.hand_over():
+                yield from self.lead(segment)
+                for effect in effects:
+                    effect()
         self._present()
+
+    def _led(self, journey: Journey) -> bool:
+        """Whether another thread lets the arm give way since, so that the moves have to be led."""
+        waits = journey.number is None and not journey.over
+        return waits and self._access.force.compliant is not None
 
     def _present(self) -> Journey | None:
         """Return the moves of this thread that may be blended with a further one.
@@ -145,7 +168,9 @@ class ProgramArm:
             raise Fault(STREAMED)
         if motion.activity in {Activity.GUIDED, Activity.MOVING, Activity.PAUSED}:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
-        while motion.activity.moving or motion.activity.protective or self._allowance.waits:
+        while (
+            motion.activity.moving or motion.activity.protective or self._allowance.waits or self._asked > 0
+        ):
             yield
 
     # ------------------------------------------------------------------ guided motions
@@ -162,6 +187,7 @@ class ProgramArm:
         """
         yield from self.finish()
         with self._moving():
+            yield from self.regain()
             while self.stopping or self._allowance.waits:
                 yield
             self.steer(start)
@@ -172,6 +198,24 @@ class ProgramArm:
         """Whether a guided motion has to wait: for a stop under way, or in a protective stop of this tick."""
         activity = self._motion.activity
         return (activity.moving or activity.protective) and after(activity, "speed_j") is None
+
+    def regain(self) -> Turns:
+        """Wait for the end of a stop, and for force mode if the program has lost it and a thread begins it again.
+
+        Raises:
+            Fault: None does.
+        """
+        left = AGAIN
+        while self.stopping or (self.lost and left > 0):
+            left -= not (self.stopping or self._asked)
+            yield
+        if self.lost:
+            raise Fault(LOST)
+
+    @property
+    def lost(self) -> bool:
+        """Whether the arm no longer gives way as the program has asked for, since something has stopped it."""
+        return self._gives is self._thread()[0] and self._access.force.compliant is None
 
     def give_way(self, start: Callable[[], int]) -> Turns:
         """Let the arm give way to forces, or change how it does, beside what else moves it.
@@ -184,25 +228,26 @@ class ProgramArm:
         """
         yield from self.finish()
         motion = self._motion
-        while (
-            motion.activity.moving and after(motion.activity, "force_mode") is None
-        ) or self._allowance.waits:
-            if motion.activity is Activity.STREAMING:
-                raise Fault(STREAMED)
-            yield
-        if motion.activity.protective:
-            return
-        self._own = True
+        self._asked += 1
         try:
+            while (
+                (motion.activity.moving or motion.activity.protective)
+                and after(motion.activity, "force_mode") is None
+            ) or self._allowance.waits:
+                if motion.activity is Activity.STREAMING:
+                    raise Fault(STREAMED)
+                yield
+            self._own = True
             self._guided = start()
         except RefusalError as refusal:
             raise Fault(refusal.reply.why) from refusal
         finally:
-            self._own = False
+            self._own, self._asked = False, self._asked - 1
+        self._gives = self._thread()[0]
 
     def hold_again(self, *, by_hand: bool) -> None:
         """End what `give_way` has begun: freedrive, or else force mode."""
-        force = self._access.force
+        force, self._gives = self._access.force, None
         if force.compliant is not None and force.by_hand == by_hand:
             self.brake(force.end, wholly=True)
 
@@ -311,7 +356,7 @@ class ProgramArm:
 
     def forget(self) -> None:
         """Forget all motions, since the program has ended."""
-        self._inside = self._driver = self._journey = self._guided = None
+        self._inside = self._driver = self._journey = self._guided = self._gives = None
         self._journeys.clear()
         self._abandoned, self._allowance.planning = False, 0
 

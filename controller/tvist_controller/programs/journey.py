@@ -111,6 +111,11 @@ class Journey:
         if fault is not None:
             raise fault
 
+    def hand_over(self) -> list[tuple[Segment, list[Effect]]]:
+        """Leave the rest of the moves to another, with what the program does after each of them."""
+        self.over = True
+        return list(zip(self.legs, self._effects, strict=True))
+
     def stop(self) -> None:
         """Note that a protective stop has begun: what it passes has been passed when the program is resumed."""
         self.outcome, self._stops_at = "protective_stop", self._motion.motions.stops_at

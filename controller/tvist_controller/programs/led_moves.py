@@ -75,8 +75,7 @@ class LedMoves:
         def wait() -> Turns:
             yield
             while self._way(segment)[1] > near:
-                while self._arm.stopping:  # force mode has ended meanwhile
-                    yield
+                yield from self._arm.regain()
                 self._arm.steer(start)
                 yield
 

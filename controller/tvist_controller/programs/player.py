@@ -250,14 +250,16 @@ class ProgramPlayer:
             self._watchdogs.clear()
             self.statements.close()
             self.arm.forget()
+        if self._main is None:
+            self._access.force.external.use(None)
 
     def _machine(self) -> Machine:
         """The program that runs now."""
         assert self._now is not None, "only programs call their functions"
         return self._now.machine
 
-    def _thread(self) -> object:
-        """What identifies the thread that runs now."""
+    def _thread(self) -> tuple[object, int]:
+        """What identifies the thread that runs now: its program and its number."""
         machine = self._machine()
         return machine, machine.thread
 

@@ -56,7 +56,8 @@ class _Called:
             raise TypeError(f"it is a {type(answer).__name__}, and must be a Condition")
         if name in _MEASURING:
             check_measurement(answer, self._joints, self._plant)
-            if not np.isfinite(np.concatenate((answer.q, answer.qd, answer.moment))).all():
+            felt = () if answer.wrench is None else answer.wrench
+            if not np.isfinite(np.concatenate((answer.q, answer.qd, answer.moment, felt))).all():
                 raise PlantError("the arm has measured what is no number")
 
 

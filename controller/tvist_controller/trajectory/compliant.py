@@ -1,15 +1,16 @@
 """A reference that gives way to forces at the tool, while another one moves it in the other directions."""
 
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 
 from tvist_controller.trajectory.base import Rest
+from tvist_controller.trajectory.following import Following
 from tvist_controller.trajectory.force_law import ForceTask, compliant_velocity
 from tvist_controller.trajectory.guided import Guided, StuckError
-from tvist_controller.trajectory.limiter import Limiter, TorqueRoom
+from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
+from tvist_controller.trajectory.tool_speed import ToolKinematics
 
 NEWTON = 3
 """Newton steps from the tool's pose to the joints' angles; two suffice for what the tool moves in a tick."""
@@ -23,23 +24,11 @@ CRAWL = 0.05
 """Share of it below which giving way counts as hindered by a singular posture [-]."""
 
 
-class Pose(Protocol):
-    """Kinematics of the tool centre point, in the base frame."""
-
-    def pose(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return its rotation matrix, shape (3, 3), and its position, shape (3,) [m]."""
-
-    def inverse(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return the Jacobian, and its pseudo-inverse without the directions that are lost, shape (n, 6)."""
-
-
 Frame = Callable[[tuple[Floats, Floats], Floats], Floats]
 """Axes of the task as columns in the base frame, shape (3, 3), from the tool's pose and its velocity, shape (3,)."""
-Turn = Callable[[Floats, Floats], Floats]
-"""Rotation vector from one rotation matrix to another, see `turn`."""
 
 
-class Compliant(Guided):
+class Compliant(Following):
     """Moves the tool by the law of force control in compliant axes, and as another reference does in all others.
 
     The pose P that is followed is integrated from twists: in the axes of the task, the law's velocity where these are
@@ -47,17 +36,12 @@ class Compliant(Guided):
     a `Limiter`. Whatever giving way is kept from, by the joints' limits or near a singular posture, is dropped from P,
     so that nothing is caught up with later.
 
+    The arguments are those of `Following`, and:
+
     Args:
-        state: Position [rad], velocity [rad/s] and acceleration [rad/s^2] to continue from, each of shape (n,).
-        limits: Limits of every joint.
-        reach: Largest position of each joint in either direction, shape (n,) [rad].
-        torque: Motion that the torque permits.
-        period: Tick [s].
-        kinematics: Kinematics of the tool centre point.
+        tool: Returns the kinematics of the tool centre point, which another one may replace at any time.
         inner: The reference that moves the tool otherwise, which continues from the same state.
         felt: Returns force and torque on the tool centre point in the last tick, base frame, shape (6,) [N, N m].
-        turn: Rotation vector from one rotation matrix to another.
-        turned: Turns a rotation matrix by a rotation vector.
     """
 
     def __init__(
@@ -68,34 +52,35 @@ class Compliant(Guided):
         torque: TorqueRoom,
         period: float,
         *,
-        kinematics: Pose,
+        tool: Callable[[], ToolKinematics],
         inner: Guided | Rest,
         felt: Callable[[], Floats],
-        turn: Turn,
-        turned: Turn,
     ) -> None:
-        self._arm, self._torque, self._period, self._reach = limits, torque, period, reach
-        self.adopt(limits)
-        self.kinematics, self.inner = kinematics, inner
-        """Kinematics of the tool centre point; the reference that moves the tool otherwise."""
-        self._felt, self._turn, self._turned = felt, turn, turned
-        self.rate = 1.0
+        super().__init__(state, _abrupt(limits, period), reach, torque, period)
+        self._tool, self.inner = tool, inner
+        """The reference that moves the tool otherwise."""
+        self._felt = felt
         self._speed: tuple[float, float | None] = (1.0, None)
-        q, qd, _ = state
-        self._limiter = Limiter(q, self.limits, period, reach=reach, torque=torque, state=state)
-        self._pose = kinematics.pose(q)
-        self._twist = kinematics.inverse(q)[0] @ qd
-        self._nominal = kinematics.pose(inner_q(inner))
-        self._moved = self._twist.copy()
-        """Velocity of the inner reference's tool [m/s, rad/s]."""
         self._task: ForceTask | None = None
         self._frame: Frame = lambda _pose, _velocity: np.eye(3)
-        self._given = np.zeros(6)
-        """Velocity by the law in the base frame, beside that of the inner reference in axes that are not compliant."""
         self.axes = np.eye(3)
         """Axes of the task, as columns in the base frame, shape (3, 3)."""
         self.hindered = 1.0
         """Share of the law's velocity that a singular posture permits, of the last tick [-]."""
+        self._begin(tool())
+
+    def _begin(self, kinematics: ToolKinematics) -> None:
+        """Let a tool centre point give way from the joints' present motion on."""
+        q, qd, _ = self.state
+        self.kinematics = kinematics
+        """Kinematics of the tool centre point."""
+        self._pose = kinematics.pose(q)
+        self._twist = kinematics.inverse(q)[0] @ qd
+        nominal, moving = self.nominal, self.inner.state[1] if isinstance(self.inner, Guided) else 0.0 * qd
+        self._nominal, self._moved = kinematics.pose(nominal), kinematics.inverse(nominal)[0] @ moving
+        """Velocity of the inner reference's tool [m/s, rad/s]."""
+        self._given = self._twist - self._moved
+        """Velocity by the law in the base frame, beside that of the inner reference in axes that are not compliant."""
 
     def aim(self, task: ForceTask, frame: Frame) -> None:
         """Control the force by another task from now on; the velocity stays and changes by the law."""
@@ -112,11 +97,6 @@ class Compliant(Guided):
         return self._task
 
     @property
-    def state(self) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the reference, each of shape (n,)."""
-        return self._limiter.state
-
-    @property
     def finished(self) -> bool:
         """Never: it gives way until a command ends it."""
         return False
@@ -124,7 +104,7 @@ class Compliant(Guided):
     @property
     def nominal(self) -> Floats:
         """Position of the joints by the inner reference, shape (n,) [rad]."""
-        return inner_q(self.inner)
+        return self.inner.state[0] if isinstance(self.inner, Guided) else self.inner.next()
 
     def take(self, inner: Guided | Rest) -> None:
         """Move the tool by another reference, which continues from where the present one is."""
@@ -133,36 +113,32 @@ class Compliant(Guided):
             inner.pace(*self._speed)
 
     def adopt(self, limits: MotionLimits) -> None:
-        """See `Guided.adopt`; as the speeds of joints, it changes its acceleration within a tick."""
-        self._arm = limits
-        self.limits = MotionLimits(
-            limits.velocity, limits.acceleration, 2.0 * limits.acceleration / self._period
-        )
+        """See `Guided.adopt`."""
+        super().adopt(_abrupt(limits, self._period))
 
     def pace(self, speed: float, slowest: float | None) -> None:
         """Set the speed of the inner reference, and the velocity limit of all."""
         self._speed = speed, slowest
         if isinstance(self.inner, Guided):
             self.inner.pace(speed, slowest)
-        self.rate = speed
-        velocity = self._arm.velocity if slowest is None else min(slowest, self._arm.velocity)
-        if velocity != self.limits.velocity:
-            self.limits = MotionLimits(velocity, self.limits.acceleration, self.limits.jerk)
-            state = self._limiter.state
-            self._limiter = Limiter(
-                state[0], self.limits, self._period, reach=self._reach, torque=self._torque, state=state
-            )
+        super().pace(speed, slowest)
 
     def next(self) -> Floats:
         """Advance by one tick and return the position of the joints.
 
         Raises:
-            StuckError: The inner reference cannot go on, or the joints cannot follow it.
+            StuckError: The inner reference cannot go on, the joints cannot follow it, or the force is no number.
         """
-        h, task = self._period, self.task
+        h, task, felt = self._period, self.task, self._felt()
+        if not np.isfinite(felt).all():
+            raise StuckError("the force at the tool is no number")
+        if (tool := self._tool()) is not self.kinematics:
+            self._task = None
+            self._begin(tool)
+            self.aim(task, self._frame)
         moved = self._move_inner()
         self.axes = axes = self._frame(self._pose, self._twist[:3])
-        given = compliant_velocity(task, _into(axes, self._given), _into(axes, self._felt()), h)
+        given = compliant_velocity(task, _into(axes, self._given), _into(axes, felt), h)
         kept = np.where(task.compliant > 0.0, 0.0, _into(axes, moved))
         q, present = self._limiter.q, self._pose
         inverse = self.kinematics.inverse(q)[1]
@@ -176,7 +152,7 @@ class Compliant(Guided):
             if np.abs(error).max() <= OFF:
                 break
         else:
-            if np.abs(np.where(task.compliant > 0.0, 0.0, _into(axes, error))).max() > OFF:
+            if not np.abs(np.where(task.compliant > 0.0, 0.0, _into(axes, error))).max() <= OFF:
                 raise StuckError("the joints cannot move the tool on beside the force that it controls")
             self._drop(found, axes)
         reached = self._limiter.follow(found, (found - q) / h)
@@ -191,17 +167,17 @@ class Compliant(Guided):
             return self._moved
         rotation, position = self._nominal
         self._nominal = there = self.kinematics.pose(self.inner.next())
-        way = np.concatenate((there[1] - position, self._turn(rotation, there[0])))
+        way = np.concatenate((there[1] - position, self.kinematics.turn(rotation, there[0])))
         self._moved = way / self._period
         return self._moved
 
     def _shifted(self, pose: tuple[Floats, Floats], way: Floats) -> tuple[Floats, Floats]:
-        return self._turned(pose[0], way[3:]), pose[1] + way[:3]
+        return self.kinematics.turned(pose[0], way[3:]), pose[1] + way[:3]
 
     def _off(self, q: Floats) -> Floats:
         """What the pose lacks to the one that is followed, shape (6,) [m, rad]."""
         rotation, position = self.kinematics.pose(q)
-        return np.concatenate((self._pose[1] - position, self._turn(rotation, self._pose[0])))
+        return np.concatenate((self._pose[1] - position, self.kinematics.turn(rotation, self._pose[0])))
 
     def _joints(self, q: Floats, inverse: Floats) -> tuple[Floats, Floats]:
         """Joints that reach the pose, from those nearby, and what is lacking then."""
@@ -221,9 +197,9 @@ class Compliant(Guided):
         self._given = _out(axes, kept)
 
 
-def inner_q(inner: Guided | Rest) -> Floats:
-    """Position of a reference, shape (n,) [rad]."""
-    return inner.state[0] if isinstance(inner, Guided) else inner.next()
+def _abrupt(limits: MotionLimits, period: float) -> MotionLimits:
+    """Limits with which the joints change their acceleration within a tick, as the speeds of joints do."""
+    return MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
 
 
 def _into(axes: Floats, base: Floats) -> Floats:

@@ -6,8 +6,8 @@ from typing import Self
 
 import numpy as np
 
-from tvist_controller.trajectory.guided import Guided
-from tvist_controller.trajectory.limiter import Limiter, TorqueRoom
+from tvist_controller.trajectory.following import Following
+from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 LOOKAHEAD = (0.03, 0.2)
@@ -24,7 +24,7 @@ THERE = 1e-7
 """Distance from the posture, and change within a tick, below which the posture is reached [rad]."""
 
 
-class Servo(Guided):
+class Servo(Following):
     """Follows the posture p of the latest command as a damped spring would: q̈ = k (p - q - T q̇).
 
     A posture that moves with constant velocity is followed with a lag of T, whatever the gain k. T is the lookahead
@@ -32,17 +32,7 @@ class Servo(Guided):
     quickly the velocity changes: with a high one, the posture is approached with the time constant T from the start;
     with a low one, the motion begins and ends more gently. A gain below 3/T² would overshoot, and is raised to that.
 
-    The result passes through a `Limiter`, which keeps it within the arm's limits and the joints' range and within the
-    torque that is available. A motion within these passes unchanged.
-
-    The client determines the timing, so the speed slider has no effect; reduced speed limits the velocity.
-
-    Args:
-        state: Position [rad], velocity [rad/s] and acceleration [rad/s^2] to continue from, each of shape (n,).
-        limits: Limits of every joint.
-        reach: Largest position of each joint in either direction, shape (n,) [rad].
-        torque: Motion that the torque permits.
-        period: Tick [s].
+    The arguments are those of `Following`.
     """
 
     def __init__(
@@ -53,17 +43,9 @@ class Servo(Guided):
         torque: TorqueRoom,
         period: float,
     ) -> None:
-        self.limits, self._arm, self._reach, self._torque = limits, limits, reach, torque
-        self._period = period
-        self.rate = 1.0
+        super().__init__(state, limits, reach, torque, period)
         self._q, self._qd = np.array(state[0]), np.array(state[1])
-        self._follow(state)
         self.aim(self._q, LOOKAHEAD[0], GAIN[0])
-
-    def _follow(self, state: tuple[Floats, Floats, Floats]) -> None:
-        self._limiter = Limiter(
-            state[0], self.limits, self._period, reach=self._reach, torque=self._torque, state=state
-        )
 
     def aim(self, posture: Floats, lookahead: float, gain: float) -> None:
         """Follow another posture.
@@ -77,19 +59,6 @@ class Servo(Guided):
         lag = min(max(lookahead, LOOKAHEAD[0]), LOOKAHEAD[1]) + DELAY * self._period
         k = max(min(max(gain, GAIN[0]), GAIN[1]), DAMPED / lag**2)
         self._step = _step(k, k * lag, self._period)
-
-    def adopt(self, limits: MotionLimits) -> None:
-        """See `Guided.adopt`."""
-        self.limits = self._arm = limits
-        self._follow(self.state)
-
-    def pace(self, speed: float, slowest: float | None) -> None:
-        """Set the speed that is reported, and the velocity limit."""
-        self.rate = speed
-        velocity = self._arm.velocity if slowest is None else min(slowest, self._arm.velocity)
-        if velocity != self.limits.velocity:
-            self.limits = MotionLimits(velocity, self._arm.acceleration, self._arm.jerk)
-            self._follow(self.state)
 
     def fork(self) -> Self:
         """Return an independent copy of the present state."""
@@ -107,11 +76,6 @@ class Servo(Guided):
         else:
             self._q = self._posture + ahead
         return self._limiter.follow(self._q, self._qd)
-
-    @property
-    def state(self) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the reference, each of shape (n,)."""
-        return self._limiter.state
 
     @property
     def finished(self) -> bool:

@@ -33,6 +33,12 @@ class ToolKinematics(Protocol):
     def inverse(self, q: Floats) -> tuple[Floats, Floats]:
         """Return the Jacobian, and its pseudo-inverse without the directions that are lost, shape (n, 6)."""
 
+    def turn(self, start: Floats, end: Floats) -> Floats:
+        """Return the rotation vector from one rotation matrix to another, shape (3,) [rad]."""
+
+    def turned(self, rotation: Floats, angle: Floats) -> Floats:
+        """Return a rotation matrix turned by a rotation vector, shape (3,) [rad]."""
+
     def straight(
         self, inverse: Floats, joints: Floats, twists: Floats, ranges: Floats, change: Floats,
         rate: float, speed: float, slowest: float, acceleration: float, period: float,

@@ -500,14 +500,25 @@ class TestOutputs:
         assert command.standard_analog_output_mask == 0b10
         assert b"standard_analog_output_0" in one.texts()[0]
 
-    def test_a_force_sensors_values_reach_the_robot_when_they_change(self, one):
+    def test_a_force_sensors_values_reach_a_program_also_if_they_stay_the_same(self, one, robot):
         names = ("external_force_torque",)
         one.started().with_inputs(names)
-        for force in (1.0, 2.0):
+        shown(robot, program="p", program_state="PLAYING")
+        for force in (1.0, 2.0, 2.0):
             (command,) = one.put(1, names, (force,) * 6)
-            assert command.wrench == (force,) * 6
-            assert one.put(1, names, (force,) * 6) == []
+            assert (command.wrench, command.token) == ((force,) * 6, "the-token")
         assert one.texts() == []
+
+    def test_a_force_sensors_values_take_no_control(self, one, robot, control):
+        names = ("external_force_torque",)
+        one.started().with_inputs(names)
+        shown(robot, program_state="STOPPED")
+        assert one.put(1, names, (1.0,) * 6) == []
+        shown(robot, program="p", program_state="PLAYING")
+        control.held_by_other = True
+        assert one.put(1, names, (1.0,) * 6) == []
+        (text,) = one.texts()
+        assert b"another client has control" in text
 
 
 CONVERSATION = [

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tvist_controller.line.differentiator import Floats
 from tvist_controller.motion.task_frame import Feature
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number, numbers, pose, shown
@@ -87,22 +88,19 @@ class ForceFunctions:
         sensor_mass: object = 0,
         sensor_measuring_offset: object = NOWHERE,
         sensor_cog: object = NOWHERE,
-    ) -> None:
+    ) -> Turns:
         """Use the force sensor whose values clients write by RTDE; its mass is part of the payload to declare."""
         number("sensor_mass", sensor_mass, 0.0)
         numbers("sensor_cog", sensor_cog, 3)
         offset = numbers("sensor_measuring_offset", sensor_measuring_offset, 3)
-        self._access.force.use_external(offset if flag("enable", enable) else None)
+        if self._access.force.compliant is not None:
+            raise Fault(
+                "the force sensor stays the same in force mode and freedrive: call end_force_mode before"
+            )
+        self._access.force.external.use(offset if flag("enable", enable) else None)
+        yield  # what the program asks for next is told by that sensor
 
-    def enable_external_ft_sensor(
-        self,
-        enable: object,
-        sensor_mass: object = 0,
-        sensor_measuring_offset: object = NOWHERE,
-        sensor_cog: object = NOWHERE,
-    ) -> None:
-        """Do what `ft_rtde_input_enable` does; its older name."""
-        self.ft_rtde_input_enable(enable, sensor_mass, sensor_measuring_offset, sensor_cog)
+    enable_external_ft_sensor = ft_rtde_input_enable
 
     @costs(60)
     def tool_contact(self, direction: object = None) -> int:
@@ -111,13 +109,13 @@ class ForceFunctions:
         return self._access.force.touched(way)
 
 
-def _choice(name: str, value: object) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _choice(name: str, value: object) -> Floats:
     return np.array(
         [integer(f"{name}[{k}]", one, 0, 1) for k, one in enumerate(numbers(name, value, 6))], float
     )
 
 
-def _limits(value: object) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _limits(value: object) -> Floats:
     found = [number(f"limits[{k}]", one, 0.0) for k, one in enumerate(numbers("limits", value, 6))]
     return np.minimum(found, MOST_LIMIT)
 

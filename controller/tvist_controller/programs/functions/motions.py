@@ -38,6 +38,7 @@ class MotionFunctions:
     def __init__(self, access: Access, arm: ProgramArm, kinematics: ProgramKinematics) -> None:
         self._access, self._arm, self._kinematics = access, arm, kinematics
         self._led = LedMoves(access, arm, kinematics)
+        arm.lead = self._led.follow
         limits = access.description.limits
         self._velocity, self._acceleration = min(limits.velocity), min(limits.acceleration)
 
@@ -116,6 +117,8 @@ class MotionFunctions:
         yield from self.movel(goal, acceleration * MAX_TOOL[1], velocity * MAX_TOOL[0], 0, r)
 
     def _follow(self, segment: Segment) -> Turns:
+        if self._arm.lost:
+            yield from self._arm.regain()
         moves = self._arm if self._access.force.compliant is None else self._led
         yield from moves.follow(segment)
 
@@ -162,13 +165,11 @@ class MotionFunctions:
         def start(shaped: bool) -> int:
             return guidance.move_tool(course()[0], acceleration, angular, shaped=shaped)
 
-        def wait() -> Iterator[None]:
+        def wait() -> Turns:
             yield
             while course()[1] > radius:
-                if (
-                    not self._access.motion.activity.protective
-                ):  # else the program is paused from this tick on
-                    self._arm.steer(start)
+                yield from self._arm.regain()
+                self._arm.steer(start)
                 yield
 
         yield from self._arm.guide(start, wait)

@@ -10,6 +10,7 @@ from tvist_controller.programs.moves import OWN_TOKEN
 from tvist_plant.robot_checks import lacking_inertia
 from tvist_plant.robot_tables import Tensor
 from tvist_protocol.commands import SetPayload
+from tvist_protocol.forces import ZeroFtsensor
 from tvist_protocol.io import SetTcp
 from tvist_urscript import Array, Fault, costs
 
@@ -104,7 +105,7 @@ class SettingFunctions:
     @costs(80)
     def zero_ftsensor(self) -> None:
         """Take the present force and torque at the tool as zero."""
-        self._access.forces.zero()
+        self._send(ZeroFtsensor(token=OWN_TOKEN))
 
     def _declare(
         self, mass: float, com: tuple[float, ...], inertia: tuple[float, ...], seconds: float = 0.0
@@ -120,7 +121,7 @@ class SettingFunctions:
             yield
         self._send(command, ordered())
 
-    def _send(self, command: SetTcp | SetPayload, plan: Plan | None = None) -> None:
+    def _send(self, command: SetTcp | SetPayload | ZeroFtsensor, plan: Plan | None = None) -> None:
         try:
             self._access.send(command, plan)
         except RefusalError as refusal:

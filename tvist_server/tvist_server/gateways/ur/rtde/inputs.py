@@ -30,7 +30,7 @@ NAMED: dict[str, tuple[Wire, str]] = {
     "standard_analog_output_1": (Wire.DOUBLE, "Value of analogue output 1 as a share of its range, 0 to 1."),
     "external_force_torque": (
         Wire.VECTOR6D,
-        "What a force sensor of one's own measures [N, N m]; used once a program has called ft_rtde_input_enable.",
+        "What a force sensor of one's own measures, every 100 ms; for programs of its host that use it [N, N m].",
     ),
 }
 """Type and description of each input variable that is no register."""
@@ -50,4 +50,6 @@ INPUTS: dict[str, Wire] = {name: wire for name, (wire, _) in NAMED.items()} | {
 """Type of every input variable by name."""
 
 NEED_CONTROL = frozenset(NAMED) - {"external_force_torque"}
-"""Variables that only the client in control may set. Registers are memory, which any client may write."""
+"""Variables that only the client in control may own. Registers are memory, which any client may write; a wrench is for
+programs of the client in control, and `ur_rtde` asks for it with every connection.
+"""

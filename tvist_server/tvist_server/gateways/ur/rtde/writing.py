@@ -39,7 +39,6 @@ class InputWriter:
         self._complain = complain
         self._ledger = robot.inputs.ledger
         self._held: dict[str, Value] = {}
-        self._wrench: Value | None = None
 
     def write(self, values: dict[str, Value]) -> None:
         """Set the variables of one package; values that are not finite are refused one by one."""
@@ -55,10 +54,12 @@ class InputWriter:
         if len(registers) == len(values):
             return
         wrench = values.get("external_force_torque")
-        if isinstance(wrench, tuple) and wrench != self._wrench:
-            self._wrench = wrench
+        io = self._io
+        if (
+            isinstance(wrench, tuple) and io is not None and io.program_state != "STOPPED"
+        ):  # else nobody reads it
             a, b, c, d, e, f = (float(number) for number in wrench)
-            self._control.ask(SetExternalWrench(wrench=(a, b, c, d, e, f)), self._answer_of({}))
+            self._change({}, lambda token: SetExternalWrench(token=token, wrench=(a, b, c, d, e, f)))
         if "speed_slider_mask" in values or "speed_slider_fraction" in values:
             self._set_speed()
         if any("_output" in name for name in values):
@@ -188,7 +189,9 @@ class InputWriter:
 
     def _change(self, values: dict[Hashable, object], command: Callable[[str], Command]) -> None:
         if self._control.held_by_other:
-            self._complain("another client has control: speed and outputs stay as they are")
+            self._complain(
+                "another client has control: speed and outputs stay as they are, and forces are not read"
+            )
             return
         self._ledger.ask(values)
         self._control.change(command, self._answer_of(values))

@@ -1,0 +1,56 @@
+"""Base of the references whose joints follow a signal as closely as the arm can."""
+
+from tvist_controller.trajectory.guided import Guided
+from tvist_controller.trajectory.limiter import Limiter, TorqueRoom
+from tvist_controller.trajectory.limits import Floats, MotionLimits
+
+
+class Following(Guided):
+    """Passes a signal through a `Limiter`: within the arm's limits, the joints' range and the available torque.
+
+    The client determines the timing of the signal, so the speed slider has no effect on it; reduced speed limits the
+    velocity.
+
+    Args:
+        state: Position [rad], velocity [rad/s] and acceleration [rad/s^2] to continue from, each of shape (n,).
+        limits: Limits of every joint.
+        reach: Largest position of each joint in either direction, shape (n,) [rad].
+        torque: Motion that the torque permits.
+        period: Tick [s].
+    """
+
+    def __init__(
+        self,
+        state: tuple[Floats, Floats, Floats],
+        limits: MotionLimits,
+        reach: Floats,
+        torque: TorqueRoom,
+        period: float,
+    ) -> None:
+        self.limits = self._arm = limits
+        self._reach, self._torque, self._period = reach, torque, period
+        self.rate = 1.0
+        self._follow(state)
+
+    def _follow(self, state: tuple[Floats, Floats, Floats]) -> None:
+        self._limiter = Limiter(
+            state[0], self.limits, self._period, reach=self._reach, torque=self._torque, state=state
+        )
+
+    @property
+    def state(self) -> tuple[Floats, Floats, Floats]:
+        """Position, velocity and acceleration of the reference, each of shape (n,)."""
+        return self._limiter.state
+
+    def adopt(self, limits: MotionLimits) -> None:
+        """See `Guided.adopt`."""
+        self.limits = self._arm = limits
+        self._follow(self.state)
+
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Set the speed that is reported, and the velocity limit."""
+        self.rate = speed
+        velocity = self._arm.velocity if slowest is None else min(slowest, self._arm.velocity)
+        if velocity != self.limits.velocity:
+            self.limits = MotionLimits(velocity, self._arm.acceleration, self._arm.jerk)
+            self._follow(self.state)

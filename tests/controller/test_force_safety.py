@@ -1,0 +1,412 @@
+"""What keeps force control safe: sensors that fall silent or change, stops, other tools, heavy payloads, threads."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tvist_controller.sources.plant_calls import called
+from tvist_plant.description import load
+from tvist_plant.drives import DriveCommand
+from tvist_plant.plant import PlantError
+from tvist_protocol import commands as c
+from tvist_protocol import forces as f
+from tvist_protocol import motions as m
+from tvist_protocol.io import SetTcp
+from tvist_protocol.programs import ProgramPause, ProgramPlay, ProgramRun, ProgramStop
+from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationReset
+from tvist_protocol.transitions import Activity
+
+from .forces import (
+    KINEMATICS,
+    NOTHING,
+    UR5E_IN_AIR,
+    Feeling,
+    feeling,
+    force_mode,
+    places,
+    pressed,
+    protective,
+    touching,
+)
+from .robots import H
+from .scripts import URSIM, failure, playing, said, script, start
+
+DOWN = "force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,-20,0,0,0], 2, [2,2,1.5,1,1,1])"
+ENABLE = "ft_rtde_input_enable(True, 0.3, [0.1, 0, 0], [0, 0, 0])"
+SEVEN = (0.0, 0.0, 7.0, 0.0, 0.0, 0.0)
+
+
+def sense(robot, wrench=SEVEN, **fields):
+    return robot.send(f.SetExternalWrench, wrench=wrench, **fields)
+
+
+def sensed(robot, ticks, wrench=SEVEN):
+    """Tick while a force sensor tells the same again and again."""
+    for _ in range(ticks):
+        sense(robot, wrench)
+        robot.tick()
+    return robot.states[-1]
+
+
+# ---------------------------------------------------------------- a sensor of one's own
+
+
+def test_only_the_client_in_control_tells_what_a_sensor_of_ones_own_measures():
+    robot, _ = feeling()
+    assert sense(robot) == Done()
+    assert sense(robot, token="me#7").code == "stale_token"
+
+
+def test_force_mode_waits_for_the_first_value_of_a_sensor_of_ones_own():
+    robot, _ = feeling()
+    start(robot, ENABLE, "sleep(9)")
+    state = robot.tick(20)
+    assert state.flange_wrench == pytest.approx(
+        [0.0] * 6
+    )  # the arm's own, until the other has told something
+    for refused in (force_mode(robot), robot.send(f.Freedrive), robot.send(f.ZeroFtsensor)):
+        assert isinstance(refused, Refused)
+        assert "external force sensor" in refused.why
+    assert sensed(robot, 2).flange_wrench == pytest.approx([0.0, 0.0, 7.0, 0.0, -0.7, 0.0])
+    assert force_mode(robot) == Accepted(id=1)
+
+
+def test_force_mode_ends_when_a_sensor_of_ones_own_falls_silent():
+    robot, _ = feeling(clock="realtime")
+    start(robot, ENABLE, "sync()", DOWN, "sleep(9)")
+    sensed(robot, 200)
+    assert robot.controller.motion.activity is Activity.GUIDED
+    assert "motion_stopped" not in robot.kinds()
+    robot.tick(45)
+    assert robot.controller.motion.activity is Activity.GUIDED
+    robot.tick(10)
+    (stopped,) = [event for event in robot.events if event.kind == "motion_stopped"]
+    assert "external force sensor" in stopped.why
+    assert "100 ms" in stopped.why
+    (ended,) = [event for event in robot.events if event.kind == "program_stopped"]
+    assert ended.why == stopped.why
+    robot.until_rest()
+    assert robot.tick(2).flange_wrench == pytest.approx([0.0] * 6)
+
+
+def test_a_sensor_of_ones_own_that_falls_silent_beside_force_mode_is_a_warning():
+    robot, _ = feeling(clock="realtime")
+    start(robot, ENABLE, "sleep(9)")
+    sensed(robot, 20)
+    robot.tick(60)
+    (warning,) = [event for event in robot.events if event.kind == "warning"]
+    assert "external force sensor" in warning.why
+    assert playing(robot)
+    assert isinstance(force_mode(robot), Refused)
+    assert robot.states[-1].flange_wrench == pytest.approx([0.0] * 6)
+
+
+def test_nothing_of_a_sensor_of_ones_own_outlasts_the_program_or_a_placement():
+    robot, _ = feeling()
+    for end in (lambda: robot.tick(100), lambda: robot.send(SimulationReset)):
+        start(robot, ENABLE, "sleep(.1)")
+        assert sensed(robot, 20).flange_wrench[2] == pytest.approx(7.0)
+        end()
+        assert robot.tick(2).flange_wrench == pytest.approx([0.0] * 6)
+        start(robot, ENABLE, "sleep(.1)")  # and an old value is no value
+        robot.tick(20)
+        assert isinstance(force_mode(robot), Refused)
+        robot.tick(60)
+
+
+def test_a_sensor_of_ones_own_does_not_hide_that_the_arms_own_feels_too_much():
+    robot, plant = feeling()
+    start(robot, ENABLE, "sleep(9)")
+    sensed(robot, 20)
+    plant.pushed[2] = 300.0
+    sensed(robot, 10)
+    assert "force at the tool is 300 N, above 250 N" in protective(robot)[0]
+    robot, plant = feeling()
+    start(robot, ENABLE, "sleep(9)")
+    sensed(robot, 20, (0.0, 260.0, 0.0, 0.0, 0.0, 0.0))
+    assert "force at the tool is 260 N, above 250 N" in protective(robot)[0]
+
+
+def test_the_end_of_the_program_that_uses_a_sensor_ends_a_clients_force_mode_with_it():
+    robot, _ = feeling()
+    start(robot, ENABLE, "sleep(.1)")
+    sensed(robot, 10)
+    assert force_mode(robot) == Accepted(id=1)
+    sensed(robot, 60)
+    (stopped,) = [event for event in robot.events if event.kind == "motion_stopped"]
+    assert stopped.why == "forces are now those of the arm's force sensor"
+
+
+def test_the_sensor_cannot_be_changed_in_force_mode():
+    robot, _ = feeling()
+    sense(robot)
+    start(robot, DOWN, ENABLE)
+    robot.tick(20)
+    assert "call end_force_mode" in failure(robot).why
+
+
+def test_what_counts_as_zero_is_forgotten_with_the_sensor_it_belongs_to():
+    robot, plant = feeling()
+    plant.pushed[2] = 5.0
+    robot.tick()
+    assert robot.send(f.ZeroFtsensor) == Done()
+    start(robot, ENABLE, "sync()", "sync()", "textmsg(get_tcp_force()[2])", "zero_ftsensor()", "sync()",
+          "textmsg(get_tcp_force()[2])", "sleep(.1)")  # fmt: skip
+    sensed(robot, 40)
+    rotation = KINEMATICS.pose(np.array(URSIM))[0]
+    assert [float(text) for text in said(robot)] == pytest.approx([7.0 * rotation[2, 2], 0.0], abs=1e-6)
+    robot.tick(60)  # the program has ended: the arm's own sensor counts, and nothing as its zero
+    assert robot.controller.io().tcp_force_zero is None
+    assert robot.controller.forces.wrench()[2] == pytest.approx(5.0)
+    robot.send(f.ZeroFtsensor)
+    robot.send(SimulationReset)
+    robot.tick()
+    assert robot.controller.io().tcp_force_zero is None
+
+
+# ---------------------------------------------------------------- numbers that are none
+
+
+def test_a_plant_that_measures_a_force_that_is_no_number_has_failed():
+    plant = Feeling()
+    plant.pushed[2] = np.nan
+    q = np.array(URSIM)
+    with pytest.raises(PlantError, match="no number"):
+        called(plant, 6).step(DriveCommand(q, q, q))
+
+
+@pytest.mark.parametrize("compliant", [(False, False, True, False, False, False), (True,) * 6])
+def test_a_force_that_is_no_number_stops_the_arm(compliant):
+    robot, plant = feeling()
+    force_mode(robot, compliant)
+    robot.tick(20)
+    plant.pushed[2] = np.nan
+    robot.tick(5)
+    plant.pushed[2] = 0.0
+    robot.until_rest()
+    assert "motion_stopped" in robot.kinds()
+    assert np.isfinite(robot.column("reference_q")).all()
+
+
+# ---------------------------------------------------------------- stops within moves of a program
+
+
+@pytest.mark.parametrize("move", ["movel({}, a=.5, v=.02)", "servoc({}, a=.5, v=.02)"])
+@pytest.mark.parametrize("how", ["pause", "protective stop", "end_force_mode"])
+def test_a_move_in_force_mode_does_not_go_on_without_it(how, move):
+    robot, _ = feeling()
+    there = "pose_trans(p[0.05,0,0,0,0,0], get_target_tcp_pose())"
+    start(robot, DOWN, move.format(there))
+    robot.tick(100)
+    if how == "pause":
+        assert robot.send(ProgramPause) == Done()
+    elif how == "protective stop":
+        robot.controller.motion.protect("a test")
+    else:
+        robot.send(f.EndForceMode)
+    robot.until_rest()
+    here = places(robot)[-1]
+    if how == "protective stop":
+        robot.send(c.UnlockProtectiveStop)
+    if how != "end_force_mode":  # which ends the program, as any stop of a client
+        robot.send(ProgramPlay)
+        robot.tick(50)
+        assert "force mode has ended" in failure(robot).why
+    assert not playing(robot)
+    assert np.abs(places(robot)[-1] - here).max() < 1e-4
+
+
+def test_a_move_in_force_mode_goes_on_after_a_pause_if_a_thread_keeps_calling_force_mode():
+    robot, plant = touching(1e4)
+    start(robot, "thread keep():", "while True:", DOWN, "sync()", "end", "end", "t = run keep()", "sleep(1)",
+          "movel(pose_trans(p[0.02,0,0,0,0,0], get_target_tcp_pose()), a=.5, v=.02)", "textmsg(1)",
+          "kill t")  # fmt: skip
+    pressed(robot, plant, 800)
+    here = places(robot)[-1]
+    robot.send(ProgramPause)
+    robot.until_rest()
+    robot.send(ProgramPlay)
+    forces = pressed(robot, plant, 1200)
+    assert said(robot) == ["1"]
+    assert failure(robot) is None
+    assert places(robot)[-1][0] - here[0] > 0.005
+    assert np.abs(forces[600:900] - 20.0).max() < 2.0
+
+
+def test_force_mode_that_is_called_in_a_protective_stop_begins_when_the_program_goes_on():
+    robot, _ = feeling()
+    start(robot, "sleep(.1)", "protective_stop()", DOWN, "sleep(1)")
+    robot.tick(100)
+    assert robot.send(c.UnlockProtectiveStop) == Done()
+    robot.send(ProgramPlay)
+    robot.tick(50)
+    assert robot.controller.programs.arm.guides
+
+
+# ---------------------------------------------------------------- threads
+
+
+@pytest.mark.parametrize("moves", [
+    ("movel(pose_trans(p[0.01,0,0,0,0,0], here), a=.5, v=.05)",),
+    ("movel(pose_trans(p[0.01,0,0,0,0,0], here), a=.5, v=.05, r=.002)", "sleep(.1)",
+     "movel(pose_trans(p[0.02,0,0,0,0,0], here), a=.5, v=.05)"),
+    ("i = 0", "while i < 30:", "movej(get_inverse_kin(pose_trans(p[0.001*i,0,0,0,0,0], here)), a=.5, v=.05)",
+     "i = i + 1", "end"),
+])  # fmt: skip
+def test_a_thread_gives_way_to_forces_beside_the_moves_of_another(moves):
+    """As PolyScope writes it: a thread calls force_mode in every step, and moves begin at once."""
+    robot, plant = touching(1e4)
+    start(robot, "here = get_target_tcp_pose()", "thread keep():", "while True:", DOWN, "sync()", "end", "end",
+          "t = run keep()", *moves, "sleep(1)", "textmsg(1)", "kill t", "end_force_mode()", "stopl(5)")  # fmt: skip
+    forces = []
+    while playing(robot):
+        forces.extend(pressed(robot, plant, 1))
+        assert len(forces) < 10_000
+    assert failure(robot) is None
+    assert said(robot) == ["1"]
+    assert max(forces) == pytest.approx(20.0, abs=1.5)
+
+
+# ---------------------------------------------------------------- another tool, a heavy payload
+
+
+def test_a_tool_that_is_set_in_force_mode_is_the_one_that_gives_way_from_then_on():
+    robot, plant = feeling()
+    turn = (False, False, False, True, True, True)
+    force_mode(robot, turn)
+    robot.tick(20)
+    offset = (0.0, 0.15, 0.1, 0.0, 0.0, 0.0)
+    assert robot.send(SetTcp, offset=offset) == Done()
+    plant.pushed[:3] = 0.0, 0.0, 20.0  # at the flange
+    tool = KINEMATICS.with_tool(offset)
+    before = tool.pose(robot.column("reference_q")[-1])
+    robot.tick(400)
+    after = tool.pose(robot.column("reference_q")[-1])
+    assert np.abs(after[1] - before[1]).max() < 1e-6  # it turns about the new point,
+    assert np.abs(after[0] - before[0]).max() > 0.01  # by the lever of the push
+    qdd = np.diff(robot.column("reference_q"), 2, axis=0) / H**2
+    assert np.abs(qdd).max() < 1.0
+
+
+def test_a_payload_that_is_swung_about_is_not_taken_for_a_force():
+    arm = load("ur30").quiet().without_floor()
+    robot, plant = touching(0.0, arm=arm, mass=30.0, q=(0.0, -1.3, 1.3, -1.57, -1.57, 0.0))
+    felt = []
+    for sign in (1.0, -1.0):
+        robot.send(m.SpeedJ, qd=tuple(sign * np.array([2.0, 2.0, -2.0, 0.0, 0.0, 0.0])), acceleration=25.0)
+        for _ in range(150):
+            robot.tick()
+            felt.append(np.linalg.norm(robot.controller.forces.felt(robot.controller.cycle.sample)[:3]))
+    assert min(sorted(felt)[-10:]) > 250.0  # as UR's get_tcp_force would have it, with the inertia
+    assert protective(robot) == []
+    plant.pushed = np.array([0.0, 300.0, 0.0])
+    robot.tick(10)
+    assert "above 250 N" in protective(robot)[0]
+
+
+def test_a_payload_that_is_swung_about_is_no_contact():
+    robot, _ = touching(0.0, mass=5.0)
+    start(robot, "s = 0", "i = 0", "while i < 300:", "s = s + tool_contact([0, 0, -1, 0, 0, 0])", "if i < 50:",
+          "sync()", "else:", "speedl([0, 0, -0.2, 0, 0, 0], 4, get_steptime())", "end", "i = i + 1", "end",
+          "textmsg(s)")  # fmt: skip
+    robot.tick(400)
+    assert said(robot) == ["0"]
+
+
+def test_a_contact_is_judged_anew_when_the_force_is_taken_as_zero():
+    robot, plant = feeling(payload=NOTHING)
+    plant.pushed[2] = 30.0
+    start(
+        robot,
+        "while True:",
+        "write_output_integer_register(0, tool_contact([0, 0, -1, 0, 0, 0]))",
+        "sync()",
+        "end",
+    )
+    robot.tick(100)
+    robot.send(f.ZeroFtsensor)
+    robot.tick(100)
+    assert robot.controller.io().output_int_register[0] == 0
+    plant.pushed[2] = 45.0
+    robot.tick(50)
+    assert robot.controller.io().output_int_register[0] > 0
+
+
+# ---------------------------------------------------------------- whatever happens
+
+OFFSETS = st.tuples(*[st.floats(-0.2, 0.2)] * 3, *[st.floats(-1.0, 1.0)] * 3)
+PROGRAMS = (
+    (DOWN, "movel(pose_trans(p[0.02,0,0.01,0,0,0], get_target_tcp_pose()), a=1, v=.1)", "end_force_mode()"),
+    ("thread keep():", "while True:", DOWN, "sync()", "end", "end", "t = run keep()",
+     "movel(pose_trans(p[0.02,0,0,0,0,0], get_target_tcp_pose()), a=1, v=.1, r=.005)", "sleep(.02)",
+     "movej(get_inverse_kin(pose_trans(p[0,0,0.02,0,0,0], get_target_tcp_pose())), a=1, v=.1)", "kill t", "stopl(5)"),
+    (ENABLE, "sync()", "zero_ftsensor()", DOWN, "set_tcp(p[0,0,.1,0,0,0])", "sleep(.1)"),
+    ("freedrive_mode([1,1,0,0,0,1])", "sleep(.1)", "end_freedrive_mode()", "speedl([0,0,.05,0,0,0], 1, .05)"),
+    (ENABLE, "sleep(1)"),
+)  # fmt: skip
+COMMANDS = st.one_of(
+    st.builds(
+        lambda compliant, wrench, kind, damping: (f.ForceMode, {
+            "compliant": compliant, "wrench": wrench, "limits": (0.2,) * 3 + (1e3,) * 3, "frame_type": kind,
+            "damping": damping}),
+        st.tuples(*[st.booleans()] * 6), st.tuples(*[st.floats(-60.0, 60.0)] * 3, *[st.floats(-8.0, 8.0)] * 3),
+        st.sampled_from([1, 2, 3]), st.floats(0.0, 1.0)),
+    st.builds(lambda free, frame: (f.Freedrive, {"free": free, "frame": frame}), st.tuples(*[st.booleans()] * 6),
+              st.sampled_from(["base", "tool"])),
+    st.builds(lambda xd: (m.SpeedL, {"xd": xd}), st.tuples(*[st.floats(-0.2, 0.2)] * 6)),
+    st.builds(lambda offset: (SetTcp, {"offset": offset}), OFFSETS),
+    st.builds(lambda mass: (c.SetPayload, {"mass": mass, "com": (0.0, 0.0, 0.05), "inertia": (0.0,) * 6}),
+              st.floats(0.0, 5.0)),
+    st.builds(lambda wrench: (f.SetExternalWrench, {"wrench": wrench}), st.tuples(*[st.floats(-90.0, 90.0)] * 6)),
+    st.builds(lambda lines: (ProgramRun, {"text": script(*lines)}), st.sampled_from(PROGRAMS)),
+    st.builds(lambda push: ("push", push), st.tuples(*[st.floats(-160.0, 160.0)] * 3)),
+    st.just(("push", (np.nan, 0.0, 0.0))),
+    st.sampled_from([(one, {}) for one in (
+        f.EndForceMode, f.ZeroFtsensor, m.StopJ, ProgramPause, ProgramPlay, ProgramStop, c.Pause, c.PowerOff, c.PowerOn,
+        c.UnlockProtectiveStop, SimulationReset)]),
+    st.sampled_from([("protective stop", ()), ("safeguard", (True,)), ("safeguard", (False,))]),
+    st.builds(lambda fraction: (c.SetSpeed, {"fraction": fraction}), st.floats(0.05, 1.0)),
+)  # fmt: skip
+
+
+@given(st.lists(st.tuples(COMMANDS, st.integers(1, 60)), min_size=1, max_size=12), st.booleans())
+def test_whatever_comes_in_between_force_control_keeps_to_its_limits_and_tells_how_it_ended(
+    sequence, lockstep
+):
+    robot, plant = feeling(clock="free" if lockstep else "realtime", lease_s=3600.0)
+    control, motion = robot.controller._force_control, robot.controller.motion
+    limits, started, reference = UR5E_IN_AIR.limits, None, [robot.states[-1].reference_q] * 2
+    for (kind, given_), ticks in [*sequence, ((m.StopJ, {}), 1500)]:
+        placements = robot.controller.cycle.placements
+        if kind == "push":
+            plant.pushed[:3] = given_
+        elif kind == "protective stop":
+            motion.protect("a test")
+        elif kind == "safeguard":
+            robot.controller._safety.safeguard(stopped=given_[0])
+        else:
+            robot.send(kind, **given_)
+        for _ in range(ticks):
+            told = len(robot.events)
+            state = robot.tick()
+            if robot.controller.cycle.placements != placements:
+                placements, reference = robot.controller.cycle.placements, [state.reference_q] * 2
+            reference = [*reference[-2:], state.reference_q]
+            steps = np.diff(reference, axis=0) / H
+            assert np.abs(steps).max() <= min(limits.velocity) * (1.0 + 1e-6)
+            assert np.abs(np.diff(steps, axis=0)).max() / H <= min(limits.acceleration) * (1.0 + 1e-6) + 1e-6
+            gives = control.compliant is not None
+            if gives:
+                assert motion.activity is Activity.GUIDED
+                assert (state.robot_mode, state.safety_mode) == (7, 1)
+            number = motion.motions._started if gives else None
+            if started not in {None, number}:
+                ends = [event for event in robot.events[told:] if event.kind == "motion_stopped"]
+                assert started in [event.id for event in ends]
+                assert all(event.why for event in ends)
+            started = number
+    ends = [event for event in robot.events if event.kind in {"motion_done", "motion_stopped"}]
+    assert len(ends) == robot.kinds().count("motion_started")
+    assert control.compliant is None
