@@ -126,6 +126,13 @@ def _parser() -> argparse.ArgumentParser:
         "--robots", type=_up_to(1000), default=5, help="Hidden robots of each of two arms [5]."
     )
     advice.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one.")
+    impact = part(
+        _impact, "impact", "Let a robot go down on surfaces, shaped or not, and see how it meets them."
+    )
+    impact.add_argument("--robot", default="ur5-light", help="Robot [ur5-light].")
+    impact.add_argument("--shapers", nargs="+", help="Shapers [none zv auto elastic].")
+    impact.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the robot's sensors [0].")
+    impact.add_argument("--figure", type=Path, help="File of a picture to draw, too [none].")
     _add_bridge(parts, part)
     return parser
 
@@ -340,6 +347,24 @@ def _advice(given: argparse.Namespace) -> int:
 
     result = report(given.robots, given.seed, _tell)
     _print(result, given.json, tables(result))
+    return 0
+
+
+def _impact(given: argparse.Namespace) -> int:
+    from proof.impact.report import SHAPERS, draw, landings, report, tables
+    from tvist_plant.description import DescriptionError
+    from tvist_shaping import BUILT_IN
+
+    if unknown := set(given.shapers or ()) - set(BUILT_IN.names()):
+        given.refuse(f"there is no shaper {min(unknown)}")
+    try:
+        made = landings(given.robot, given.shapers or SHAPERS, given.seed, _tell)
+    except DescriptionError as error:
+        given.refuse(str(error))
+    result = report(made)
+    _print(result, given.json, tables(result))
+    if given.figure is not None:
+        draw(made, given.figure)
     return 0
 
 

@@ -51,7 +51,7 @@ from tvist_controller.safety.supervision import Supervision
 from tvist_controller.safety.watching import REFUSED, Watching
 from tvist_controller.setup import Setup, body
 from tvist_plant.fingerprint import fingerprint
-from tvist_plant.plant import PERIOD, Placeable, Plant, PlantError, Supervised, Watched
+from tvist_plant.plant import PERIOD, InWorld, Placeable, Plant, PlantError, Supervised, Watched
 from tvist_protocol import commands as c
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Refused, Reply
@@ -93,7 +93,7 @@ class Controller(WholeRobot):
         if setup.truth:
             truth_of(self.cycle.line.plant)  # raises now, not at the first tick, if the plant has no truth
         self._seed = setup.seed
-        self._reporter = Reporter(setup.description)
+        self._reporter = Reporter(setup.description, self.cycle.line.plant)
         collisions = CollisionModel(setup.description, body(setup.payload))
         # What only watches has no power to move anything, whatever is asked of it.
         mode = "POWER_OFF" if isinstance(plant, Watched) else setup.mode
@@ -369,8 +369,7 @@ class Controller(WholeRobot):
             ValueError: The plant does not provide it.
         """
         try:
-            plant = self.cycle.line.plant
-            return self._reporter.truth(self.tick_number, plant, with_modes=self.setup.truth)
+            return self._reporter.truth(self.tick_number, with_modes=self.setup.truth)
         except PlantError as error:
             self._failed = error
             return None
@@ -433,9 +432,9 @@ class Controller(WholeRobot):
 
     def place(self, call: Call[SimulationReset]) -> Reply:
         """Place the simulated arm somewhere at rest."""
-        command, chosen = call.command, call.planned()
-        if not isinstance(self.cycle.line.plant, Placeable):
-            name = type(self.cycle.line.plant).__name__
+        command, chosen, plant = call.command, call.planned(), self.cycle.line.plant
+        if not isinstance(plant, Placeable):
+            name = type(plant).__name__
             raise RefusalError(
                 "unknown_type", "type", f"the plant {name} cannot be put anywhere: it has no reset"
             )
@@ -445,8 +444,12 @@ class Controller(WholeRobot):
             carried = carried or self.cell.empty
         placed = [] if carried is None else [carried]
         if command.q is not None:
-            placed = [self.motion.collisions.declared, *(placed or [self.cycle.line.plant.payload])]
-        self.motion.collisions.check_place(q, placed, "payload" if command.q is None else "q")
+            placed = [self.motion.collisions.declared, *(placed or [plant.payload])]
+        blamed = "payload" if command.q is None and command.payload is not None else "q"
+        self.motion.collisions.check_place(q, placed, blamed)
+        met = plant.obstacle(q, carried) if isinstance(plant, InWorld) else None
+        if met is not None:
+            raise RefusalError("collision", blamed, f"{met}: choose a posture in which the arm is clear")
         self.programs.end("simulation.reset")
         self.motion.abandon("simulation.reset")
         self._faults.clear()

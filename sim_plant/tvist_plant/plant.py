@@ -367,6 +367,14 @@ class InWorld(Protocol):
     def contact(self) -> Floats:
         """Return the force of all that touches the arm, its tool or its fingers, base frame, shape (3,) [N]."""
 
+    def obstacle(self, q: Floats, payload: Payload | None) -> str | None:
+        """Say what the arm would stand in after a reset; None if it would be clear. Asking changes nothing.
+
+        Args:
+            q: Joint angles of the reset, shape (n,) [rad].
+            payload: New carried payload; None for the present one.
+        """
+
 
 @dataclass(frozen=True)
 class Hand:

@@ -1,7 +1,10 @@
 """The arm in a world: what it touches pushes back as the scene says, and a gripper holds by friction."""
 
+from hashlib import sha256
+
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 from msgspec.structs import replace
 
@@ -31,6 +34,10 @@ def world(tmp_path, text, arm="ur5e", payload=None, **sensors):
 
 def still(q):
     return DriveCommand(np.array(q, dtype=float), np.zeros(len(q)), np.zeros(len(q)))
+
+
+def _fields(measured):
+    return [measured.q, measured.qd, measured.moment, measured.accelerometer, measured.wrench]
 
 
 def held(arm, q, ticks):
@@ -91,8 +98,11 @@ def test_noise_and_offset_are_the_files_and_follow_the_seed(tmp_path):
     np.testing.assert_allclose(rows[0].std(axis=0), [0.5] * 3 + [0.02] * 3, rtol=0.2)
 
 
+@pytest.mark.parametrize("loaded", [None, 0.0, 5.0])
 @pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5])
-def test_pressed_a_surface_yields_by_the_stiffness_it_has(tmp_path, stiffness):
+def test_pressed_a_surface_yields_by_the_stiffness_it_has_whatever_the_arm_carries(
+    tmp_path, stiffness, loaded
+):
     arm = world(tmp_path, EMPTY)
     arm.reset(still(DOWN))
     x, y, z = arm.truth().flange_position
@@ -101,7 +111,10 @@ def test_pressed_a_surface_yields_by_the_stiffness_it_has(tmp_path, stiffness):
         f'type="box" size="0.2 0.2 0.1" pos="{x} {y} {z - 0.2105}" solref="-{stiffness} -50"/></worldbody></mujoco>'
     )
     arm = world(tmp_path, text)
-    free = arm.reset(still(DOWN)).wrench
+    arm.reset(still(DOWN))
+    if loaded is not None:  # at its centre, where that has no moment
+        arm.load(Payload(mass=loaded, com=(0.0, 0.0, 0.05)))
+    free = held(arm, DOWN, 1).wrench
     q = DOWN - [0.0, 0.0, 0.006, 0.0, 0.0, 0.0]  # some millimetres down
     measured = held(arm, q, 1500)
     depth = 0.0005 - (arm.truth().flange_position[2] - z)
@@ -112,6 +125,89 @@ def test_pressed_a_surface_yields_by_the_stiffness_it_has(tmp_path, stiffness):
     assert force[2] == pytest.approx(-stiffness * touch.dist, rel=0.02), depth
     upward = arm.truth().flange_rotation @ (measured.wrench - free)[:3]
     assert upward[2] == pytest.approx(force[2], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("shape", "turned"),
+    [
+        ('euler="90 0 0" pos="0 0 0.1"', True),
+        ('axisangle="1 0 0 90" pos="0 0 0.1"', True),
+        ('xyaxes="1 0 0 0 0 1" pos="0 0 0.1"', True),
+        ('zaxis="0 1 0" pos="0 0 0.1"', True),
+        ('fromto="0 -0.05 0.1 0 0.05 0.1"', True),
+        ('pos="0 0 0.1"', False),
+    ],
+)
+def test_a_tool_is_turned_as_the_scene_says(tmp_path, shape, turned):
+    """A capsule across the flange is as wide as it is long, in its own frame and in that of its body."""
+    tool = f'<geom type="capsule" size="0.01 0.05" {shape}/>'
+    for body in (f'<body name="tool">{tool}</body>', f'<body name="tool"><frame>{tool}</frame></body>'):
+        arm = world(tmp_path, f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+        (found,) = arm.things().shapes
+        assert found.size[:2] == pytest.approx((0.01, 0.05))
+        assert found.pose[:3] == pytest.approx((0.0, 0.0, 0.1))
+        axis = pin.exp3(np.array(found.pose[3:]))[:, 2]
+        np.testing.assert_allclose(np.abs(axis), [0.0, 1.0, 0.0] if turned else [0.0, 0.0, 1.0], atol=1e-9)
+
+
+def test_the_pose_of_a_tools_body_and_the_units_of_the_scene_hold(tmp_path):
+    text = (
+        '<mujoco><compiler angle="radian" eulerseq="zyx"/><worldbody><body name="tool" pos="0 0 0.02" '
+        'euler="0 0 1.5707963267948966"><geom type="capsule" size="0.01 0.05" pos="0 0.03 0"/></body></worldbody>'
+        "</mujoco>"
+    )
+    (found,) = world(tmp_path, text).things().shapes
+    assert found.pose[:3] == pytest.approx((0.0, 0.0, 0.05))
+    np.testing.assert_allclose(pin.exp3(np.array(found.pose[3:]))[:, 2], [0.0, -1.0, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("tool", "surface", "touches"),
+    [
+        ("", "", True),
+        ('contype="0" conaffinity="0"', "", False),
+        ("", 'contype="2" conaffinity="2"', False),
+        ('contype="2" conaffinity="0"', 'contype="0" conaffinity="2"', True),
+        ('contype="4" conaffinity="4"', 'contype="2" conaffinity="2"', False),
+    ],
+)
+def test_a_tool_touches_what_its_masks_say_and_the_arm_all_that_is_solid(tmp_path, tool, surface, touches):
+    text = (
+        f'<mujoco><worldbody><body name="tool"><geom name="tip" size="0.02" {tool}/></body>'
+        f'<geom name="ground" type="plane" size="1 1 1" pos="0 0 -1" {surface}/></worldbody></mujoco>'
+    )
+    model = world(tmp_path, text)._world.model
+    both = zip(model.pair_geom1, model.pair_geom2, strict=True)
+    pairs = {frozenset(model.geom(one).name for one in pair) for pair in both}
+    assert (frozenset(("tip", "world/ground")) in pairs) == touches
+    assert frozenset(("arm forearm", "world/ground")) in pairs
+
+
+def test_a_tools_margin_is_the_pairs(tmp_path):
+    text = (
+        '<mujoco><worldbody><body name="tool"><geom name="tip" size="0.02" margin="0.003"/></body>'
+        '<geom name="ground" type="plane" size="1 1 1" pos="0 0 -1"/></worldbody></mujoco>'
+    )
+    model = world(tmp_path, text)._world.model
+    tips = (model.pair_geom1 == model.geom("tip").id) | (model.pair_geom2 == model.geom("tip").id)
+    np.testing.assert_array_equal(model.pair_margin[tips], 0.003)
+
+
+def test_what_a_reset_would_stand_in_is_known_before_and_asking_changes_nothing(tmp_path, ur5e):
+    clear, low = np.array([[-2.7, -1.8, -1.8, -1.1, 1.57, 0.0], [-2.7, -2.2, -1.8, -0.7, 1.57, 0.0]])
+    for payload in (None, Payload(mass=5.0, com=(0.0, 0.0, 0.05))):
+        asked, other = (WorldArm(ur5e, ur5e.payload, find_scene("table")) for _ in range(2))
+        for arm in (asked, other):
+            arm.reset(still(clear))
+            held(arm, clear, 5)
+        assert asked.obstacle(clear, payload) is None
+        met = asked.obstacle(low, payload)
+        assert met is not None
+        assert "stands" in met
+        assert "inside" in met
+        after = ([*_fields(arm.step(still(clear))), arm.places()] for arm in (asked, other))
+        for one, two in zip(*after, strict=True):
+            np.testing.assert_array_equal(one, two)
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.3, 0.7])
@@ -280,3 +376,35 @@ def test_a_bad_scene_is_one_sentence(tmp_path, text, said):
 def test_a_scene_that_is_missing_names_those_that_come_with_the_package():
     with pytest.raises(SceneError, match="must be one of pallet, peg, table, wall, or a file"):
         find_scene("nowhere")
+
+
+def test_the_hash_of_a_scene_covers_all_files_that_it_names(tmp_path):
+    (tmp_path / "meshes").mkdir()
+    corners = "v 0 0 0\nv {0} 0 0\nv 0 {0} 0\nv 0 0 {0}\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    part = '<mujoco><worldbody><geom name="floor" size="0.{}" pos="3 3 3"/></worldbody></mujoco>'
+    files = {
+        "scene.xml": (
+            '<mujoco><compiler meshdir="meshes"/><include file="part.xml"/><asset><mesh name="m" file="m.obj"/></asset>'
+            '<worldbody><geom type="mesh" mesh="m" pos="3 0 3"/></worldbody></mujoco>'
+        ),
+        "part.xml": part.format(1),
+        "meshes/m.obj": corners.format(1),
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    place = str(tmp_path / "scene.xml")
+    found = {find_scene(place).sha256}
+    world(tmp_path, files["scene.xml"])
+    for name, text in (("part.xml", part.format(2)), ("meshes/m.obj", corners.format(2))):
+        (tmp_path / name).write_text(text)
+        found.add(find_scene(place).sha256)
+    (tmp_path / "part.xml").unlink()
+    found.add(find_scene(place).sha256)
+    assert len(found) == 4
+    with pytest.raises(SceneError, match=r"part\.xml"):
+        world(tmp_path, files["scene.xml"])
+
+
+def test_a_scene_that_names_one_file_only_has_its_hash():
+    scene = find_scene("table")
+    assert scene.sha256 == sha256(scene.path.read_bytes()).hexdigest()

@@ -2,14 +2,22 @@
 
 import re
 
+import msgspec
 import numpy as np
 import pytest
+from tests.controller.robots import UR5E, Robot
 
 from tvist_lab.programs.expectations import Expectation, ExpectationError, _is_inside, missed
 from tvist_lab.programs.in_lockstep import run_in_lockstep
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
 from tvist_plant.plant import Shape
+from tvist_plant.world.scene_file import find_scene
+from tvist_plant.world.world_arm import WorldArm
+from tvist_protocol import commands as c
+from tvist_protocol.replies import Accepted
+from tvist_protocol.simulation import SimulationReset
+from tvist_protocol.values import Payload
 from tvist_server.config import ConfigError, ServeConfig
 
 CELL = """
@@ -36,6 +44,7 @@ LIFT = """def lift():
 end
 """
 FORCE = 80
+HEAVY = Payload(mass=5.0, com=(0.0, 0.0, 0.05), inertia=(0.01, 0.0, 0.0, 0.01, 0.0, 0.01))
 
 
 def config(tmp_path, world="table", cell=CELL):
@@ -119,6 +128,32 @@ def test_an_arm_that_would_stand_in_a_wall_is_one_sentence(tmp_path):
         ConfigError, match=r"world .*wall.xml: .* stands .* mm inside shape 0: choose a posture"
     ):
         ran(ServeConfig(world=str(tmp_path / "wall.xml"), clock="free").setup(), "def a():\nend")
+
+
+@pytest.mark.parametrize("given", [{"q": (-2.7, -2.2, -1.8, -0.7, 1.57, 0.0)}, {"payload": HEAVY}])
+def test_a_reset_into_the_world_is_refused_and_changes_nothing(given, tmp_path):
+    """Where the arm stands it is clear by less than it would bend under another payload."""
+    clear, light = (-2.7, -1.8, -1.8, -1.1, 1.57, 0.0), msgspec.structs.replace(HEAVY, mass=0.1)
+    x, y, z = Robot(q=clear, carried=light).controller.cycle.line.plant.truth().flange_position
+    (tmp_path / "scene.xml").write_text(
+        '<mujoco><worldbody><body name="tool"><geom type="sphere" size="0.01" pos="0 0 0.1"/></body><geom name="plate" '
+        f'type="box" size="0.1 0.1 0.01" pos="{x} {y} {z - 0.12 - 4e-4}"/></worldbody></mujoco>'
+    )
+    scene = find_scene(str(tmp_path / "scene.xml"))
+    robots = [
+        Robot(q=clear, carried=light, plant=WorldArm(UR5E, UR5E.payload, scene), truth=True) for _ in range(2)
+    ]
+    for one in robots:
+        one.tick(5)
+    reply = robots[0].send(SimulationReset, **given, seed=7, mode="IDLE", shaper="ei")
+    assert (reply.code, reply.where) == ("collision", next(iter(given)))
+    assert "mm inside plate: choose a posture" in reply.why
+    for one in robots:
+        assert isinstance(one.send(c.MoveJ, q=(-2.7, -1.7, -1.7, -1.3, 1.57, 0.0)), Accepted)
+        one.until_rest()
+    assert robots[0].states == robots[1].states
+    assert robots[0].events == robots[1].events
+    assert robots[0].controller.truth() == robots[1].controller.truth()
 
 
 def test_a_scene_that_has_changed_is_noted_and_one_that_has_gone_is_asked_for(tmp_path):

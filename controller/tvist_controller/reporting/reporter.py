@@ -19,13 +19,17 @@ class Reporter:
 
     Args:
         description: The robot.
+        plant: Its arm, of which truths are.
     """
 
-    def __init__(self, description: RobotDescription) -> None:
+    def __init__(self, description: RobotDescription, plant: Plant) -> None:
         self._joints = description.joints
         self._kinematics = ForwardKinematics(description)
         self._layouts = Layouts()
         self._true_modes: dict[str, list[float]] = {}
+        self._plant = plant
+        self._modal = plant if isinstance(plant, ModalPlant) else None
+        self._world = plant if isinstance(plant, InWorld) else None
 
     def report(
         self,
@@ -59,27 +63,25 @@ class Reporter:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self._kinematics = self._kinematics.with_tool(offset)
 
-    def truth(self, tick: int, plant: Plant, *, with_modes: bool) -> Truth:
+    def truth(self, tick: int, *, with_modes: bool) -> Truth:
         """Return what a real robot cannot measure, after a tick.
 
         Its modes are updated every `TRUE_MODES_EVERY` ticks; they are empty lists if the plant does not provide them.
 
         Args:
             tick: Number of the tick.
-            plant: The plant.
             with_modes: Whether modes are wanted: they take half a tick to compute.
 
         Raises:
             ValueError: The plant does not provide the truth.
         """
         if with_modes and (not self._true_modes or tick % TRUE_MODES_EVERY == 0):
-            modes = plant.modes() if isinstance(plant, ModalPlant) else None
+            modes = None if self._modal is None else self._modal.modes()
             self._true_modes = {
                 name: [] if modes is None else getattr(modes, name)[: self._joints].tolist()
                 for name in ("f_d", "zeta", "participation")
             }
-        truth = truth_of(plant)
-        world = plant if isinstance(plant, InWorld) else None
+        truth, world = truth_of(self._plant), self._world
         return Truth(
             tick=tick,
             timestamp=tick * PERIOD,

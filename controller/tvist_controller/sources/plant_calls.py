@@ -18,6 +18,7 @@ _MEASURING = ("step", "reset", "measure")
 _OTHERS = (
     "truth", "switch", "stop", "wait", "sight", "interval", "load", "push", "make_nan", "play", "held", "modes", "seen",
     "described", "things", "places", "contact", "mount", "grip", "opening",
+    "obstacle",
 )  # fmt: skip
 _TELLING = ("truth", "play", "held", "modes")
 MOST_KEPT = 10

@@ -43,13 +43,16 @@ FIRMEST = 0.5
 
 _FLAT = {int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_PLANE)}
 
+ALL = 0x7FFFFFFF
+"""`contype` and `conaffinity` of what touches every solid shape: the arm and the fingers."""
+
 Names = frozenset[str]
+Contacts = Sequence[tuple[float | None, float | None]]
+"""Stiffness [N/m] and damping [N s/m] of each pair of shapes, where a shape gives them."""
 
 
-def add_pairs(
-    spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names
-) -> list[tuple[float | None, float | None]]:
-    """Add every pair of shapes that may touch; return the stiffness and the damping of each where a shape gives them.
+def add_pairs(spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names) -> Contacts:
+    """Add every pair of shapes that may touch.
 
     Args:
         spec: The world; all its shapes have names.
@@ -61,7 +64,7 @@ def add_pairs(
     """
     own = {frozenset((pair.geomname1, pair.geomname2)) for pair in spec.pairs}
     apart = {frozenset((one.bodyname1, one.bodyname2)) for one in spec.excludes}
-    shapes = [one for one in spec.geoms if one.contype or one.conaffinity or one.name in arm]
+    shapes = [one for one in spec.geoms if one.contype or one.conaffinity]
     given: list[tuple[float | None, float | None]] = [(None, None)] * len(spec.pairs)
     for first, second in _touching(shapes, model, arm, apart):
         if frozenset((first.name, second.name)) in own:
@@ -83,8 +86,8 @@ def add_pairs(
     return given
 
 
-def set_contacts(model: "mujoco.MjModel", given: Sequence[tuple[float | None, float | None]]) -> None:
-    """Give each pair of a compiled world its spring and damper, as far as it is one of ours.
+def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
+    """Give each pair of a world its spring and damper, as far as it is one of ours, for the masses that it has now.
 
     Args:
         model: The world.
@@ -142,13 +145,16 @@ def _touching(
     """Pairs of shapes by MuJoCo's own rules: one of them moves, and they are not of one body nor of neighbours."""
     fixed_to = model.body_weldid
     for first, second in combinations(shapes, 2):
-        ours = (first.name in arm) + (second.name in arm)
         one, other = (int(fixed_to[model.geom(shape.name).bodyid[0]]) for shape in (first, second))
-        if ours == 2 or one == other or frozenset((first.parent.name, second.parent.name)) in apart:
+        if (
+            arm >= {first.name, second.name}
+            or one == other
+            or frozenset((first.parent.name, second.parent.name)) in apart
+        ):
             continue
         if one and other and (_joins(model, one, other) or _joins(model, other, one)):
             continue
-        if ours or first.contype & second.conaffinity or second.contype & first.conaffinity:
+        if first.contype & second.conaffinity or second.contype & first.conaffinity:
             yield first, second
 
 

@@ -5,6 +5,7 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_plant.plant import Hand
+from tvist_plant.world.contacts import ALL
 
 PAD = (0.011, 0.004, 0.03)
 """Half of the lengths of a finger along x y z of the tool centre point [m]."""
@@ -45,7 +46,7 @@ def add_fingers(spec: "mujoco.MjSpec", load: "mujoco.MjsBody", hand: Hand) -> No
         )
         finger.add_geom(
             name=name, type=mujoco.mjtGeom.mjGEOM_BOX, size=list(PAD), mass=0.0, condim=4, friction=list(FRICTION),
-            rgba=[0.25, 0.25, 0.27, 1.0],
+            rgba=[0.25, 0.25, 0.27, 1.0], contype=ALL, conaffinity=ALL,
         )  # fmt: skip
     linkage = spec.add_tendon(stiffness=TOGETHER, damping=DAMPING, springlength=[0.0, 0.0])
     for name, side in SIDES.items():

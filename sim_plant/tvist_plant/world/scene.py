@@ -9,7 +9,7 @@ import pinocchio as pin
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import Hand, Shape, Things
 from tvist_plant.world.arm_form import LOAD, arm_spec, link_name
-from tvist_plant.world.contacts import IMPRATIO, PREFIX, add_pairs, check_masses, set_contacts
+from tvist_plant.world.contacts import ALL, IMPRATIO, PREFIX, Contacts, add_pairs, check_masses, set_contacts
 from tvist_plant.world.fingers import add_fingers
 from tvist_plant.world.scene_file import SceneError, SceneFile
 
@@ -33,6 +33,8 @@ class World:
 
     model: "mujoco.MjModel"
     """Both, the arm first."""
+    contacts: Contacts
+    """Result of `add_pairs`, for `set_contacts`."""
     things: Things
     """What there is besides the arm."""
     bodies: tuple[int, ...]
@@ -77,7 +79,8 @@ def _build(
     _name_all(spec, "arm ")
     load, before = spec.body(LOAD), {one.name for one in spec.bodies}
     if tooled:
-        _mount(tool, load)
+        content.compiler.fusestatic = False  # else the tool would be part of the world
+        _mount(tool, load, content.compile())
         content.delete(tool)
     if hand is not None:
         add_fingers(spec, load, hand)
@@ -102,11 +105,16 @@ def _build(
             f"{len(bodies)} of its bodies move, too many for real time: must be at most {MOST_BODIES}"
         )
     own = tuple(number for number, name in enumerate(names) if name in mounted and number)
-    return World(model, _things(scene.name, model, bodies, set(own) - set(bodies)), bodies, own)
+    return World(model, given, _things(scene.name, model, bodies, set(own) - set(bodies)), bodies, own)
 
 
-def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody") -> None:
+def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody", alone: "mujoco.MjModel") -> None:
     """Mount the shapes of the scene's tool on the flange; their weight is the payload's.
+
+    Args:
+        tool: The tool.
+        load: Body of what is beyond the flange.
+        alone: The scene, compiled, in which poses and sizes are numbers however the file gives them.
 
     Raises:
         SceneError: It is more than shapes of primitive kinds.
@@ -115,12 +123,17 @@ def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody") -> None:
         raise SceneError(
             "the body 'tool', which is mounted on the flange, has joints or bodies: must have shapes only"
         )
+    body = alone.body(tool.name)
+    base, turn = np.zeros(3), np.zeros(4)
     for number, one in enumerate(tool.geoms):
-        if one.type not in _KINDS:
+        shape = alone.geom(body.geomadr[0] + number)
+        if (kind := mujoco.mjtGeom(shape.type[0])) not in _KINDS:
             raise SceneError(f"shape {number} of the body 'tool' is a mesh: must be a primitive shape")
-        made = load.add_geom(name=one.name or f"tool shape {number}", type=one.type, size=one.size, mass=0.0)
-        made.pos, made.quat, made.fromto = one.pos, one.quat, one.fromto
-        made.friction, made.condim, made.solref, made.rgba = one.friction, one.condim, one.solref, one.rgba
+        mujoco.mju_mulPose(base, turn, body.pos, body.quat, shape.pos, shape.quat)
+        made = load.add_geom(name=one.name or f"tool shape {number}", type=kind, size=shape.size, mass=0.0)
+        made.pos, made.quat, made.rgba = base, turn, shape.rgba
+        for name in ("friction", "condim", "solref", "margin", "contype", "conaffinity"):
+            setattr(made, name, getattr(one, name))
 
 
 def _add_capsules(
@@ -141,6 +154,8 @@ def _add_capsules(
             fromto=ends,
             mass=0.0,
             friction=[0, 0, 0],
+            contype=ALL,
+            conaffinity=ALL,
         )
     radius, end = description.collision.payload_radius, 2.0 * np.array(payload.com)
     if hand is not None:  # the palm, as far as the fingers' roots
@@ -148,8 +163,9 @@ def _add_capsules(
     if not tooled and description.collision.bodies and (payload.mass or hand is not None):
         ends = _ends((0.0, 0.0, 0.0), tuple(end.tolist()))
         spec.body(LOAD).add_geom(
-            name="arm payload", type=capsule, size=[radius, 0, 0], fromto=ends, mass=0.0, friction=[0, 0, 0]
-        )
+            name="arm payload", type=capsule, size=[radius, 0, 0], fromto=ends, mass=0.0, friction=[0, 0, 0],
+            contype=ALL, conaffinity=ALL,
+        )  # fmt: skip
 
 
 def _ends(start: tuple[float, ...], end: tuple[float, ...]) -> list[float]:

@@ -1,8 +1,9 @@
 """Files of scenes: those that come with the package, by name, and a user's own, by path."""
 
 from dataclasses import dataclass
-from hashlib import sha256
+from hashlib import file_digest, sha256
 from pathlib import Path
+from xml.etree.ElementTree import Element
 
 from tvist_plant.user_file import UserFileError, read_bytes, xml
 
@@ -23,7 +24,7 @@ class SceneFile:
     path: Path
     """Its file."""
     sha256: str
-    """SHA-256 of the file, in hexadecimal; it says nothing of files that this one includes."""
+    """SHA-256 of the file, in hexadecimal; if it names others, such as meshes, of the hashes of all."""
 
 
 def scenes() -> list[str]:
@@ -51,11 +52,38 @@ def find_scene(name: str) -> SceneFile:
     except UserFileError as error:
         raise SceneError(str(error)) from error
     try:
-        root = xml(content).tag
-    except UserFileError as error:
+        root = xml(content)
+        others = [_hash(file) for file in _named(root, path.parent)]
+    except (UserFileError, OSError) as error:
         raise SceneError(f"world {name}: {error}") from error
-    if root != "mujoco":
+    if root.tag != "mujoco":
         raise SceneError(
-            f"world {name}: it begins with <{root}>: must be a file in MuJoCo's format, <mujoco>"
+            f"world {name}: it begins with <{root.tag}>: must be a file in MuJoCo's format, <mujoco>"
         )
-    return SceneFile(name, path.resolve(), sha256(content).hexdigest())
+    own = sha256(content).hexdigest()
+    whole = sha256("".join((own, *others)).encode()).hexdigest() if others else own
+    return SceneFile(name, path.resolve(), whole)
+
+
+def _named(root: Element, folder: Path) -> list[Path]:
+    """Return the files that a scene in a folder names, and those that included ones name.
+
+    What is missing is left out; MuJoCo will say so.
+    """
+    folders, names, elements = {folder}, set[str](), list(root.iter())
+    for one in elements:  # they become more with each included file
+        for key, value in one.items():
+            if one.tag == "compiler" and key.endswith("dir"):
+                folders.add(folder / value)
+            elif key.startswith("file") and value not in names:
+                names.update((value, Path(value).name))  # `strippath` leaves the name only
+                if one.tag in {"include", "model"} and (folder / value).is_file():
+                    folders.add((folder / value).parent)
+                    elements += xml(read_bytes(folder / value, "included file")).iter()
+    places = {place / name for place in folders for name in names}
+    return sorted(place for place in places if place.is_file())
+
+
+def _hash(file: Path) -> str:
+    with file.open("rb") as stream:
+        return file_digest(stream, "sha256").hexdigest()

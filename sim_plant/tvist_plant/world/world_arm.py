@@ -1,5 +1,8 @@
 """The arm in MuJoCo among things that it touches, as a plant."""
 
+from copy import copy
+
+import mujoco
 import numpy as np
 import pinocchio as pin
 
@@ -8,7 +11,7 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.model import Floats
 from tvist_plant.plant import Hand, Measurement, PlantError, Response, Things
 from tvist_plant.sensors import Accelerometer, ForceSensor
-from tvist_plant.world.contacts import PREFIX
+from tvist_plant.world.contacts import PREFIX, set_contacts
 from tvist_plant.world.fingers import Fingers
 from tvist_plant.world.mujoco_arm import TIMESTEP, MujocoArm
 from tvist_plant.world.scene import build
@@ -70,9 +73,9 @@ class WorldArm(MujocoArm):
         if self._fingers is not None:
             self._fingers.open()
         measured = super().reset(command, payload=payload, seed=seed)
-        met = self._met()
+        met = self._met(self._arm.data)
         if met is not None:
-            raise PlantError(f"world {self._scene.name}: {met}: choose a posture in which the arm is clear")
+            raise PlantError(f"{met}: choose a posture in which the arm is clear")
         return measured
 
     def step(self, command: DriveCommand) -> Measurement:
@@ -112,6 +115,7 @@ class WorldArm(MujocoArm):
         """Carry another payload from now on; see `Loadable`. Its shape in the world stays the first one's."""
         self._payload = payload
         self._arm.carry(payload)
+        set_contacts(self._world.model, self._world.contacts)  # their stiffness is relative to the masses
 
     def push(self, torque: Floats) -> None:
         """Apply external torques to the joints; see `Pushable`."""
@@ -137,15 +141,24 @@ class WorldArm(MujocoArm):
         """Return the force of all that touches the arm, base frame, shape (3,) [N]."""
         return np.asarray(self._arm.data.cfrc_ext[self._own, 3:].sum(axis=0))
 
-    def _met(self) -> str | None:
+    def obstacle(self, q: Floats, payload: Payload | None) -> str | None:
+        """Say what the arm would stand in after a reset; see `InWorld`."""
+        arm = SecondOpinion(self._description, self._payload, TIMESTEP, copy(self._world.model))
+        if payload is not None:
+            arm.carry(payload)  # it bends the arm
+        arm.reset(DriveCommand(q, np.zeros(len(q)), np.zeros(len(q))))
+        return self._met(arm.data)
+
+    def _met(self, data: "mujoco.MjData") -> str | None:
         """Say what the arm stands in; None if it is clear."""
-        model, data = self._world.model, self._arm.data
+        model = self._world.model
         for touch in data.contact[: data.ncon]:
             bodies = [int(model.geom_bodyid[geom]) for geom in touch.geom]
             if touch.dist < -DEEPEST and any(body in self._world.arm or model.geom(geom).name.startswith("arm ")
                                              for body, geom in zip(bodies, touch.geom, strict=True)):  # fmt: skip
                 first, second = (model.geom(geom).name.removeprefix(PREFIX) for geom in touch.geom)
-                return f"{first} stands {-1e3 * touch.dist:.3g} mm inside {second}"
+                depth = -1e3 * touch.dist
+                return f"world {self._scene.name}: {first} stands {depth:.3g} mm inside {second}"
         return None
 
     # ------------------------------------------------------------------ the gripper

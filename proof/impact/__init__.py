@@ -1,0 +1,1 @@
+"""What shaping does to impact and to settling on a surface."""
