@@ -14,9 +14,11 @@ from tvist_protocol.commands import UnlockProtectiveStop
 from tvist_protocol.programs import ProgramPause, ProgramPlay
 from tvist_protocol.simulation import SimulationInject
 from tvist_server.moving import registers as r
-from tvist_server.moving.program import program
+from tvist_server.moving.program import CLOSE, program
 from tvist_server.moving.window import Window
 
+BACK = 1.1 * CLOSE / H**2
+"""Acceleration with which the rest of a distance from the set-points is made up for [rad/s²]."""
 GIVEN = {"speed": 0.5, "deceleration": 4.0, "lookahead": 0.03, "gain": 2000.0}
 DOCUMENTED = {
     *("get_steptime", "sync", "pow", "norm", "servoj", "stopj", "get_target_joint_positions", "textmsg"),
@@ -103,7 +105,7 @@ def test_a_bad_link_shows_by_smooth_detours_that_fade(seed, speed, jitter, stall
     told, own = np.array(robot.told), of_path(path, robot.numbers)
     ways, own_ways = np.diff(told, axis=0), own[1:] - of_path(path, np.array(robot.numbers[1:]) - 1)
     assert np.abs(ways - own_ways).max() <= 2e-3
-    assert np.abs(np.diff(ways, axis=0)).max() / H**2 <= 25.0 * speed
+    assert np.abs(np.diff(ways, axis=0)).max() / H**2 <= 25.0 * speed + BACK
     fades = np.abs(told - own).max(axis=1)
     assert fades.max() <= 0.05 * speed
     assert fades[-1] <= 1e-3 * speed
@@ -227,7 +229,7 @@ def test_the_first_set_point_may_be_a_hundredth_of_a_radian_away(away):
         return
     told = np.array(robot.told)
     assert np.abs(told[-1] - path[0]).max() <= 1e-6
-    assert np.abs(np.diff(told, 2, axis=0)).max() / H**2 <= 0.01 / 0.05**2
+    assert np.abs(np.diff(told, 2, axis=0)).max() / H**2 <= 0.01 / 0.05**2 + BACK
     robot.until_ended().assert_kept(last)
 
 

@@ -15,6 +15,8 @@ AWAY = 0.01
 """Largest distance of a joint from the first set-point [rad]."""
 AGAIN = 0.016
 """Longest time from the arrival of the last set-point in which the next is expected to be on its way again [s]."""
+CLOSE = 3e-5
+"""Distance from the set-points that is made up for in a period [rad]."""
 LATER = 3
 """Number of periods in which set-points come too late until the program waits for them longer."""
 FADE = 0.05
@@ -52,11 +54,19 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         | {f"state_{one.name.lower()}": int(one) for one in State}
         | {"name": NAME, "run": run, "speed": float(MARGIN * speed)}
         | {"deceleration": float(deceleration), "lookahead": float(lookahead), "gain": float(gain)}
-        | {"silence": SILENCE, "first": FIRST, "away": AWAY, "fade": FADE, "again": AGAIN, "later": LATER}
+        | {
+            "silence": SILENCE,
+            "first": FIRST,
+            "away": AWAY,
+            "fade": FADE,
+            "again": AGAIN,
+            "later": LATER,
+            "close": CLOSE,
+        }
         | {
             "leaps": " and ".join(f"norm(leap[{j}]) <= far" for j in range(JOINTS)),
             "ways": "\n".join(
-                f"        if norm(way[{j}]) > most:\n          way[{j}] = change[{j}]\n        end"
+                f"          if norm(way[{j}]) > most:\n            way[{j}] = change[{j}]\n          end"
                 for j in range(JOINTS)
             ),
             "angles": ", ".join(
@@ -195,13 +205,22 @@ def $name():
       elif norm(q - get_target_joint_positions()) > near:
         why = $ended_strayed
       end
-      way = own + extra * keep - (q - previous) * pull
+      off = q - previous
+      if norm(off) <= $close: # back onto the set-points at once, which servoj smooths
+        way = own - off
+      else:
+        way = own + extra * keep - off * pull
+      end
       far = most * gap
       if not (norm(leap) <= far and norm(way) <= most): # of all joints; only then a tick is to look at each
         if not ($leaps): # nor is what is no number
           why = $ended_too_fast
         end
+        if gap != 1: # there is no time for each once more
+          way = change
+        else:
 $ways
+        end
       end
       extra = way - own
       last = new
