@@ -15,7 +15,7 @@ AWAY = 0.01
 """Largest distance of a joint from the first set-point [rad]."""
 AGAIN = 0.016
 """Longest time from the arrival of the last set-point in which the next is expected to be on its way again [s]."""
-CLOSE = 3e-5
+CLOSE = 1e-4
 """Distance from the set-points that is made up for in a period [rad]."""
 LATER = 3
 """Number of periods in which set-points come too late until the program waits for them longer."""
