@@ -16,7 +16,7 @@ AWAY = 0.01
 AGAIN = 0.016
 """Longest time from the arrival of the last set-point in which the next is expected to be on its way again [s]."""
 CLOSE = 1e-4
-"""Distance from the set-points that is made up for in a period [rad]."""
+"""Distance from the set-points, and from their way in a period, that is made up for in a period [rad]."""
 LATER = 3
 """Number of periods in which set-points come too late until the program waits for them longer."""
 FADE = 0.05
@@ -206,7 +206,7 @@ def $name():
         why = $ended_strayed
       end
       off = q - previous
-      if norm(off) <= $close: # back onto the set-points at once, which servoj smooths
+      if norm(off) + norm(extra) <= $close: # back onto the set-points at once, which servoj smooths
         way = own - off
       else:
         way = own + extra * keep - off * pull
