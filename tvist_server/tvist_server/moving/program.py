@@ -15,8 +15,10 @@ AWAY = 0.01
 """Largest distance of a joint from the first set-point [rad]."""
 AGAIN = 0.016
 """Longest time from the arrival of the last set-point in which the next is expected to be on its way again [s]."""
-CLOSE = 1e-4
-"""Distance from the set-points that is made up for in a period [rad]."""
+CLOSE = 3e-4
+"""Distance from the set-points, and from their way in a period, that is made up for in a period [rad]."""
+AFTER_SHIFT = 1e-5
+"""The same after the program has shifted the motion in time, which is no error that is soon over [rad]."""
 LATER = 3
 """Number of periods in which set-points come too late until the program waits for them longer."""
 FADE = 0.05
@@ -62,6 +64,7 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
             "again": AGAIN,
             "later": LATER,
             "close": CLOSE,
+            "after_shift": AFTER_SHIFT,
         }
         | {
             "leaps": " and ".join(f"norm(leap[{j}]) <= far" for j in range(JOINTS)),
@@ -130,6 +133,7 @@ def $name():
   left_out = 0
   silence = 0.0
   later = 0 # periods in which set-points came, but too late, since one had been early
+  close = $close # distance that is made up for at once [rad]
   blind = True # whether the last period was without a set-point that had come
 
   why = $ended_not
@@ -158,6 +162,7 @@ def $name():
     if behind > 2 or later > $later: # set-points come less late than at first, or later, and not for once
       number = now - 1
       later = 0
+      close = $after_shift
     end
 
     if read_input_integer_register($ORDER) != $run:
@@ -206,8 +211,9 @@ def $name():
         why = $ended_strayed
       end
       off = q - previous
-      if norm(off) <= $close: # back onto the set-points at once, which servoj smooths
+      if norm(off) + norm(extra) <= close: # back onto the set-points at once, which servoj smooths
         way = own - off
+        close = $close
       else:
         way = own + extra * keep - off * pull
       end
