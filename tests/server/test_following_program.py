@@ -166,6 +166,27 @@ def test_it_brakes_within_40_ms_of_the_last_set_point(speed, moment):
     assert before <= robot.most
 
 
+LATE = (
+    "1211221001222311123234223212231223223432122212112221232231223121221223122112221223222221112122321211210"
+)
+"""Periods by which packages are late on a bad link, one a digit."""
+
+
+@pytest.mark.parametrize(("speed", "share"), [(0.05, 0.97), (1.0, 0.97), (1.0, 1.0), (2.5, 1.0)])
+def test_joints_at_their_largest_speed_fall_behind_no_further_once_a_bad_link_is_good(speed, share):
+    """On a robot of 125 Hz; neither do they stay behind, since the program may be faster than the set-points."""
+    count, step = 900, 0.008
+    speeds = np.clip((np.arange(count) - 8) * step * 40.0 * speed, 0.0, share * speed)
+    path = HERE + np.outer(np.cumsum(speeds) * step, (1.0, -0.15, 0.1, 0.2, 0.3, -1.0))
+    newest = np.maximum.accumulate([k - int(by) for k, by in enumerate(LATE)]).tolist()
+    arrivals = [[place] if place >= 0 else [] for place in [*newest, *range(len(LATE), count)]]
+    robot, _ = followed(path, arrivals, count, speed=speed, step=step)
+    assert robot.state is r.State.FOLLOWING
+    off = np.abs(np.array(robot.told) - of_path(path, robot.numbers)).max(axis=1)
+    assert off[len(LATE) + 10 :].max() <= off[: len(LATE) + 10].max()
+    assert off[-1] <= 1e-9
+
+
 @pytest.mark.parametrize("lost", [3, 7, 12, 17])
 def test_a_sender_that_has_lost_periods_for_good_is_followed_later_by_as_many(lost):
     path = swings(1000, 0.45)

@@ -66,7 +66,8 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         | {
             "leaps": " and ".join(f"norm(leap[{j}]) <= far" for j in range(JOINTS)),
             "ways": "\n".join(
-                f"          if norm(way[{j}]) > most:\n            way[{j}] = change[{j}]\n          end"
+                f"          if way[{j}] > most:\n            way[{j}] = most\n"
+                f"          elif way[{j}] < least:\n            way[{j}] = least\n          end"
                 for j in range(JOINTS)
             ),
             "angles": ", ".join(
@@ -105,6 +106,7 @@ def $name():
 
   step = get_steptime()
   most = $speed * step # largest way of a joint in a period [rad]
+  least = -most
   near = $away + 4.0 * $speed * ($lookahead + 4.0 * step) # largest distance of the arm from where servoj leads it [rad]
   keep = pow($fade / ($fade + step), 2) # a distance from the set-points fades as if damped critically:
   pull = pow(step / ($fade + step), 2) # what a period keeps of its velocity, and how it pulls
