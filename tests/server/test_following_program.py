@@ -187,6 +187,25 @@ def test_joints_at_their_largest_speed_fall_behind_no_further_once_a_bad_link_is
     assert off[-1] <= 1e-9
 
 
+@pytest.mark.parametrize("together", [2, 3, 4])
+@pytest.mark.parametrize("slip", [0, 1, 2, 3])
+@pytest.mark.parametrize("speed", [0.5, 2.5])
+def test_packages_that_come_together_are_followed_at_the_largest_speed_whenever_they_come(
+    together, slip, speed
+):
+    """All joints are as fast as they may be; from some moment on, packages come later by some periods."""
+    count = 900
+    passed = np.minimum(np.cumsum(np.clip((np.arange(count) - 100) * H * 5.0, 0.0, speed)) * H, 0.7 * speed)
+    path = HERE + np.outer(passed, (1.0, -1.0, 1.0, 1.0, 1.0, -1.0))
+    newest = [(k + 1 - (slip if k > 40 else 0)) // together * together - 1 for k in range(count)]
+    arrivals = [[b] if b > a else [] for a, b in zip([-1, *newest], newest, strict=False)]
+    robot, _ = followed(path, arrivals, count, speed=speed)
+    assert robot.state is r.State.FOLLOWING
+    off = np.abs(np.array(robot.told) - of_path(path, robot.numbers)).max(axis=1)
+    assert off.max() <= 0.03 * speed
+    assert off[-1] <= CLOSE
+
+
 @pytest.mark.parametrize("lost", [3, 7, 12, 17])
 def test_a_sender_that_has_lost_periods_for_good_is_followed_later_by_as_many(lost):
     path = swings(1000, 0.45)

@@ -131,7 +131,7 @@ def $name():
   alone = 0
   left_out = 0
   silence = 0.0
-  later = 0 # periods in which set-points came, but too late, since one had been early
+  later = 0 # gaps, and periods in which set-points came, but too late, since one had been early
   blind = True # whether the last period was without a set-point that had come
 
   why = $ended_not
@@ -157,7 +157,7 @@ def $name():
     end
     number = number + 1
     behind = now - number
-    if behind > 2 or later > $later: # set-points come less late than at first, or later, and not for once
+    if behind > 2 or (later > $later and silence == 0.0): # set-points come less late than at first, or later for good
       number = now - 1
       later = 0
     end
@@ -189,7 +189,7 @@ def $name():
         way = change
       end
       alone = alone + 1
-      if silence == 0.0:
+      if silence == 0.0 or not lone:
         later = later + 1
       end
     else:
