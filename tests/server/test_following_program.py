@@ -273,6 +273,20 @@ def test_the_first_set_point_may_be_a_hundredth_of_a_radian_away(away):
     robot.until_ended().assert_kept(last)
 
 
+@pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.parametrize("waits", [0, 50])
+def test_a_program_that_waits_is_ended_at_once(number, waits):
+    """Else the robot would take no program for as long as it waits."""
+    package = (number, -RUN, *(4 * tuple(HERE)))
+    robot = Alone(before=None if waits else package)
+    robot.steps(waits)
+    robot.write(*package)
+    robot.steps(10)
+    assert robot.state is r.State.ENDED
+    assert robot.ended is r.Ended.ORDERED
+    assert not robot.told
+
+
 def test_registers_of_before_move_nothing():
     robot = Alone(before=packages(swings(600, 0.4), 400)[-1])
     robot.steps(1000)

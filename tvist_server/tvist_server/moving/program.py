@@ -83,7 +83,7 @@ def $name():
   # when they stop. It moves nothing before the first has come, and after a stop it has ended.
   #
   # Input registers, which one package writes:
-  #   integer $NUMBER: number of the newest set-point, 1 more in each period; integer $ORDER: $run to follow
+  #   integer $NUMBER: number of the newest set-point, 1 more in each period; integer $ORDER: $run to follow, -$run: end
   #   float $SETPOINTS to 47: the newest set-point and the three before it, six joint angles each [rad]
   # Output registers:
   #   integer $STATE: $state_waiting waiting, $state_following following, $state_braking braking, $state_ended ended
@@ -115,9 +115,11 @@ def $name():
   old = read_input_integer_register($NUMBER)
   newest = old
   waited = 0.0
-  while waited < $first and (newest == old or read_input_integer_register($ORDER) != $run):
+  order = read_input_integer_register($ORDER)
+  while waited < $first and order != -$run and (newest == old or order != $run):
     sync()
     waited = waited + step
+    order = read_input_integer_register($ORDER)
     newest = read_input_integer_register($NUMBER)
   end
 
@@ -141,6 +143,9 @@ def $name():
       why = $ended_away
     end
     i = i + 1
+  end
+  if order != $run:
+    why = $ended_ordered
   end
   if waited >= $first:
     why = $ended_silence
