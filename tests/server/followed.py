@@ -134,8 +134,8 @@ class OnRobot(Followed):
 class Alone(Followed):
     """The program with nothing but registers, on an arm that follows some periods later."""
 
-    def __init__(self, *, speed=0.5, deceleration=4.0, before=None, lag=LAG):
-        super().__init__(speed, deceleration, H)
+    def __init__(self, *, speed=0.5, deceleration=4.0, before=None, lag=LAG, step=H):
+        super().__init__(speed, deceleration, step)
         self._ints, self._doubles, self._outputs = [0] * 48, [0.0] * 48, [0] * 48
         functions = {
             "get_steptime": lambda: H,

@@ -166,6 +166,46 @@ def test_it_brakes_within_40_ms_of_the_last_set_point(speed, moment):
     assert before <= robot.most
 
 
+LATE = (
+    "1211221001222311123234223212231223223432122212112221232231223121221223122112221223222221112122321211210"
+)
+"""Periods by which packages are late on a bad link, one a digit."""
+
+
+@pytest.mark.parametrize(("speed", "share"), [(0.05, 0.97), (1.0, 0.97), (1.0, 1.0), (2.5, 1.0)])
+def test_joints_at_their_largest_speed_fall_behind_no_further_once_a_bad_link_is_good(speed, share):
+    """On a robot of 125 Hz; neither do they stay behind, since the program may be faster than the set-points."""
+    count, step = 900, 0.008
+    speeds = np.clip((np.arange(count) - 8) * step * 40.0 * speed, 0.0, share * speed)
+    path = HERE + np.outer(np.cumsum(speeds) * step, (1.0, -0.15, 0.1, 0.2, 0.3, -1.0))
+    newest = np.maximum.accumulate([k - int(by) for k, by in enumerate(LATE)]).tolist()
+    arrivals = [[place] if place >= 0 else [] for place in [*newest, *range(len(LATE), count)]]
+    robot, _ = followed(path, arrivals, count, speed=speed, step=step)
+    assert robot.state is r.State.FOLLOWING
+    off = np.abs(np.array(robot.told) - of_path(path, robot.numbers)).max(axis=1)
+    assert off[len(LATE) + 10 :].max() <= off[: len(LATE) + 10].max()
+    assert off[-1] <= 1e-9
+
+
+@pytest.mark.parametrize("together", [2, 3, 4])
+@pytest.mark.parametrize("slip", [0, 1, 2, 3])
+@pytest.mark.parametrize("speed", [0.5, 2.5])
+def test_packages_that_come_together_are_followed_at_the_largest_speed_whenever_they_come(
+    together, slip, speed
+):
+    """All joints are as fast as they may be; from some moment on, packages come later by some periods."""
+    count = 900
+    passed = np.minimum(np.cumsum(np.clip((np.arange(count) - 100) * H * 5.0, 0.0, speed)) * H, 0.7 * speed)
+    path = HERE + np.outer(passed, (1.0, -1.0, 1.0, 1.0, 1.0, -1.0))
+    newest = [(k + 1 - (slip if k > 40 else 0)) // together * together - 1 for k in range(count)]
+    arrivals = [[b] if b > a else [] for a, b in zip([-1, *newest], newest, strict=False)]
+    robot, _ = followed(path, arrivals, count, speed=speed)
+    assert robot.state is r.State.FOLLOWING
+    off = np.abs(np.array(robot.told) - of_path(path, robot.numbers)).max(axis=1)
+    assert off.max() <= 0.03 * speed
+    assert off[-1] <= 1e-3 * speed
+
+
 @pytest.mark.parametrize("lost", [3, 7, 12, 17])
 def test_a_sender_that_has_lost_periods_for_good_is_followed_later_by_as_many(lost):
     path = swings(1000, 0.45)
@@ -231,6 +271,20 @@ def test_the_first_set_point_may_be_a_hundredth_of_a_radian_away(away):
     assert np.abs(told[-1] - path[0]).max() <= 1e-6
     assert np.abs(np.diff(told, 2, axis=0)).max() / H**2 <= 0.01 / 0.05**2 + BACK
     robot.until_ended().assert_kept(last)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.parametrize("waits", [0, 50])
+def test_a_program_that_waits_is_ended_at_once(number, waits):
+    """Else the robot would take no program for as long as it waits."""
+    package = (number, -RUN, *(4 * tuple(HERE)))
+    robot = Alone(before=None if waits else package)
+    robot.steps(waits)
+    robot.write(*package)
+    robot.steps(10)
+    assert robot.state is r.State.ENDED
+    assert robot.ended is r.Ended.ORDERED
+    assert not robot.told
 
 
 def test_registers_of_before_move_nothing():

@@ -292,7 +292,13 @@ def test_a_period_of_the_robot_gets_one_set_point_and_begins_where_it_stands(run
     assert angles[:6] == pytest.approx(Q + 8e-4)
     assert angles[6:12] == pytest.approx(Q + 1e-4 * (8 - interval))
     run.end()
-    assert robot.written[-1][1] == 0
+    assert robot.written[-1][1] == -7
+
+
+def test_a_run_that_ends_before_its_first_set_point_tells_its_program(new_run):
+    run, robot = new_run
+    run.end()
+    assert robot.written[-1] == (0, -7, *(0.0,) * (len(r.INPUTS) - 2))
 
 
 def test_modes_have_some_rows_to_tell_why_the_program_has_ended(running):

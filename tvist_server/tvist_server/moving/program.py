@@ -69,7 +69,8 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         | {
             "leaps": " and ".join(f"norm(leap[{j}]) <= far" for j in range(JOINTS)),
             "ways": "\n".join(
-                f"          if norm(way[{j}]) > most:\n            way[{j}] = change[{j}]\n          end"
+                f"          if way[{j}] > most:\n            way[{j}] = most\n"
+                f"          elif way[{j}] < least:\n            way[{j}] = least\n          end"
                 for j in range(JOINTS)
             ),
             "angles": ", ".join(
@@ -85,7 +86,7 @@ def $name():
   # when they stop. It moves nothing before the first has come, and after a stop it has ended.
   #
   # Input registers, which one package writes:
-  #   integer $NUMBER: number of the newest set-point, 1 more in each period; integer $ORDER: $run to follow
+  #   integer $NUMBER: number of the newest set-point, 1 more in each period; integer $ORDER: $run to follow, -$run: end
   #   float $SETPOINTS to 47: the newest set-point and the three before it, six joint angles each [rad]
   # Output registers:
   #   integer $STATE: $state_waiting waiting, $state_following following, $state_braking braking, $state_ended ended
@@ -108,6 +109,7 @@ def $name():
 
   step = get_steptime()
   most = $speed * step # largest way of a joint in a period [rad]
+  least = -most
   near = $away + 4.0 * $speed * ($lookahead + 4.0 * step) # largest distance of the arm from where servoj leads it [rad]
   keep = pow($fade / ($fade + step), 2) # a distance from the set-points fades as if damped critically:
   pull = pow(step / ($fade + step), 2) # what a period keeps of its velocity, and how it pulls
@@ -116,9 +118,11 @@ def $name():
   old = read_input_integer_register($NUMBER)
   newest = old
   waited = 0.0
-  while waited < $first and (newest == old or read_input_integer_register($ORDER) != $run):
+  order = read_input_integer_register($ORDER)
+  while waited < $first and order != -$run and (newest == old or order != $run):
     sync()
     waited = waited + step
+    order = read_input_integer_register($ORDER)
     newest = read_input_integer_register($NUMBER)
   end
 
@@ -132,7 +136,9 @@ def $name():
   alone = 0
   left_out = 0
   silence = 0.0
-  later = 0 # periods in which set-points came, but too late, since one had been early
+  patience = $silence - 2.5 * step # earlier by what reading and telling may take
+  missed = $silence / step # periods
+  later = 0 # gaps, and periods in which set-points came, but too late, since one had been early
   close = $close # distance that is made up for at once [rad]
   blind = True # whether the last period was without a set-point that had come
 
@@ -143,6 +149,9 @@ def $name():
       why = $ended_away
     end
     i = i + 1
+  end
+  if order != $run:
+    why = $ended_ordered
   end
   if waited >= $first:
     why = $ended_silence
@@ -159,7 +168,7 @@ def $name():
     end
     number = number + 1
     behind = now - number
-    if behind > 2 or later > $later: # set-points come less late than at first, or later, and not for once
+    if behind > 2 or (later > $later and silence == 0.0): # set-points come less late than at first, or later for good
       number = now - 1
       later = 0
       close = $after_shift
@@ -167,9 +176,9 @@ def $name():
 
     if read_input_integer_register($ORDER) != $run:
       why = $ended_ordered
-    elif now < newest or behind * step > $silence: # another sender, or a pause: it must not catch up
+    elif now < newest or behind > missed: # another sender, or a pause: it must not catch up
       why = $ended_lost
-    elif silence > $silence - 2.5 * step: # earlier by what reading and telling may take
+    elif silence > patience:
       why = $ended_silence
     end
     newest = now
@@ -192,7 +201,7 @@ def $name():
         way = change
       end
       alone = alone + 1
-      if silence == 0.0:
+      if silence == 0.0 or not lone:
         later = later + 1
       end
     else:

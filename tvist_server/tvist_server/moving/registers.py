@@ -16,7 +16,7 @@ MOST = 2**31 - 1
 NUMBER = 24
 """Input integer: number n of the newest set-point, 1 more in each control period of the robot; 0: none yet."""
 ORDER = 25
-"""Input integer: number of the run whose program is to follow. Any other number, such as 0, ends it."""
+"""Input integer: number of the run whose program is to follow; any other ends it. Its negative also ends the wait."""
 SETPOINTS = 24
 """First of the input doubles: joint angles of set-point n, then of n-1, n-2 and n-3 [rad]."""
 

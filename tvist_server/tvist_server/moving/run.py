@@ -96,15 +96,13 @@ class Run:
 
     def write(self) -> None:
         """Write the newest set-points."""
-        self._write(self._number)
-
-    def _write(self, order: int) -> None:
         if self._window.number:
-            self._robot.write(self._window.values(order))
+            self._robot.write(self._window.values(self._number))
 
     def end(self) -> None:
         """Let the program brake and end."""
-        self._write(0)
+        nothing = (0, -self._number, *(0.0,) * (len(INPUTS) - 2))
+        self._robot.write(self._window.values(-self._number) if self._window.number else nothing)
         self._upload.close()
         self._waiting = self._follows = self.ready = False
 

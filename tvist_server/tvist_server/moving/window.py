@@ -28,7 +28,7 @@ class Window:
         """Return the values of an input package, in the order of `registers.INPUTS`.
 
         Args:
-            order: Number of the run that is to follow; 0 to end it.
+            order: Number of the run that is to follow; its negative to end it.
         """
         assert self.number, "a package has a set-point"
         return self.number, order, *(angle for one in self._kept for angle in one)
