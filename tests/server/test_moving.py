@@ -25,7 +25,7 @@ from tvist_server.moving.configuration import Configuration, found, narrowed
 from tvist_server.moving.halts import halt_by_modes, halt_by_program
 from tvist_server.moving.pace import MOST, SILENT, Pace
 from tvist_server.moving.registers import Ended
-from tvist_server.moving.run import Run
+from tvist_server.moving.run import HEEDS, Run
 from tvist_server.moving.start_checks import (
     Wanted,
     answers_trouble,
@@ -343,6 +343,15 @@ def test_a_program_that_takes_the_place_of_ours_is_noticed(running, how):
         run.take(playing)
     assert "another program has taken the place of ours" in run.halt.why
     assert not run.ready
+
+
+def test_a_program_that_takes_the_place_of_ours_while_it_waits_is_noticed(running):
+    run, _, playing = running
+    for number in range(2 * HEEDS):
+        run.add(DriveCommand(Q, np.zeros(6), np.zeros(6)), played=True)
+        run.take(playing)
+        assert (run.halt is None) or number > HEEDS
+    assert "another program has taken the place of ours" in run.halt.why
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,8 @@ GRACE = 5
 """Number of rows after the program's end in which modes may still tell why."""
 STANDS = 10
 """Number of rows with the same set-point after which another program has taken the place of ours."""
+HEEDS = 250
+"""Number of set-points that a waiting program has got when it is another one: ours follows the first that it sees."""
 BEGINS = 5.0
 """Longest time in which the program has to begin [s]."""
 TELL_EVERY = 10.0
@@ -127,7 +129,8 @@ class Run:
         self._still = self._still + 1 if state == State.FOLLOWING and played == self._played else 0
         self._played = played
         ends = halt_by_program(ended if ours else 0, sight.modes)
-        if ends is None and not (ours and self._still < STANDS):
+        waits = state == State.WAITING and self._window.number > HEEDS
+        if ends is None and (not ours or waits or self._still >= STANDS):
             ends = Halt(REPLACED, sight.modes[1])
         self._ending = 0 if ends is None else self._ending + 1
         if self._ending > GRACE:
