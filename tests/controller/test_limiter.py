@@ -63,7 +63,9 @@ def test_random_walks_stay_within_the_limits_are_caught_up_with_and_then_equalle
     ramps = limits.velocity / limits.acceleration + 4 * limits.acceleration / limits.jerk
     enough = int((way / limits.velocity + 8 * ramps + 1.0) / H)
     still = np.zeros(joints)
-    held = [limiter.follow(walk[-1], still) for _ in range(3)]  # its third difference, too, has seen the stop then
+    held = [
+        limiter.follow(walk[-1], still) for _ in range(3)
+    ]  # its third difference, too, has seen the stop then
     while limiter.limited and len(held) < enough:
         held.append(limiter.follow(walk[-1], still))
     held += [limiter.follow(walk[-1], still) for _ in range(10)]
