@@ -299,12 +299,17 @@ def _search(given: argparse.Namespace) -> int:
     return 1 if found else 0
 
 
-def _bound(given: argparse.Namespace) -> int:
-    from proof.bound.report import SHAPERS, compare, report, tables
+def _check_built_in(given: argparse.Namespace) -> None:
     from tvist_shaping import BUILT_IN
 
     if unknown := set(given.shapers or ()) - set(BUILT_IN.names()):
         given.refuse(f"there is no shaper {min(unknown)}")
+
+
+def _bound(given: argparse.Namespace) -> int:
+    from proof.bound.report import SHAPERS, compare, report, tables
+
+    _check_built_in(given)
     result = report(compare(given.random, given.seed, given.shapers or SHAPERS))
     _print(result, given.json, tables(result))
     return 0
@@ -353,10 +358,8 @@ def _advice(given: argparse.Namespace) -> int:
 def _impact(given: argparse.Namespace) -> int:
     from proof.impact.report import SHAPERS, draw, landings, report, tables
     from tvist_plant.description import DescriptionError
-    from tvist_shaping import BUILT_IN
 
-    if unknown := set(given.shapers or ()) - set(BUILT_IN.names()):
-        given.refuse(f"there is no shaper {min(unknown)}")
+    _check_built_in(given)
     try:
         made = landings(given.robot, given.shapers or SHAPERS, given.seed, _tell)
     except DescriptionError as error:

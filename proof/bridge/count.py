@@ -45,7 +45,7 @@ class Counted:
 
     @property
     def equal(self) -> bool:
-        """Whether both have counted the same."""
+        """Whether program and rows agree."""
         return self.said == (self.alone, self.left_out)
 
 

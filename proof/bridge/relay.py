@@ -39,7 +39,7 @@ class Relay:
 
     @property
     def endpoint(self) -> str:
-        """Where it listens, as Zenoh has it."""
+        """Its address in Zenoh's notation."""
         return "tcp/{}:{}".format(*self._near)
 
     def __enter__(self) -> Self:

@@ -38,7 +38,7 @@ class ExternalSensor:
 
     @property
     def awaited(self) -> bool:
-        """Whether it is to be used and has told nothing, or nothing for too long."""
+        """Whether it is used but has sent no value yet, or none for too long."""
         return self._offset is not None and self._wrench is None
 
     def next(self) -> Floats | None:

@@ -203,7 +203,9 @@ class ForceControl:
         ]
         if self._contact.awake:
             self._contact.note(pressed[0] if pressed else self._forces.felt(sample)[:3])
-        why = self._excess(sample, float(np.max([np.linalg.norm(force) for force in pressed], initial=0.0)))
+        # NumPy's maximum, unlike Python's, is NaN if one of them is; most arms have no sensor, and are spared it.
+        force = float(np.max([np.linalg.norm(one) for one in pressed])) if pressed else 0.0
+        why = self._excess(sample, force)
         self._beyond = 0 if why is None else self._beyond + 1
         if why is not None and self._beyond > TICKS:
             self._beyond = 0

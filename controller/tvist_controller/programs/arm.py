@@ -119,7 +119,7 @@ class ProgramArm:
         self._present()
 
     def _led(self, journey: Journey) -> bool:
-        """Whether another thread lets the arm give way since, so that the moves have to be led."""
+        """Whether another thread has let the arm give way meanwhile, so that force control has to lead the moves."""
         waits = journey.number is None and not journey.over
         return waits and self._access.force.compliant is not None
 
@@ -214,7 +214,7 @@ class ProgramArm:
 
     @property
     def lost(self) -> bool:
-        """Whether the arm no longer gives way as the program has asked for, since something has stopped it."""
+        """Whether a stop has ended the force mode that the program had begun."""
         return self._gives is self._thread()[0] and self._access.force.compliant is None
 
     def give_way(self, start: Callable[[], int]) -> Turns:

@@ -68,7 +68,7 @@ def find_scene(name: str) -> SceneFile:
 def _named(root: Element, folder: Path) -> list[Path]:
     """Return the files that a scene in a folder names, and those that included ones name.
 
-    What is missing is left out; MuJoCo will say so.
+    Missing files are left out: MuJoCo reports them.
     """
     folders, names, elements = {folder}, set[str](), list(root.iter())
     for one in elements:  # they become more with each included file

@@ -12,7 +12,7 @@ from tvist_protocol.modes import RuntimeState
 from tvist_server.moving.commanded_robot import CommandedRobot
 from tvist_server.moving.halts import REPLACED, halt_by_modes, halt_by_program
 from tvist_server.moving.program import program
-from tvist_server.moving.registers import ALONE, ENDED, INPUTS, LEFT_OUT, PLAYED, RUN, STATE, State
+from tvist_server.moving.registers import ALONE, ENDED, LEFT_OUT, PLAYED, RUN, STATE, State
 from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
 from tvist_server.moving.upload import Upload
 from tvist_server.moving.window import Window
@@ -69,7 +69,7 @@ class Run:
         self.halt: Halt | None = None
         """Why it does not, and will not any more."""
         self._told, self._told_at = (0, 0, 0), 0.0
-        robot.write((0,) * len(INPUTS))  # what an earlier run has left there is not played
+        robot.write(self._window.values(0))  # what an earlier run has left there is not played
         deceleration = min(max(DECELERATION, speed / BRAKES), *limits.acceleration)
         text = program(number, speed=speed, deceleration=deceleration, lookahead=LOOKAHEAD, gain=GAIN)
         self._upload = Upload(place, text, check)
@@ -103,8 +103,7 @@ class Run:
 
     def end(self) -> None:
         """Let the program brake and end."""
-        nothing = (0, -self._number, *(0.0,) * (len(INPUTS) - 2))
-        self._robot.write(self._window.values(-self._number) if self._window.number else nothing)
+        self._robot.write(self._window.values(-self._number))
         self._upload.close()
         self._waiting = self._follows = self.ready = False
 

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Sequence
 
-from tvist_server.moving.registers import KEPT, MOST
+from tvist_server.moving.registers import JOINTS, KEPT, MOST
 
 
 class Window:
@@ -25,10 +25,10 @@ class Window:
         self._kept.extendleft([setpoint] * (1 if self._kept else KEPT))
 
     def values(self, order: int) -> tuple[float, ...]:
-        """Return the values of an input package, in the order of `registers.INPUTS`.
+        """Return the values of an input package, in the order of `registers.INPUTS`; zeros before the first set-point.
 
         Args:
             order: Number of the run that is to follow; its negative to end it.
         """
-        assert self.number, "a package has a set-point"
-        return self.number, order, *(angle for one in self._kept for angle in one)
+        kept = self._kept or [(0.0,) * JOINTS] * KEPT
+        return self.number, order, *(angle for one in kept for angle in one)
