@@ -19,8 +19,6 @@ CLOSE = 3e-4
 """Distance from the set-points, and from their way in a period, that is made up for in a period [rad]."""
 AFTER_SHIFT = 1e-5
 """The same after the program has shifted the motion in time, which is no error that is soon over [rad]."""
-LATER = 3
-"""Number of periods in which set-points come too late until the program waits for them longer."""
 FADE = 0.05
 """Time constant with which a distance from the set-points fades [s]."""
 MARGIN = 1.05
@@ -62,15 +60,14 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
             "away": AWAY,
             "fade": FADE,
             "again": AGAIN,
-            "later": LATER,
             "close": CLOSE,
             "after_shift": AFTER_SHIFT,
         }
         | {
-            "leaps": " and ".join(f"norm(leap[{j}]) <= far" for j in range(JOINTS)),
+            "steps": " and ".join(f"norm(own[{j}]) <= most" for j in range(JOINTS)),
             "ways": "\n".join(
-                f"          if way[{j}] > most:\n            way[{j}] = most\n"
-                f"          elif way[{j}] < least:\n            way[{j}] = least\n          end"
+                f"        if way[{j}] > most:\n          way[{j}] = most\n"
+                f"        elif way[{j}] < least:\n          way[{j}] = least\n        end"
                 for j in range(JOINTS)
             ),
             "angles": ", ".join(
@@ -138,7 +135,6 @@ def $name():
   silence = 0.0
   patience = $silence - 2.5 * step # earlier by what reading and telling may take
   missed = $silence / step # periods
-  later = 0 # gaps, and periods in which set-points came, but too late, since one had been early
   close = $close # distance that is made up for at once [rad]
   blind = True # whether the last period was without a set-point that had come
 
@@ -168,9 +164,8 @@ def $name():
     end
     number = number + 1
     behind = now - number
-    if behind > 2 or (later > $later and silence == 0.0): # set-points come less late than at first, or later for good
+    if behind > 2 or (blind and silence == 0.0 and behind < 1): # set-points come less late than at first, or later
       number = now - 1
-      later = 0
       close = $after_shift
     end
 
@@ -201,41 +196,36 @@ def $name():
         way = change
       end
       alone = alone + 1
-      if silence == 0.0 or not lone:
-        later = later + 1
-      end
     else:
-      if behind > 0:
-        later = 0
-      end
       own = new - previous # change of the set-points in this period
-      leap = own
-      if gap != 1 or lone:
-        leap = new - last
-        extra = change - own
-        if not (norm(own) <= 2.5 * most): # of all joints; one that was never played is checked here alone
+      fast = norm(own)
+      if gap != 1: # of two set-points, neither was compared before; there is no time to look at each joint
+        if not (fast <= 2.5 * most and norm(new - last) <= 2.5 * most * gap):
           why = $ended_too_fast
         end
-      elif norm(q - get_target_joint_positions()) > near:
+      elif not lone and norm(q - get_target_joint_positions()) > near:
         why = $ended_strayed
       end
+      if gap != 1 or lone:
+        extra = change - own
+      end
       off = q - previous
-      if norm(off) + norm(extra) <= close: # back onto the set-points at once, which servoj smooths
-        way = own - off
+      if norm(off) + norm(extra) <= close and fast + norm(off) <= most:
+        q = previous # back onto the set-points at once, which servoj smooths
+        way = own
         close = $close
       else:
         way = own + extra * keep - off * pull
       end
-      far = most * gap
-      if not (norm(leap) <= far and norm(way) <= most): # of all joints; only then a tick is to look at each
-        if not ($leaps): # nor is what is no number
+      if gap != 1:
+        if not (norm(way) <= most):
+          way = change
+        end
+      elif not (fast <= most and norm(way) <= most): # of all joints; only then a tick is to look at each
+        if not ($steps): # nor is what is no number
           why = $ended_too_fast
         end
-        if gap != 1: # there is no time for each once more
-          way = change
-        else:
 $ways
-        end
       end
       extra = way - own
       last = new
