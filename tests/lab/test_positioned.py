@@ -5,7 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tvist_controller.api.line import CollisionModel, body, paper_payload
+from tvist_controller.api.line import (
+    TORQUE_SHARE,
+    CollisionModel,
+    InverseDynamics,
+    JointLine,
+    body,
+    paper_payload,
+    quickest_motion,
+)
 from tvist_lab.identification.design import predicted
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.modal_fit import RAYLEIGH, describe, fit_modal, softened
@@ -45,6 +53,22 @@ async def test_no_joint_is_faster_than_the_robot_in_front_allows():
     plan = await planned()
     assert plan.ways.velocity <= min(ROBOT.limits.velocity)
     assert plan.speed <= min(ROBOT.limits.velocity)
+
+
+async def test_an_arm_that_rings_stays_within_its_torques():
+    """Its torque swings by as much again as that of a rigid arm, about its weight's."""
+    plan = await planned(ring_downs=12)
+    dynamics = InverseDynamics(ROBOT, body(plan.arm.payloads[0]))
+    for jog in plan.jogs:
+        motion, way = quickest_motion(JointLine(jog.way[-1], jog.q), jog.limits, PERIOD), [jog.way[-1]]
+        while not motion.finished:
+            way.append(motion.next())
+        q = np.array(way)
+        qd = np.gradient(q, PERIOD, axis=0)
+        weight = dynamics.gravities(q)
+        pushed = dynamics.torques(q, qd, np.gradient(qd, PERIOD, axis=0)) - weight
+        assert (np.abs(weight) + 2.0 * np.abs(pushed) <= TORQUE_SHARE * np.array(ROBOT.limits.torque)).all()
+    assert len({jog.limits.acceleration for jog in plan.jogs}) > 1, "some poses demand a gentler jog"
 
 
 async def test_too_few_ring_downs_and_the_file_of_another_robot_are_refused():

@@ -22,7 +22,7 @@ from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.modal_calibration import Origin, contradicting
 from tvist_lab.identification.modal_fit import softened
 from tvist_lab.identification.modal_plan import LEAST, ModalPlan, check, free_configurations
-from tvist_lab.identification.proposals import Proposal, is_free, propose
+from tvist_lab.identification.proposals import GENTLEST, Proposal, is_free, propose, slower
 from tvist_lab.identification.ring_downs import PAUSE, Jog, Ringing
 from tvist_lab.identification.servo_response import ServoResponse, fresh, servo_response
 from tvist_lab.identification.unknowns import ArmModes, unknowns_near
@@ -45,9 +45,7 @@ GENTLE = 1.0
 AFTER = 0.6
 """Time recorded after a move [s]."""
 FIRST = 0.55
-"""Quickness of the first jog over that of `JOG`, since nobody knows how loud the arm rings [-]."""
-GENTLEST = 0.4
-"""Smallest quickness of a jog over that of `JOG` [-]."""
+"""Quickness of the first jog over what its torques permit, since nobody knows how loud the arm rings [-]."""
 LOUD, LATER = 0.15, 0.1
 """Rms of the acceleration per axis to aim at, as after a program's motion [m/s^2], so much later than the stop [s]."""
 INEXACT = 0.03
@@ -141,11 +139,11 @@ def _planned(description: RobotDescription, info: Info, at: Floats, plan: ModalP
             f"from where the arm stands, {len(jogs)} of {plan.ring_downs} configurations can be reached without "
             "touching itself or the floor: move it to where it has more room, or ask for fewer ring-downs"
         )
-    slower = tuple(
+    capped = tuple(
         replace(jog, limits=replace(jog.limits, velocity=min(jog.limits.velocity, speed))) for jog in jogs
     )
     ways = MotionLimits(speed, GENTLE, JOG.limits.jerk)
-    return MovePlan(arm, at, turned, slower, ways, plan.seed)
+    return MovePlan(arm, at, turned, capped, ways, plan.seed)
 
 
 @dataclass(frozen=True)
@@ -173,7 +171,7 @@ async def make_moves(robot: Robot, control: Arm, plan: MovePlan, progress: Calla
     """
     info, began = await robot.info(), (await robot.state()).tick
     await control.set_shaper("none")
-    quick = plan.jogs[0].limits
+    quick = max((jog.limits for jog in plan.jogs), key=lambda limits: limits.acceleration)
     progress("turning the last joint")
     ways = (plan.turned, plan.at) * TURNS
     turns = [await _recorded(robot, control, q, quick) for q in ways]
@@ -182,7 +180,7 @@ async def make_moves(robot: Robot, control: Arm, plan: MovePlan, progress: Calla
         progress(f"ring-down {number} of {len(plan.jogs)}")
         for posture in jog.way:
             await control.move_j(posture, **asdict(plan.ways))
-        jogs.append(await _recorded(robot, control, jog.q, _slower(jog.limits, share)))
+        jogs.append(await _recorded(robot, control, jog.q, slower(jog.limits, share)))
         heard = _stop(number, jogs[-1], servo).ringing
         loud = 0.0 if heard is None else _rms_after(heard, LATER)
         share = float(np.clip(share * np.sqrt(LOUD / max(loud, 1e-3)), GENTLEST, 1.0))
@@ -210,11 +208,6 @@ def identify_moved(
         calibration = with_fields(found.calibration, servo_lag_s=servo.lag, servo_gain=servo.gain)
         found = replace(found, calibration=calibration)
     return Positioned(found, servo, moved.seconds)
-
-
-def _slower(limits: MotionLimits, share: float) -> MotionLimits:
-    """Return the limits of a motion that takes longer by 1 / share."""
-    return MotionLimits(share * limits.velocity, share**2 * limits.acceleration, share**3 * limits.jerk)
 
 
 async def _recorded(robot: Robot, control: Arm, q: Floats, limits: MotionLimits) -> Recording:

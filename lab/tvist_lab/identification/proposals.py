@@ -6,7 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from tvist_controller.api.line import CollisionModel, MotionLimits, body
+from tvist_controller.api.line import (
+    CollisionModel,
+    InverseDynamics,
+    JointLine,
+    MotionLimits,
+    acceleration_on_way,
+    body,
+)
 from tvist_lab.identification.design import choose
 from tvist_lab.identification.ring_downs import Jog
 from tvist_lab.identification.unknowns import ArmModes
@@ -16,6 +23,10 @@ SPARE = 3
 """Number of candidates that are ordered for each proposal, since the way to some is not free."""
 STEP = 0.03
 """Angle of the fastest joint between two postures in which a way is checked [rad]."""
+REBOUND = 1.0
+"""Overshoot of a ringing arm's torque, over the rigid arm's: a drive at its limit would spoil the ring-down [-]."""
+GENTLEST = 0.4
+"""Smallest quickness of a jog over the one that is wanted [-]."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +62,8 @@ def propose(
     counts = [SPARE * count if number == payload else 0 for number in range(len(arm.payloads))]
     order = choose(arm, candidates, jog, counts, known)
     collisions = CollisionModel(arm.description, body(arm.payloads[payload]))
-    joints = arm.description.joints
+    dynamics = InverseDynamics(arm.description, body(arm.payloads[payload]))
+    joints, torque = arm.description.joints, np.array(arm.description.limits.torque)
     upright = here * np.array([joint not in (1, 2, 3) for joint in range(joints)])
     upright[[joint for joint in (1, 3) if joint < joints]] = -np.pi / 2
     found: list[Proposal] = []
@@ -59,10 +71,27 @@ def propose(
         q = candidates[number]
         start = q - jog.of(joints)
         way = next((way for way in ((start,), (upright, start)) if is_free(collisions, here, *way, q)), None)
-        if way is not None and len(found) < count:
-            found.append(Proposal(way, q, jog.limits))
+        quickness = _quickness(dynamics, start, q, jog.limits, torque)
+        if way is not None and quickness >= GENTLEST and len(found) < count:
+            found.append(Proposal(way, q, slower(jog.limits, quickness)))
             here = q
     return tuple(found)
+
+
+def slower(limits: MotionLimits, quickness: float) -> MotionLimits:
+    """Return the limits of a motion that takes longer by 1 / quickness."""
+    return MotionLimits(
+        quickness * limits.velocity, quickness**2 * limits.acceleration, quickness**3 * limits.jerk
+    )
+
+
+def _quickness(
+    dynamics: InverseDynamics, start: Floats, end: Floats, limits: MotionLimits, torque: Floats
+) -> float:
+    """Return the largest share, up to 1, of a jog's quickness with which the arm rings within its torques."""
+    line = JointLine(start, end)
+    room = acceleration_on_way(dynamics, line, start, end - start, limits.velocity, torque)
+    return min(1.0, float(np.sqrt(room / (1.0 + REBOUND) / limits.acceleration)))
 
 
 def is_free(collisions: CollisionModel, *postures: Floats) -> bool:
