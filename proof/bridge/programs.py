@@ -154,8 +154,10 @@ def _wrong(direct: Ran, other: Ran) -> str:
             )
     if not direct.stops:
         return "on the robot: nothing moved"
-    if not other.stops or apart(direct.stops[-1], other.stops[-1]) > CLOSE:
-        return "by the bridge: it did not end where it does on the robot"
+    if not other.stops:
+        return "by the bridge: nothing moved"
+    if (off := apart(direct.stops[-1], other.stops[-1])) > CLOSE:
+        return f"by the bridge: it ended {off:.3f} rad from where it does on the robot"
     return ""
 
 

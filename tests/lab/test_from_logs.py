@@ -9,7 +9,7 @@ from proof.logs.everyday import everyday_logs, unseen
 
 from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.identification.design import predicted
-from tvist_lab.identification.everyday_stops import CONTRADICTS, Log, stops_of
+from tvist_lab.identification.everyday_stops import CONTRADICTS, Log, noise_of, stops_of
 from tvist_lab.identification.forecast import Forecast
 from tvist_lab.identification.from_logs import identify_from_logs, more_moves, usable
 from tvist_lab.identification.identify import IdentificationError
@@ -17,8 +17,8 @@ from tvist_lab.identification.modal_fit import describe, fit_modal, of_masses
 from tvist_lab.identification.modal_plan import ModalPlan, free_configurations
 from tvist_lab.identification.ring_downs import Jog
 from tvist_lab.identification.unknowns import SURE, ArmModes, unknowns_near
-from tvist_lab.metrics import motions
-from tvist_lab.recordings import RecordingError
+from tvist_lab.metrics import MotionRows, motions
+from tvist_lab.recordings import Recording, RecordingError
 from tvist_plant.description import load
 
 ROBOT = load("ur5e")
@@ -29,6 +29,23 @@ PAYLOADS = (paper_payload(ROBOT, 0.0), paper_payload(ROBOT, 5.0))
 def logs():
     """Twenty motions of a hidden robot."""
     return asyncio.run(everyday_logs("ur5e", 21, 4))
+
+
+@pytest.mark.parametrize("held", [1, 4])
+def test_the_noise_of_a_sensor_is_the_same_where_rows_are_repeated(held):
+    """A robot that sends 125 rows a second gets each row four times in a recording at 500 Hz."""
+    rows = np.arange(4000)
+    vibration = np.sin(2.0 * np.pi * 5.0 * 0.002 * rows)[:, None] * np.exp(-rows / 200.0)[:, None]
+    measured = vibration + np.random.default_rng(5).normal(0.0, 0.03, (len(rows), 3))
+    recording = Recording(
+        {
+            "tick": rows,
+            "timestamp": 0.002 * rows,
+            "actual_tool_accelerometer": measured[rows - rows % held],
+        }
+    )
+    motion = MotionRows(start=0, reference_stop=100, shaped_stop=100, end=len(rows))
+    assert noise_of(recording, motion) == pytest.approx(0.03, rel=0.15)
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ import numpy as np
 
 from tvist_lab.identification.payload import ball
 from tvist_lab.identification.ring_downs import LEAST_NOISE, SAMPLES, SKIPPED, Ringing
+from tvist_lab.identification.servo_response import fresh
 from tvist_lab.metrics import MotionRows, motions, still_driven
 from tvist_lab.metrics.vibration import SENSOR
 from tvist_lab.recordings import Floats, Recording, RecordingError
@@ -140,11 +141,13 @@ def noise_of(recording: Recording, motion: MotionRows) -> float:
     """Noise of the accelerometer, rms per axis [m/s^2].
 
     It is the smaller of two measures: the spread before the motion, if the arm was at rest by then, and what remains of
-    the whole motion's third differences, which a vibration of a tenth of the sampling rate hardly enters.
+    the whole motion's third differences, which a vibration of a tenth of the sampling rate hardly enters. Rows that
+    repeat the one before say nothing of it.
     """
     first = int(np.searchsorted(recording.time, recording.time[motion.start] - BEFORE))
     before = _finite(recording[SENSOR][first : motion.start])
-    whole = _finite(recording[SENSOR][motion.start : motion.end])
+    seen = fresh(recording)
+    whole = _finite(recording[SENSOR][seen[(seen >= motion.start) & (seen < motion.end)]])
     found = [
         float(np.sqrt(np.mean(np.square(np.median(np.abs(np.diff(whole, 3, axis=0)), axis=0))) / 20.0))
         / 0.6745
