@@ -15,7 +15,7 @@ from tvist_lab.identification.from_logs import identify_from_logs, more_moves, u
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.modal_fit import describe, fit_modal, of_masses
 from tvist_lab.identification.modal_plan import ModalPlan, free_configurations
-from tvist_lab.identification.ring_downs import Jog
+from tvist_lab.identification.ring_downs import LEAST_NOISE, Jog
 from tvist_lab.identification.unknowns import SURE, ArmModes, unknowns_near
 from tvist_lab.metrics import MotionRows, motions
 from tvist_lab.recordings import Recording, RecordingError
@@ -37,15 +37,20 @@ def test_the_noise_of_a_sensor_is_the_same_where_rows_are_repeated(held):
     rows = np.arange(4000)
     vibration = np.sin(2.0 * np.pi * 5.0 * 0.002 * rows)[:, None] * np.exp(-rows / 200.0)[:, None]
     measured = vibration + np.random.default_rng(5).normal(0.0, 0.03, (len(rows), 3))
-    recording = Recording(
-        {
-            "tick": rows,
-            "timestamp": 0.002 * rows,
-            "actual_tool_accelerometer": measured[rows - rows % held],
-        }
+    assert _noise(measured[rows - rows % held]) == pytest.approx(0.03, rel=0.15)
+
+
+def test_an_arm_without_a_sensor_has_the_smallest_noise():
+    assert _noise(np.zeros((4000, 3))) == LEAST_NOISE
+
+
+def _noise(measured):
+    """Noise by a recording at 500 Hz, all of it one motion."""
+    rows = np.arange(len(measured))
+    columns = {"tick": rows, "timestamp": 0.002 * rows, "actual_tool_accelerometer": measured}
+    return noise_of(
+        Recording(columns), MotionRows(start=0, reference_stop=100, shaped_stop=100, end=len(rows))
     )
-    motion = MotionRows(start=0, reference_stop=100, shaped_stop=100, end=len(rows))
-    assert noise_of(recording, motion) == pytest.approx(0.03, rel=0.15)
 
 
 @pytest.fixture(scope="module")

@@ -148,13 +148,13 @@ def noise_of(recording: Recording, motion: MotionRows) -> float:
     before = _finite(recording[SENSOR][first : motion.start])
     seen = fresh(recording)
     whole = _finite(recording[SENSOR][seen[(seen >= motion.start) & (seen < motion.end)]])
-    found = [
-        float(np.sqrt(np.mean(np.square(np.median(np.abs(np.diff(whole, 3, axis=0)), axis=0))) / 20.0))
-        / 0.6745
-    ]
+    found = []
+    if len(whole) > 3:
+        typical = np.median(np.abs(np.diff(whole, 3, axis=0)), axis=0)
+        found.append(float(np.sqrt(np.mean(typical**2) / 20.0)) / 0.6745)
     if len(before) > 0.5 * BEFORE / recording.period:
         found.append(float(np.sqrt(np.mean((before - before.mean(axis=0)) ** 2))))
-    return max(min(found), LEAST_NOISE)
+    return max(min(found, default=0.0), LEAST_NOISE)
 
 
 def _finite(values: Floats) -> Floats:
