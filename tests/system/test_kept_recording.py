@@ -1,21 +1,34 @@
 """`tvist serve --record FILE --keep DURATION`, killed and ended."""
 
 import signal
+import time
+from contextlib import suppress
 
 import pytest
 from tests.conformance.served import Served, refused_to_start
 
 from tvist_client.robot import Robot
-from tvist_lab.recordings.mcap_file import read
+from tvist_lab.recordings.mcap_file import RecordingFileError, read
 from tvist_protocol.recorded import earlier_name
 
 TICKS = 1300
+PATIENCE = 30.0
+
+
+def until_written(path):
+    """Wait until all but the last chunk is in the file: what a process has not written yet ends with it."""
+    deadline, last = time.monotonic() + PATIENCE, 0
+    while last <= TICKS - 600:
+        assert time.monotonic() < deadline, f"only {last} ticks were written"
+        with suppress(RecordingFileError):
+            last = read(path).states[-1].tick
 
 
 async def advance_and_send(number, path):
     with Served("--clock", "lockstep", "--record", str(path), "--keep", "1s") as served:
         async with await Robot.connect(served.endpoint, "ur5e") as robot, robot.control("a"):
             await robot.advance(TICKS)
+        until_written(path)
         served.end(number)
     content = read(path)
     ticks = [state.tick for state in content.states]
@@ -53,6 +66,9 @@ async def test_a_service_that_is_killed_and_started_again_loses_no_recording(opt
             for name in robots.values():
                 async with await Robot.connect(served.endpoint, name) as robot, robot.control("a"):
                     await robot.advance(ticks)
+            if number is signal.SIGKILL:
+                for name in robots:
+                    until_written(tmp_path / name)
             served.end(number)
     for name in robots:
         killed, ended = read(tmp_path / earlier_name(name, 1)), read(tmp_path / name)
