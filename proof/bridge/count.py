@@ -45,7 +45,7 @@ class Counted:
 
     @property
     def equal(self) -> bool:
-        """Whether program and rows agree."""
+        """Whether the program counts the same as its rows show."""
         return self.said == (self.alone, self.left_out)
 
 

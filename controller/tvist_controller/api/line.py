@@ -15,7 +15,7 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import STILL, central_differences
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.limits import TORQUE_SHARE, acceleration_on_way
+from tvist_controller.line.limits import REBOUND, TORQUE_SHARE, acceleration_on_way
 from tvist_controller.line.whole_motion import Driven, DrivenLine, respond
 from tvist_controller.planning.choices import choose_filter, wanted_modes
 from tvist_controller.planning.keeping import keeping_motion
@@ -30,6 +30,7 @@ from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, 
 
 __all__ = [
     "CLEARANCE",
+    "REBOUND",
     "STILL",
     "TORQUE_SHARE",
     "CollisionModel",

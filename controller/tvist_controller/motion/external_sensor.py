@@ -38,7 +38,7 @@ class ExternalSensor:
 
     @property
     def awaited(self) -> bool:
-        """Whether it is used but has sent no value yet, or none for too long."""
+        """Whether the sensor is in use, and its last value is too old or has not come yet."""
         return self._offset is not None and self._wrench is None
 
     def next(self) -> Floats | None:

@@ -214,7 +214,7 @@ class ProgramArm:
 
     @property
     def lost(self) -> bool:
-        """Whether a stop has ended the force mode that the program had begun."""
+        """Whether the program began a force mode that a stop has ended."""
         return self._gives is self._thread()[0] and self._access.force.compliant is None
 
     def give_way(self, start: Callable[[], int]) -> Turns:

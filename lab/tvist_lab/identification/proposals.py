@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from tvist_controller.api.line import (
+    REBOUND,
     CollisionModel,
     InverseDynamics,
     JointLine,
@@ -23,8 +24,6 @@ SPARE = 3
 """Number of candidates that are ordered for each proposal, since the way to some is not free."""
 STEP = 0.03
 """Angle of the fastest joint between two postures in which a way is checked [rad]."""
-REBOUND = 1.0
-"""Overshoot of a ringing arm's torque, over the rigid arm's: a drive at its limit would spoil the ring-down [-]."""
 GENTLEST = 0.4
 """Smallest quickness of a jog over the one that is wanted [-]."""
 
@@ -88,7 +87,10 @@ def slower(limits: MotionLimits, quickness: float) -> MotionLimits:
 def _quickness(
     dynamics: InverseDynamics, start: Floats, end: Floats, limits: MotionLimits, torque: Floats
 ) -> float:
-    """Return the largest share, up to 1, of a jog's quickness with which the arm rings within its torques."""
+    """Return the largest share, up to 1, of a jog's quickness with which the arm rings within its torques.
+
+    A drive at its limit would spoil the ring-down.
+    """
     line = JointLine(start, end)
     room = acceleration_on_way(dynamics, line, start, end - start, limits.velocity, torque)
     return min(1.0, float(np.sqrt(room / (1.0 + REBOUND) / limits.acceleration)))
