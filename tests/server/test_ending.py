@@ -1,11 +1,33 @@
-"""Signals wait where nothing may be half done."""
+"""Signals wait where nothing may be half done, and end the process whatever it does."""
 
 import signal
+import subprocess
+import sys
 import threading
 
 import pytest
 
 from tvist_server.ending import signals_held
+
+HANGING = """
+import atexit, signal, threading, time
+from tvist_server import ending
+def on_and_on():
+    while True: {what}
+ending.LONGEST = 0.2
+shutdown = ending.Ending()
+{where}
+"""
+
+
+@pytest.mark.parametrize("what", ["time.sleep(9)", "sum(range(10**12))"])
+@pytest.mark.parametrize("where", ["on_and_on()", "atexit.register(on_and_on)", "shutdown.hear(on_and_on)",
+                                   "threading.Thread(target=on_and_on).start()"])  # fmt: skip
+def test_a_shutdown_that_hangs_is_cut_off_and_says_where(what, where):
+    """Also in code that keeps the interpreter's lock once the signal was heard."""
+    code = HANGING.format(what=what, where=f"signal.raise_signal(signal.SIGTERM); {where}")
+    ended = subprocess.run([sys.executable, "-c", code], stderr=subprocess.PIPE, check=False)
+    assert (ended.returncode, b"in on_and_on" in ended.stderr) == (1, True)
 
 
 @pytest.fixture(autouse=True)

@@ -309,11 +309,14 @@ class UrInterfaces(Gateway):
                 loop.call_soon_threadsafe(action)
 
     def _aside(self, read: Callable[[], str | None], then: Callable[[str | None], None]) -> None:
-        """Read a file in a thread of its own, which nobody waits for, and call back in the interfaces' thread."""
+        """Read a file in a thread of its own, for which nobody waits, and call back in the interfaces' thread."""
 
         def reading() -> None:
-            text = read()
-            self._soon(lambda: then(text))
+            text = None
+            try:
+                text = read()
+            finally:
+                self._soon(lambda: then(text))
 
         threading.Thread(target=reading, name="tvist-ur-file", daemon=True).start()
 

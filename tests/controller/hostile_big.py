@@ -1,0 +1,223 @@
+"""Hostile programs from seeds: every dear function in loops, threads and secondary programs, at edges of arguments."""
+
+from random import Random
+
+import numpy as np
+
+from tvist_controller.dispatch.planner import Planner
+from tvist_controller.programs.functions.motions import MotionFunctions
+from tvist_controller.programs.functions.settings import SettingFunctions
+from tvist_controller.programs.functions.unsimulated import SUBJECTS
+from tvist_controller.programs.library import known_signatures
+from tvist_protocol.programs import ProgramRun
+from tvist_urscript import names
+
+from .robots import UR5E
+from .scripts import URSIM, a_robot
+
+STARTS = (
+    *(UR5E.poses[name] for name in ("Q1", "Q2", "Q3")),
+    (0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0),
+    URSIM,
+)
+"""Stretched and singular postures, UR's own start among them, and one with room around it."""
+POSTURES = [list(map(float, q)) for q in STARTS]
+POSES = ("p[0.3, 0.2, 0.4, 0, 3, 0]", "p[0, -0.23, 1.08, 0, 2.2, -2.2]", "p[0.8, -0.1, 0.2, 1, 1, 1]",
+         "p[2, 0, 0, 0, 0, 0]", "get_target_tcp_pose()", "p[1e-9, 1e-9, 0.6, 3.14159, 0, 0]")  # fmt: skip
+ONCE = (
+    "x = get_inverse_kin_has_solution({pose}, {q})", "x = get_inverse_kin({safe})", "x = get_forward_kin({q})",
+    "x = get_forward_kin({q}, {pose})", "x = get_jacobian({q})", "x = get_mass_matrix({q})", "x = get_mass_matrix()",
+    "x = is_within_safety_limits({q})", "x = is_within_safety_limits({pose})", "x = force()", "x = get_tcp_force()",
+    "x = get_joint_torques()", "zero_ftsensor()", "x = get_target_tcp_pose()", "x = get_target_tcp_speed()",
+    "x = get_actual_tcp_pose()", "x = get_target_waypoint()", "x = get_actual_joint_positions_history(i % 2)",
+    "x = get_actual_tool_flange_pose()", "x = get_tool_accelerometer_reading()", "x = is_steady()",
+    "textmsg({q})", "textmsg(l)", "x = to_str(l)", 'x = str_cat("a", {q})', "x = s == str_cat(s, i)", "popup(s)",
+    "set_standard_digital_out(i % 8, True)", "write_output_float_register(i % 40, 0.5)",
+    "write_output_integer_register(1, i)", "set_flag(i % 30, True)", "set_analog_out(1, 0.5)",
+    "x = pose_trans({pose}, {pose})", "x = interpolate_pose({pose}, {pose}, 0.3)", "x = pose_inv({pose})",
+    "x = wrench_trans({pose}, [1, 2, 3, 4, 5, 6])", "x = rpy2rotvec([i, 2, 3])", "x = rotvec2rpy([i, 2, 3])",
+    "x = inv(m)", "x = inv(big)", "x = big * big", "x = big * row", "x = transpose(big)", "x = l + l",
+    "x = deep + deep",
+    "x = deep * 2.5", "x = l * l", "l[i % 1000] = i", "big[3, 4] = i", "x = norm(l)", "x = normalize(l)",
+    "x = size(big)",
+    "x = make_list(1000, l)" , "x = make_list(1000, i)", "x = integer_to_binary_list(i)", "x = -deep",
+    "x = deep == deep",
+    "x = binary_list_to_integer(bits)", "x = recurse(150)", "x = sqrt(i) + sin(i) * cos(i)", "h = run tiny()",
+    "x = to_num(s) + str_len(s)", "x = str_sub(s, 0, 5)", "x = [l, l, l]", "x = get_inverse_kin({safe}, {q})",
+    'x = socket_open("127.0.0.1", 9, "a")', 'socket_send_string(s, "a")', 'x = socket_get_var("a", "a")',
+    'rtde_set_watchdog("input_int_register_0", 0.001)', "x = [get_mass_matrix(), get_jacobian(), get_jacobian({q})]",
+)  # fmt: skip
+"""Statements without time, of which most are dear."""
+MOVES = (
+    "movej({q}, a={a}, v={v})", "movej(get_target_joint_positions())", "movej({safe}, a={a}, v={v})", "movel({safe})",
+    "movel(get_target_tcp_pose())", "movep({safe}, r=0.01)", "movec({safe}, get_target_tcp_pose())",
+    "movej(near(0.0001), a={a}, v={v})", "movej(near(0.3), r=0.05)", "movel(get_target_tcp_pose(), r=0.02)",
+    "servoj({q}, t=0.002, gain={gain}, lookahead_time={lag})", "servoj(near(0.01), t=0.002)", "servoc({safe}, r=0.05)",
+    "speedj([{s}, {s}, {s}, {s}, {s}, {s}], {a}, 0.002)", "speedl([{s}, {s}, {s}, {s}, {s}, {s}], {a}, 0.002)",
+    "speedl([0, 0, {s}, 0, 0, 0], {a}, 0.002)", "speedl([{s}, 0, 0, 0, 0, 0], {a}, 0.1)", "stopj({a})", "stopl({a})",
+    "set_tcp(p[0, 0, {lag}, 0, 0, 0])", "set_payload({s}, [0, 0, 0.05])", "sleep({lag})", "sync()", "sync()",
+)  # fmt: skip
+HEAD = """
+  i = 0
+  x = 0
+  s = "123"
+  m = [[1, 2, 3], [4, 5, 6], [7, 8, 10]]
+  l = make_list(1000, 0.5)
+  row = make_list(14, 1.5)
+  bits = make_list(32, True)
+  deep = make_list(2, l)
+  deep[1] = make_list(990, 2.5)
+  big = make_list(14, row)
+  while i < 14:
+    big[i, i] = 20 + i
+    i = i + 1
+  end
+  def recurse(n):
+    if n > 0:
+      return recurse(n - 1)
+    end
+    return 0
+  end
+  def near(d):
+    q = get_target_joint_positions()
+    q[i % 6] = q[i % 6] + d * (1 - 2 * (i % 2))
+    return q
+  end
+  thread tiny():
+    sync()
+  end
+"""
+
+
+def text(seed: int) -> tuple[list[str], tuple[float, ...]]:
+    """Return a hostile program, with its secondary ones, and the posture it begins at."""
+    r = Random(seed)
+
+    def filled(statement: str) -> str:
+        return statement.format(
+            q=r.choice(POSTURES), pose=r.choice(POSES), safe=r.choice((POSES[0], POSES[0], POSES[4])),
+            a=r.choice((0.1, 1.4, 8, 40)), v=r.choice((0.01, 1.05, 3)), s=r.choice((-1, -0.1, 0.01, 0.1, 1)),
+            gain=r.choice((100, 300, 2000)), lag=r.choice((0.03, 0.1, 0.2)),
+        )  # fmt: skip
+
+    def loop(name: str, statements: list[str], rest: int) -> list[str]:
+        body = ["i = i + 1", *statements, f"if i % {rest} == 0:", "  sync()", "end"]
+        return [f"thread {name}():", "while True:", *body, "end", "end"]
+
+    dear = r.sample(ONCE, r.choice((1, 1, 2, 4)))
+    threads = r.choice((1, 1, 3, 20))
+    lines = HEAD.splitlines()
+    for number in range(threads):
+        lines += loop(f"t{number}", [filled(one) for one in dear], r.choice((1, 3, 10**6)))
+    moves = [filled(one) for one in r.sample(MOVES, r.choice((1, 1, 2, 3)))]
+    if r.random() < 0.7:
+        lines += loop("mover", moves, 10**6)
+    lines += ["while True:", *(f"h{k} = run t{k}()" for k in range(threads))]
+    lines += ["hm = run mover()"] if "thread mover():" in lines else []
+    lines += [f"sleep({0.002 * r.choice((1, 5, 40))})", *(f"kill h{k}" for k in range(threads))]
+    lines += [f"kill hm\n{r.choice(('', 'stopj(4)', 'stopl(2)'))}"] if "thread mover():" in lines else []
+    main = "\n".join(("def hostile():", *lines, "end", "end", ""))
+    beside = [
+        "\n".join((f"sec beside{k}():", *HEAD.splitlines(), "while True:", "i = i + 1",
+                   *(filled(one) for one in dear), "if i % 3 == 0:", "sync()", "end", "end", "end", ""))
+        for k in range(r.choice((0, 0, 1, 8)))
+    ]  # fmt: skip
+    return [main, *beside], r.choice(STARTS)
+
+
+class Beside:
+    """Plans what programs order, between the ticks, as a served robot does next to them."""
+
+    def __init__(self, robot) -> None:
+        self.controller = robot.controller
+        self._planner, self._waiting = Planner(robot.controller.setup), []
+        robot.controller.plans._order = self._order
+
+    def _order(self, command, basis):
+        found = []
+        self._waiting.append((command, basis, found))
+        return lambda: found[0] if found else self._planner.plan(command, basis)
+
+    def work(self) -> None:
+        for command, basis, found in self._waiting:
+            found.append(self._planner.plan(command, basis))
+        self._waiting.clear()
+
+
+def begin(seed: int):
+    """Return a robot that runs the hostile program of a seed, and what plans for it."""
+    texts, q = text(seed)
+    robot = a_robot(q=q)
+    beside = Beside(robot)
+    for one in texts:
+        reply = robot.send(ProgramRun, text=one)
+        assert not hasattr(reply, "why"), f"{reply}\n{one}"
+    return robot, beside, texts
+
+
+# ---------------------------------------------------------------- odd numbers
+
+NUMBERS = (
+    *(
+        "0",
+        "1",
+        "-1",
+        "0.5",
+        "2",
+        "1e-300",
+        "1e-12",
+        "1e-9",
+        "-1e-3",
+        "0.002",
+        "0.03",
+        "0.999999",
+        "7",
+        "100",
+    ),
+    *("999.9", "1000", "-1000", "1e5", "1e8", "-1e8", "2147483647", "1e160", "-1e160", "1e300", "1e308"),
+)
+POSE = frozenset({"pose", "pose_via", "pose_to", "x", "goal", "tcp", "task_frame", "feature"})
+POSTURE = frozenset({"q", "qnear", "qNear"})
+LISTS = {"d": "0 0 9.82", "cog": "0.01 0 0.05", "sensor_cog": "0 0 0.05", "sensor_measuring_offset": "0 0 0.1",
+         "selection_vector": "0 0 1 0 0 1", "freeAxes": "1 1 1 0 0 0", "qd": "0.1 0 -0.2 0 0 0.1",
+         "xd": "0 0.05 0 0 0 0.1", "wrench": "0 0 -10 0 0 0", "limits": "0.1 0.1 0.1 0.3 0.3 0.3",
+         "inertia": "0.01 0.01 0.01 0 0 0", "direction": "0 0 -1 0 0 0"}  # fmt: skip
+PLAIN = {"r": "0.01", "t": "0.1", "lookahead_time": "0.1", "gain": "300", "v": "0.3", "damping": "0.5"}
+SETTINGS, MOTIONS = names(SettingFunctions), names(MotionFunctions)
+WAITING = {"socket_open", "socket_read_string", "interpreter_mode", "popup", "rtde_set_watchdog"}
+OTHERS = sorted(set(known_signatures()) - WAITING - set(SUBJECTS) - set(SETTINGS) - set(MOTIONS))
+
+
+def odd(seed: int) -> str:
+    """A program that sets the robot up and moves it, with some odd numbers among plausible ones."""
+    r, signatures = Random(seed), known_signatures()
+    oddness = r.choice((0.02, 0.1, 0.3))
+
+    def number(plain) -> str:
+        return r.choice(NUMBERS) if r.random() < oddness else str(plain)
+
+    def numbers(values) -> str:
+        return f"[{', '.join(map(number, values))}]"
+
+    def posture() -> str:
+        return numbers(round(angle + r.uniform(-0.3, 0.3), 3) for angle in URSIM)
+
+    def pose() -> str:
+        if r.random() < 0.3:
+            return f"pose_trans(get_target_tcp_pose(), p{numbers([0.02, -0.02, -0.05, 0, 0, 0.1])})"
+        return f"p{numbers((round(r.uniform(-0.4, 0.1), 3), -0.35, round(r.uniform(0.1, 0.4), 3), 2.2, 2.2, 0.1))}"
+
+    def argument(name: str) -> str:
+        if name in POSE | POSTURE:
+            return pose() if (name in POSE) == (r.random() < 0.8) else posture()
+        return numbers(LISTS[name].split()) if name in LISTS else number(PLAIN.get(name, 1))
+
+    def call(name: str) -> str:
+        known = [one.name for one in signatures[name].parameters]
+        given = known[: r.randint(signatures[name].required, len(known))]
+        return f"  x = {name}({', '.join(map(argument, given))})"
+
+    lines = [call(r.choice(SETTINGS)) for _ in range(r.randrange(3))]
+    lines += [call(r.choice((r.choice(OTHERS), "force_mode"))) for _ in range(r.randrange(2))]
+    lines += [call(r.choice(MOTIONS)) for _ in range(r.randrange(1, 5))]
+    return "\n".join(("def odd():", *lines, "end", ""))
