@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tvist_plant.plant import Measurement, Pacing, Plant, PlantError, Standing, Supervised
+from tvist_plant.plant import Measurement, Pacing, Plant, PlantError, Sight, Standing, Supervised
 
 
 def check_unpaced(plant: Plant) -> None:
@@ -65,3 +65,28 @@ def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
             raise ValueError(
                 f"plant {type(plant).__name__}: measured {name} {what}: its shape must be {shape}"
             )
+
+
+def check_sight(sight: Sight, joints: int) -> None:
+    """Check what a robot that its own controller moves has said: it becomes state, limits and rates here.
+
+    Raises:
+        PlantError: A number is missing, not finite or outside its range; the message names the field.
+    """
+    measured, load = sight.measured, sight.payload
+    for name, value, length in (
+        ("target", sight.target, 4 * joints),
+        ("q", measured.q, joints),
+        ("qd", measured.qd, joints),
+        ("moment", measured.moment, joints),
+        ("accelerometer", measured.accelerometer, 3),
+        ("speed", sight.speed, 1),
+        ("payload", None if load is None else (load.mass, *load.com, *load.inertia), 10),
+        ("tool", sight.tool, 6),
+        ("force", sight.force, 6),
+        ("slider", sight.slider, 1),
+    ):
+        if value is not None and (np.size(value) != length or not np.isfinite(value).all()):
+            raise PlantError(f"the arm's {name} is {value}: must be {length} finite numbers")
+    if sight.slider is not None and not 0.0 <= sight.slider <= 1.0:
+        raise PlantError(f"the arm's slider is {sight.slider:g}: must be 0 to 1")

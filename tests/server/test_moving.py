@@ -38,7 +38,7 @@ from tvist_server.moving.upload import Upload
 from tvist_server.rtde.client import RtdeError
 from tvist_server.rtde.codec import PackageKind, package
 from tvist_server.rtde.commanding import CommandingClient
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import Field, Wire
 from tvist_server.watching.place import place_of
 
 Q = np.array([0.3, -1.2, 1.5, -1.8, -1.5, 0.2])
@@ -51,7 +51,7 @@ WANTED = Wanted(UR5E, Payload(mass=5.0))
 
 
 def client():
-    return CommandingClient({"timestamp": Wire.DOUBLE}, {}, {"n": Wire.INT32, "q": Wire.DOUBLE})
+    return CommandingClient({"timestamp": Field(Wire.DOUBLE)}, {}, {"n": Wire.INT32, "q": Wire.DOUBLE})
 
 
 def set_up(commanding, types):

@@ -19,6 +19,15 @@ FAR, TURNED = 5e-3, 0.01
 """Differences of its dimensions from the robot file, from which on it is another model [m, rad]."""
 
 
+_RANGES = (
+    ("least", "smallest angle", -1e3, -0.1, "rad"),
+    ("most", "largest angle", 0.1, 1e3, "rad"),
+    ("velocity", "largest velocity", 0.05, 1e2, "rad/s"),
+    ("acceleration", "largest acceleration", 0.5, 1e4, "rad/s²"),
+)
+"""What its limits may be. Motions are planned within equal limits in both directions, which must leave some room."""
+
+
 class Configuration(NamedTuple):
     """What a robot is, and may do; all arrays have shape (6,)."""
 
@@ -34,6 +43,17 @@ class Configuration(NamedTuple):
     """Denavit and Hartenberg's lengths [m], as the next [m] and angles [rad]."""
     d: np.ndarray
     alpha: np.ndarray
+
+    def trouble(self) -> str | None:
+        """Return why nothing can be planned within its limits; None if it can."""
+        for field, name, least, most, unit in _RANGES:
+            for joint, value in enumerate(getattr(self, field).tolist()):
+                if not least <= value <= most:
+                    return (
+                        f"the {name} of its joint {joint} is {value:g} {unit}: must be {least:g} to {most:g}; correct "
+                        "the joint limits in its safety settings"
+                    )
+        return None
 
     def is_of(self, description: RobotDescription) -> bool:
         """Return whether its dimensions are those of a robot file."""

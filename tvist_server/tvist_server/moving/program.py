@@ -23,7 +23,7 @@ FADE = 0.05
 """Time constant with which a distance from the set-points fades [s]."""
 MARGIN = 1.05
 """Speed of the arm over that of the fastest set-points, at most."""
-_REGISTERS = ("NUMBER", "ORDER", "SETPOINTS", "STATE", "PLAYED", "ENDED", "ALONE", "LEFT_OUT", "RUN")
+_REGISTERS = ("NUMBER", "ORDER", "SETPOINTS", "STATE", "PLAYED", "ENDED", "ALONE", "LEFT_OUT", "RUN", "MOST")
 
 
 def program(run: int, *, speed: float, deceleration: float, lookahead: float, gain: float) -> str:
@@ -62,6 +62,7 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
             "again": AGAIN,
             "close": CLOSE,
             "after_shift": AFTER_SHIFT,
+            "half": MOST // 2,
         }
         | {
             "steps": " and ".join(f"norm(own[{j}]) <= most" for j in range(JOINTS)),
@@ -161,6 +162,11 @@ def $name():
     silence = silence + step
     if now > newest:
       silence = 0.0
+    elif newest - now > $half: # 1 has followed the largest number: ours are shifted by as much
+      silence = 0.0
+      newest = newest - $MOST
+      number = number - $MOST
+      last_number = last_number - $MOST
     end
     number = number + 1
     behind = now - number

@@ -8,11 +8,14 @@ from collections.abc import Mapping, Sequence
 from struct import Struct
 from typing import NamedTuple
 
+import numpy as np
+
+from tvist_protocol.errors import quoted
 from tvist_server.rtde.codec import PackageKind, PackageReader, package
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import Field
 
 Row = Mapping[str, tuple[float, ...]]
-"""Values of one cycle of the robot by name; a number is a tuple of one."""
+"""Values of one cycle of the robot by name, each in its range; a number is a tuple of one."""
 PROTOCOL = 2
 """Version of the protocol, in which the client chooses the frequency."""
 RATE = 500.0
@@ -39,11 +42,11 @@ class RtdeClient:
     """Reads one robot's outputs.
 
     Args:
-        needed: Types of the variables without which the rows are of no use, by name.
-        optional: Types of further variables, which some robots do not know and rows then lack.
+        needed: Types and ranges of the variables without which the rows are of no use, by name.
+        optional: Those of further variables, which some robots do not know and rows then lack.
     """
 
-    def __init__(self, needed: Mapping[str, Wire], optional: Mapping[str, Wire]) -> None:
+    def __init__(self, needed: Mapping[str, Field], optional: Mapping[str, Field]) -> None:
         self._needed, self._types = needed, {**needed, **optional}
         self._names = list(self._types)
         self._reader = PackageReader()
@@ -114,10 +117,17 @@ class RtdeClient:
             self._names = [name for name in self._names if name not in unknown]
             return self._set_up()
         for name, word in zip(self._names, words, strict=True):
-            if word != self._types[name].name:
-                raise RtdeError(f"{name} is of type {word[:20]}, and should be {self._types[name].name}")
+            if word != self._types[name].wire.name:
+                raise RtdeError(
+                    f"{name} is of type {quoted(word)}, and should be {self._types[name].wire.name}"
+                )
         self._recipe = payload[0]
-        self._row = Struct(">" + "".join(self._types[name].value for name in self._names))
+        fields = [(name, *self._types[name]) for name in self._names]
+        self._row = Struct(">" + "".join(wire.value for _, wire, _, _ in fields))
+        self._entries = [
+            (name, least, most) for name, wire, least, most in fields for _ in range(wire.length)
+        ]
+        self._least, self._most = np.array([entry[1:] for entry in self._entries], dtype=float).T
         return self._begin_rows()
 
     def _begin_rows(self) -> bytes:
@@ -131,7 +141,12 @@ class RtdeClient:
             raise RtdeError(f"a row has {len(payload) - 1} bytes instead of {self._row.size}")
         numbers, row, at = self._row.unpack_from(payload, 1), dict[str, tuple[float, ...]](), 0
         for name in self._names:
-            length = self._types[name].length
+            length = self._types[name].wire.length
             row[name] = numbers[at : at + length]
             at += length
+        values = np.array(numbers, dtype=float)
+        wrong = np.flatnonzero(~((self._least <= values) & (values <= self._most)))
+        if wrong.size:  # or not a number
+            name, least, most = self._entries[wrong[0]]
+            raise RtdeError(f"its {name} is {values[wrong[0]]:g}: must be {least:g} to {most:g}")
         return (row,)

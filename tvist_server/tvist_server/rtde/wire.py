@@ -1,7 +1,9 @@
 """Types of RTDE's variables, and their bytes."""
 
+import sys
 from enum import Enum
 from struct import Struct
+from typing import NamedTuple
 
 
 class Wire(Enum):
@@ -27,3 +29,11 @@ class Wire(Enum):
     def length(self) -> int:
         """Number of entries of a vector; 1 for a type that is no vector."""
         return int(self.value[:-1] or 1)
+
+
+class Field(NamedTuple):
+    """A variable that is read: its type, and the range of its numbers; without one they only have to be finite."""
+
+    wire: Wire
+    least: float = -sys.float_info.max
+    most: float = sys.float_info.max
