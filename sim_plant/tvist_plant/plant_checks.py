@@ -1,5 +1,7 @@
 """Checks of a plant, which may be a user's own."""
 
+from typing import Any
+
 import numpy as np
 
 from tvist_plant.plant import Measurement, Pacing, Plant, PlantError, Sight, Standing, Supervised
@@ -68,25 +70,14 @@ def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
 
 
 def check_sight(sight: Sight, joints: int) -> None:
-    """Check what a robot that its own controller moves has said: it becomes state, limits and rates here.
-
-    Raises:
-        PlantError: A number is missing, not finite or outside its range; the message names the field.
-    """
-    measured, load = sight.measured, sight.payload
-    for name, value, length in (
-        ("target", sight.target, 4 * joints),
-        ("q", measured.q, joints),
-        ("qd", measured.qd, joints),
-        ("moment", measured.moment, joints),
-        ("accelerometer", measured.accelerometer, 3),
-        ("speed", sight.speed, 1),
-        ("payload", None if load is None else (load.mass, *load.com, *load.inertia), 10),
-        ("tool", sight.tool, 6),
-        ("force", sight.force, 6),
-        ("slider", sight.slider, 1),
-    ):
-        if value is not None and (np.size(value) != length or not np.isfinite(value).all()):
-            raise PlantError(f"the arm's {name} is {value}: must be {length} finite numbers")
+    """Check what a robot that its own controller moves has said; a `ValueError` names the field that is wrong."""
+    felt, load = sight.measured, sight.payload
+    own: dict[str, tuple[Any, int]]
+    own = {"target": (sight.target, 4 * joints), "speed": (sight.speed, 1), "slider": (sight.slider, 1)}
+    own |= {"measured": (np.concatenate((felt.q, felt.qd, felt.moment)), 3 * joints), "tool": (sight.tool, 6)}
+    own |= {"payload": (load and (load.mass, *load.com, *load.inertia), 10), "force": (sight.force, 6)}
+    for name, (said, count) in own.items():
+        if said is not None and (np.size(said) != count or not np.isfinite(said).all()):
+            raise ValueError(f"{name} is {said}: must be {count} finite numbers")
     if sight.slider is not None and not 0.0 <= sight.slider <= 1.0:
-        raise PlantError(f"the arm's slider is {sight.slider:g}: must be 0 to 1")
+        raise ValueError(f"slider is {sight.slider:g}: must be 0 to 1")

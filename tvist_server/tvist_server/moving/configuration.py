@@ -19,15 +19,6 @@ FAR, TURNED = 5e-3, 0.01
 """Differences of its dimensions from the robot file, from which on it is another model [m, rad]."""
 
 
-_RANGES = (
-    ("least", "smallest angle", -1e3, -0.1, "rad"),
-    ("most", "largest angle", 0.1, 1e3, "rad"),
-    ("velocity", "largest velocity", 0.05, 1e2, "rad/s"),
-    ("acceleration", "largest acceleration", 0.5, 1e4, "rad/s²"),
-)
-"""What its limits may be. Motions are planned within equal limits in both directions, which must leave some room."""
-
-
 class Configuration(NamedTuple):
     """What a robot is, and may do; all arrays have shape (6,)."""
 
@@ -45,14 +36,16 @@ class Configuration(NamedTuple):
     alpha: np.ndarray
 
     def trouble(self) -> str | None:
-        """Return why nothing can be planned within its limits; None if it can."""
-        for field, name, least, most, unit in _RANGES:
-            for joint, value in enumerate(getattr(self, field).tolist()):
-                if not least <= value <= most:
-                    return (
-                        f"the {name} of its joint {joint} is {value:g} {unit}: must be {least:g} to {most:g}; correct "
-                        "the joint limits in its safety settings"
-                    )
+        """Return why no motion can be planned within its limits, equal in both directions; None if it can."""
+        for name, found, least, most in (
+            ("smallest angles", self.least, -1e3, -0.1),
+            ("largest angles", self.most, 0.1, 1e3),
+            ("largest velocities", self.velocity, 0.05, 1e2),
+            ("largest accelerations", self.acceleration, 0.5, 1e4),
+        ):
+            if not ((least <= found) & (found <= most)).all():
+                must = f"must be {least:g} to {most:g}"
+                return f"the {name} of its joints are {found.tolist()}: {must}; correct them in its safety settings"
         return None
 
     def is_of(self, description: RobotDescription) -> bool:

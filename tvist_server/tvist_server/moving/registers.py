@@ -68,8 +68,8 @@ INPUTS: dict[str, Wire] = {
     **{f"input_double_register_{SETPOINTS + place}": Wire.DOUBLE for place in range(KEPT * JOINTS)},
 }
 """What is written, in the order of a package's values."""
-OUTPUTS: dict[str, Field] = {
-    f"output_int_register_{place}": Field(Wire.INT32)
-    for place in (STATE, PLAYED, ENDED, ALONE, LEFT_OUT, RUN)
-}
+OUTPUTS: dict[str, Field] = dict.fromkeys(
+    [f"output_int_register_{place}" for place in (STATE, PLAYED, ENDED, ALONE, LEFT_OUT, RUN)],
+    Field(Wire.INT32),
+)
 """What is read."""

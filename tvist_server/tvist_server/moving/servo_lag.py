@@ -63,11 +63,7 @@ class Setpoints:
         self._qd = np.zeros_like(self._q)
 
     def next(self, command: DriveCommand) -> Floats:
-        """Return the set-point for the next command, shape (n,) [rad].
-
-        Raises:
-            PlantError: It is no number, so that it must not reach the robot.
-        """
+        """Return the set-point for the next command, shape (n,) [rad]; one that is no number raises `PlantError`."""
         wanted, lag = command.q, self._lag
         if lag is not None:
             velocity = (command.q - self._q) / PERIOD

@@ -8,8 +8,6 @@ from collections.abc import Mapping, Sequence
 from struct import Struct
 from typing import NamedTuple
 
-import numpy as np
-
 from tvist_protocol.errors import quoted
 from tvist_server.rtde.codec import PackageKind, PackageReader, package
 from tvist_server.rtde.wire import Field
@@ -118,16 +116,9 @@ class RtdeClient:
             return self._set_up()
         for name, word in zip(self._names, words, strict=True):
             if word != self._types[name].wire.name:
-                raise RtdeError(
-                    f"{name} is of type {quoted(word)}, and should be {self._types[name].wire.name}"
-                )
+                raise RtdeError(f"{name} is of type {quoted(word)}, not {self._types[name].wire.name}")
         self._recipe = payload[0]
-        fields = [(name, *self._types[name]) for name in self._names]
-        self._row = Struct(">" + "".join(wire.value for _, wire, _, _ in fields))
-        self._entries = [
-            (name, least, most) for name, wire, least, most in fields for _ in range(wire.length)
-        ]
-        self._least, self._most = np.array([entry[1:] for entry in self._entries], dtype=float).T
+        self._row = Struct(">" + "".join(self._types[name].wire.value for name in self._names))
         return self._begin_rows()
 
     def _begin_rows(self) -> bytes:
@@ -141,12 +132,10 @@ class RtdeClient:
             raise RtdeError(f"a row has {len(payload) - 1} bytes instead of {self._row.size}")
         numbers, row, at = self._row.unpack_from(payload, 1), dict[str, tuple[float, ...]](), 0
         for name in self._names:
-            length = self._types[name].wire.length
-            row[name] = numbers[at : at + length]
-            at += length
-        values = np.array(numbers, dtype=float)
-        wrong = np.flatnonzero(~((self._least <= values) & (values <= self._most)))
-        if wrong.size:  # or not a number
-            name, least, most = self._entries[wrong[0]]
-            raise RtdeError(f"its {name} is {values[wrong[0]]:g}: must be {least:g} to {most:g}")
+            wire, least, most = self._types[name]
+            row[name] = values = numbers[at : at + wire.length]
+            wrong = [value for value in values if not least <= value <= most]  # or no number
+            if wrong:
+                raise RtdeError(f"its {name} is {wrong[0]:g}: must be {least:g} to {most:g}")
+            at += wire.length
         return (row,)

@@ -1,6 +1,5 @@
 """Types of RTDE's variables, and their bytes."""
 
-import sys
 from enum import Enum
 from struct import Struct
 from typing import NamedTuple
@@ -32,8 +31,8 @@ class Wire(Enum):
 
 
 class Field(NamedTuple):
-    """A variable that is read: its type, and the range of its numbers; without one they only have to be finite."""
+    """A variable that is read: its type, and the range of its numbers."""
 
     wire: Wire
-    least: float = -sys.float_info.max
-    most: float = sys.float_info.max
+    least: float = -(2.0**63)
+    most: float = 2.0**63

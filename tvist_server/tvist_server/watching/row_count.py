@@ -45,10 +45,8 @@ class RowCount:
         Args:
             timestamp: The robot's time [s].
             now: Our time [s].
-            reconnected: Whether the connection was lost before it.
-
-        Raises:
-            RtdeError: The robot's time goes back, or on by more than ours since its earliest row.
+            reconnected: Whether the connection was lost before it. If not, time that does not go on as ours does, or
+                goes back, raises `RtdeError`.
         """
         own, before = round(timestamp / PERIOD), self._own
         if own == before:
@@ -58,7 +56,9 @@ class RowCount:
         if before is not None and not reconnected:
             if own < before or ahead > self._ahead + SAME_CLOCK:
                 was = before * PERIOD
-                raise RtdeError(f"its timestamp is {timestamp:g} s after {was:g} s: must go on as time does")
+                raise RtdeError(
+                    f"the robot's timestamp is {timestamp:g} s after {was:g} s: must go on as time does"
+                )
             ahead = max(ahead, self._ahead)
         if before is not None:
             passed, elapsed = own - before, round((now - self._heard) / PERIOD)

@@ -3,7 +3,6 @@
 A lost connection is looked for again once a second, without delaying the thread that ticks.
 """
 
-import math
 import time
 from collections import deque
 from dataclasses import replace
@@ -18,7 +17,7 @@ from tvist_plant.plant import PERIOD, Measurement, PlantError, Sight
 from tvist_protocol.errors import harmless
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.rtde.client import Row, RtdeClient, RtdeError
-from tvist_server.watching.connection import Connection, LostError, UnreachableError, resolved
+from tvist_server.watching.connection import ANSWERS, Connection, LostError, UnreachableError, resolved
 from tvist_server.watching.place import Place
 from tvist_server.watching.row_count import RowCount
 from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, has_real_payload, sight_of
@@ -27,8 +26,6 @@ LOOKED_AT = 25
 """Number of rows from which the time between two is found."""
 INTERVALS = {1: "500", 4: "125"}
 """Control periods between two rows, and the rate of such a robot [Hz]."""
-LOOKS = 3.0
-"""Longest time in which these must come [s]."""
 TEXTS = 10
 """Most texts of the robot's that are passed on in a second, and that wait for its next row."""
 RETRY = 1.0
@@ -73,9 +70,8 @@ class WatchedRobot:
         """Whether the present connection has sent a row of the right robot."""
         self._lost = 0.0, ""
         """When the connection was lost [s], and why; nothing while it is there."""
-        self._retry_at = self._told_at = 0.0
+        self._retry_at = self._told_at = self._texts_at = 0.0
         self._untold = self._room = self._left_out = 0
-        self._texts_at = -math.inf
         self._notes: list[str] = []
         try:
             self._address = resolved(place)
@@ -120,9 +116,7 @@ class WatchedRobot:
         try:
             for row in self._rows(timeout):
                 self._take(row)
-        except RtdeError as error:
-            self._lose(LostError(f"{self._place}: {error}"))
-        except LostError as error:
+        except (LostError, RtdeError) as error:
             self._lose(error)
         return bool(self._sights)
 
@@ -139,11 +133,11 @@ class WatchedRobot:
         self._connect()
         rows = self.looked_at
         try:
-            ends = time.monotonic() + LOOKS
+            ends = time.monotonic() + ANSWERS
             while len(rows) < LOOKED_AT:
                 rows += self._rows(1.0)
                 if time.monotonic() > ends:
-                    raise LostError(f"the robot at {self._place} sends only {len(rows)} rows in {LOOKS:g} s")
+                    raise LostError(f"{self._place} sends only {len(rows)} rows in {ANSWERS:g} s")
             self._check(rows[-1])
             self.version = self._client.version
             """Version of its software: major, minor, bugfix, build."""
@@ -251,7 +245,7 @@ class WatchedRobot:
         self.payload = sight.payload or self.payload
         return sight
 
-    def _lose(self, error: LostError) -> None:
+    def _lose(self, error: LostError | RtdeError) -> None:
         """Give up the connection, and say so in a tick of its own; once for each reason.
 
         That nobody answers there is news only if it is the first.
