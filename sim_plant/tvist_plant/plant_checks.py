@@ -72,10 +72,10 @@ def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
 def check_sight(sight: Sight, joints: int) -> None:
     """Check what a robot that its own controller moves has said; a `ValueError` names the field that is wrong."""
     felt, load = sight.measured, sight.payload
-    own: dict[str, tuple[Any, int]]
-    own = {"target": (sight.target, 4 * joints), "speed": (sight.speed, 1), "slider": (sight.slider, 1)}
+    own: dict[str, tuple[Any, int]] = {"target": (sight.target, 4 * joints), "speed": (sight.speed, 1)}
     own |= {"measured": (np.concatenate((felt.q, felt.qd, felt.moment)), 3 * joints), "tool": (sight.tool, 6)}
     own |= {"payload": (load and (load.mass, *load.com, *load.inertia), 10), "force": (sight.force, 6)}
+    own |= {"slider": (sight.slider, 1), "tick": (sight.tick, 1), "modes": (sight.modes, 3)}
     for name, (said, count) in own.items():
         if said is not None and (np.size(said) != count or not np.isfinite(said).all()):
             raise ValueError(f"{name} is {said}: must be {count} finite numbers")

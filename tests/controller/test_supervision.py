@@ -1,6 +1,5 @@
 """A robot that is moved through its own controller: what that decides becomes our state, and nothing moves on."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -152,17 +151,14 @@ def test_its_slider_scales_our_speed_and_leaves_what_was_set(robot, arm):
     assert robot.states[-1].speed_scaling == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize(
-    "said", [{"slider": math.nan}, {"slider": -1.0}, {"target": np.full((4, 6), np.nan)}, {"tool": (1.0,)}]
-)
+@pytest.mark.parametrize("said", [{"slider": np.nan}, {"slider": -1.0}, {"speed": np.inf}, {"tool": (1.0,)}])
 def test_what_no_robot_can_say_stops_it_and_names_the_field(arm, said):
     robot = Robot(plant=called(arm, 6))
     robot.tick(5)
     moving(robot, arm)
     arm.says(**said)
-    robot.tick(200)
-    assert any(f"{next(iter(said))} is" in (event.why or "") for event in robot.events)
-    assert np.isfinite(arm.sent).all()
+    robot.tick(2)
+    assert f"{next(iter(said))} is" in robot.events[-1].why
     assert not arm.holds
 
 

@@ -1,7 +1,6 @@
 """What a robot is moved by, without a socket or a clock: inputs that are claimed, start checks, reasons and periods."""
 
 import contextlib
-import itertools
 import math
 import re
 import struct
@@ -404,6 +403,7 @@ def test_a_program_is_sent_only_if_the_robot_is_free_at_the_last_moment(monkeypa
     assert sent == []
 
 
+FAR, TEXT = place_of("ur://127.0.0.1:9"), package(PackageKind.TEXT_MESSAGE, b"\x06\x1b[2J\nX\x00\x03")
 FIELDS = {**NEEDED, **r.OUTPUTS, **OPTIONAL}
 DOUBLES = [name for name, field in FIELDS.items() if field.wire.value.endswith("d")]
 STANDS = {name: (0,) * field.wire.length for name, field in FIELDS.items()} | {
@@ -417,44 +417,31 @@ def packed(row, recipe=1):
     return package(PackageKind.DATA, bytes([recipe]) + b"".join(values))
 
 
-TEXT = package(PackageKind.TEXT_MESSAGE, b"\x06\x1b[2J\nX\x00\x03")
-
-
 class Far:
     """A robot in the test's own time, its own socket and selector; `spoil` makes of its rows the bytes that come."""
 
     def __init__(self, patch):
-        self.now, self.time, self.written, self.spoil, self.close = 100.0, 50.0, [], packed, lambda: None
-        times = SimpleNamespace(
-            monotonic=lambda: self.passed(1e-7), sleep=self.passed, monotonic_ns=lambda: 1
-        )
+        self.now, self.written, self.spoil, self.close = 50.0, [], packed, lambda: None
+        times = SimpleNamespace(monotonic=self.passed, sleep=self.passed, monotonic_ns=lambda: 1)
         for module in ("watching.connection", "watching.watched_robot", "moving.moved_robot", "moving.run"):
             patch.setattr(f"tvist_server.{module}.time", times)
-        patch.setattr("tvist_server.watching.watched_robot.resolved", lambda _: None)
-        patch.setattr("tvist_server.moving.moved_robot.configuration_of", lambda _: None)
-        patch.setattr("tvist_server.moving.moved_robot.asked", lambda *_: {})
         patch.setattr("tvist_server.moving.run.Upload", self.upload)
         patch.setattr(CommandedRobot, "_new_connection", lambda _: self.connected())
 
-    def passed(self, duration):
+    def passed(self, duration=1e-7):
         self.now += duration
         return self.now
 
     def connected(self):
         self.run, self.number, self.q = 0, 0, tuple(Q)
-        own, link = CommandingClient(FIELDS, {}, r.INPUTS), object.__new__(CommandingConnection)
-        wires = (r.INPUTS.values(), (field.wire for field in FIELDS.values()))
-        set_up(own, *(",".join(wire.name for wire in one).encode() for one in wires))
-        own.receive(package(PackageKind.START, b"\x01"))
-        state = {
-            "client": own,
-            "_commanding": own,
-            "_socket": self,
-            "_selector": self,
-            "_place": "far",
-            "texts": [],
-        }
-        vars(link).update(state, _heard=self.now, _newest=-1, _connected=True, _rest=b"")
+        client, link = CommandingClient(FIELDS, {}, r.INPUTS), object.__new__(CommandingConnection)
+        wires = r.INPUTS.values(), [field.wire for field in FIELDS.values()]
+        set_up(client, *(",".join(wire.name for wire in one).encode() for one in wires))
+        client.receive(package(PackageKind.START, b"\x01"))
+        vars(link).update(
+            client=client, _commanding=client, _socket=self, _selector=self, _place=FAR, texts=[]
+        )
+        vars(link).update(_heard=self.now, _newest=-1, _connected=True, _rest=b"")
         return link
 
     def send(self, data):
@@ -466,14 +453,12 @@ class Far:
         return len(data)
 
     def select(self, timeout):
-        if timeout > 0.0:
-            self.now, self.time = self.now + PERIOD, self.time + PERIOD
-        return timeout > 0.0
+        return timeout > 0.0 and self.passed(PERIOD) > 0.0
 
     def recv(self, _):
         said = {r.RUN: self.run, r.STATE: 2 if self.number else 1, r.PLAYED: self.number}
         row = STANDS | {f"output_int_register_{place}": (value,) for place, value in said.items()}
-        row |= {"timestamp": (self.time,), "runtime_state": (2 if self.run else 1,)}
+        row |= {"timestamp": (self.now,), "runtime_state": (2 if self.run else 1,)}
         return self.spoil(row | {"target_q": self.q, "actual_q": self.q})
 
     def upload(self, _, text, __):
@@ -482,24 +467,21 @@ class Far:
 
 
 SPOILT = [
-    ("timestamp is 1e+06 s after", {"timestamp": (1e6,)}),
-    ("timestamp is 3 s after", {"timestamp": (3.0,)}),
+    ("to 1e+06 s", {"timestamp": (1e6,)}),
+    ("to 3 s", {"timestamp": (3.0,)}),
     ("no new row for 1 s", {"timestamp": (51.0,)}),
     ("no new row for 1 s", TEXT),
     ("no new row for 1 s", packed(STANDS, recipe=2)),
     ("more texts of the robot are left out", {}),
     ("target_speed_fraction is -1: must be 0 to 1", {"target_speed_fraction": (-1.0,)}),
-    *(
-        (f"its {name} is {value:g}: must be", {name: (value,) * len(STANDS[name])})
-        for name, value in zip(DOUBLES, itertools.cycle((math.nan, math.inf, 1e18)))
-    ),
+    *[(f"{name} is nan: must be", {name: (math.nan,) * len(STANDS[name])}) for name in DOUBLES],
 ]
 
 
 @pytest.mark.parametrize(("said", "wrong"), SPOILT, ids=[said for said, _ in SPOILT])
 def test_what_is_wrong_in_rows_is_said_and_no_set_point_leaves_the_limits(monkeypatch, said, wrong):
     far = Far(monkeypatch)
-    plant = called(MovedRobot(place_of("ur://far"), UR5E, Payload(mass=5.0), speed_cap=0.5), 6)
+    plant = called(MovedRobot(FAR, UR5E, Payload(mass=5.0), speed_cap=0.5), 6)
     robot = Robot(plant=plant)
     for tick in range(800):
         if tick == 100:
@@ -524,4 +506,4 @@ def test_a_conversation_has_one_deadline_however_slowly_it_is_answered(monkeypat
     slow = SimpleNamespace(sendall=len, settimeout=float, recv=lambda _: b"x")
     monkeypatch.setattr("socket.create_connection", lambda *_: contextlib.nullcontext(slow))
     with pytest.raises(NoAnswerError, match="no answer within 2 s"):
-        ask(place_of("ur://far"), b"", lambda _: None)
+        ask(FAR, b"", lambda _: None)

@@ -12,10 +12,8 @@ from tvist_server.rtde.wire import Field, Wire
 from tvist_server.watching.place import place_of
 from tvist_server.watching.row_count import RowCount
 
-NEEDED, OPTIONAL = (
-    {"timestamp": Field(Wire.DOUBLE), "q": Field(Wire.VECTOR3D)},
-    {"payload": Field(Wire.DOUBLE)},
-)
+NEEDED = {"timestamp": Field(Wire.DOUBLE), "q": Field(Wire.VECTOR3D)}
+OPTIONAL = {"payload": Field(Wire.DOUBLE)}
 
 
 def answers(types):

@@ -52,7 +52,7 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         {name: getattr(registers, name) for name in _REGISTERS}
         | {f"ended_{one.name.lower()}": int(one) for one in Ended}
         | {f"state_{one.name.lower()}": int(one) for one in State}
-        | {"name": NAME, "run": run, "speed": float(MARGIN * speed)}
+        | {"name": NAME, "run": run, "speed": float(MARGIN * speed), "half": MOST // 2}
         | {"deceleration": float(deceleration), "lookahead": float(lookahead), "gain": float(gain)}
         | {
             "silence": SILENCE,
@@ -62,7 +62,6 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
             "again": AGAIN,
             "close": CLOSE,
             "after_shift": AFTER_SHIFT,
-            "half": MOST // 2,
         }
         | {
             "steps": " and ".join(f"norm(own[{j}]) <= most" for j in range(JOINTS)),

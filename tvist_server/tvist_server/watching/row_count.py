@@ -6,8 +6,7 @@ from tvist_plant.plant import PERIOD
 from tvist_server.rtde.client import RtdeError
 
 SAME_CLOCK = 1.0
-"""Largest difference between the robot's clock and ours over a lost connection; more, and it began anew. By as much may
-a row be ahead of those before it [s]."""
+"""Largest lead of a row over those before it, and difference of the clocks over a lost connection [s]."""
 
 
 class Counted(NamedTuple):
@@ -55,10 +54,7 @@ class RowCount:
         missing, anew, ahead = 0, False, timestamp - now
         if before is not None and not reconnected:
             if own < before or ahead > self._ahead + SAME_CLOCK:
-                was = before * PERIOD
-                raise RtdeError(
-                    f"the robot's timestamp is {timestamp:g} s after {was:g} s: must go on as time does"
-                )
+                raise RtdeError(f"the robot's timestamp goes from {before * PERIOD:g} to {timestamp:g} s")
             ahead = max(ahead, self._ahead)
         if before is not None:
             passed, elapsed = own - before, round((now - self._heard) / PERIOD)

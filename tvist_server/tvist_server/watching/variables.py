@@ -9,32 +9,31 @@ from tvist_plant.plant import Measurement, Sight
 from tvist_server.rtde.client import Row
 from tvist_server.rtde.wire import Field, Wire
 
-_SIX, _MODE = Wire.VECTOR6D, (-1, 255)
 NEEDED: dict[str, Field] = {
     "timestamp": Field(Wire.DOUBLE, 0.0, 1e9),
-    "target_q": Field(_SIX, -1e3, 1e3),
-    "target_qd": Field(_SIX, -1e3, 1e3),
-    "target_qdd": Field(_SIX, -1e5, 1e5),
-    "target_moment": Field(_SIX, -1e5, 1e5),
-    "actual_q": Field(_SIX, -1e3, 1e3),
-    "actual_qd": Field(_SIX, -1e3, 1e3),
-    "actual_current": Field(_SIX, -1e3, 1e3),
-    "actual_TCP_pose": Field(_SIX, -1e3, 1e3),
-    "actual_TCP_force": Field(_SIX, -1e5, 1e5),
+    "target_q": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "target_qd": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "target_qdd": Field(Wire.VECTOR6D, -1e5, 1e5),
+    "target_moment": Field(Wire.VECTOR6D, -1e5, 1e5),
+    "actual_q": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "actual_qd": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "actual_current": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "actual_TCP_pose": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "actual_TCP_force": Field(Wire.VECTOR6D, -1e5, 1e5),
     "actual_tool_accelerometer": Field(Wire.VECTOR3D, -1e4, 1e4),
-    "robot_mode": Field(Wire.INT32, *_MODE),
-    "safety_mode": Field(Wire.INT32, *_MODE),
-    "runtime_state": Field(Wire.UINT32, *_MODE),
+    "robot_mode": Field(Wire.INT32, -1, 255),
+    "safety_mode": Field(Wire.INT32, -1, 255),
+    "runtime_state": Field(Wire.UINT32, -1, 255),
     "speed_scaling": Field(Wire.DOUBLE, 0.0, 2.0),
 }
 """Variables that every robot with RTDE has. The ranges exclude what no robot can mean."""
 OPTIONAL: dict[str, Field] = {
-    "actual_current_as_torque": Field(_SIX, -1e5, 1e5),
+    "actual_current_as_torque": Field(Wire.VECTOR6D, -1e5, 1e5),
     "target_speed_fraction": Field(Wire.DOUBLE, 0.0, 1.0),
-    "tcp_offset": Field(_SIX, -10.0, 10.0),
+    "tcp_offset": Field(Wire.VECTOR6D, -10.0, 10.0),
     "payload": Field(Wire.DOUBLE, 0.0, 100.0),
     "payload_cog": Field(Wire.VECTOR3D, -2.0, 2.0),
-    "payload_inertia": Field(_SIX, -10.0, 10.0),
+    "payload_inertia": Field(Wire.VECTOR6D, -10.0, 10.0),
     "actual_digital_input_bits": Field(Wire.UINT64, 0, 2**32 - 1),
     "actual_digital_output_bits": Field(Wire.UINT64, 0, 2**32 - 1),
 }
