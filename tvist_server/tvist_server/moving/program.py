@@ -52,7 +52,7 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         {name: getattr(registers, name) for name in _REGISTERS}
         | {f"ended_{one.name.lower()}": int(one) for one in Ended}
         | {f"state_{one.name.lower()}": int(one) for one in State}
-        | {"name": NAME, "run": run, "speed": float(MARGIN * speed), "half": MOST // 2}
+        | {"name": NAME, "run": run, "speed": float(MARGIN * speed)}
         | {"deceleration": float(deceleration), "lookahead": float(lookahead), "gain": float(gain)}
         | {
             "silence": SILENCE,
@@ -159,13 +159,12 @@ def $name():
   while why == $ended_not:
     now = read_input_integer_register($NUMBER)
     silence = silence + step
-    if now > newest:
+    if now != newest:
       silence = 0.0
-    elif newest - now > $half: # 1 has followed the largest number: ours are shifted by as much
-      silence = 0.0
-      newest = newest - $MOST
-      number = number - $MOST
-      last_number = last_number - $MOST
+      if now < newest: # 1 has followed the largest number
+        number = number - $MOST
+        last_number = last_number - $MOST
+      end
     end
     number = number + 1
     behind = now - number
@@ -176,7 +175,7 @@ def $name():
 
     if read_input_integer_register($ORDER) != $run:
       why = $ended_ordered
-    elif now < newest or behind > missed: # another sender, or a pause: it must not catch up
+    elif behind > missed: # another sender, or a pause: it must not catch up
       why = $ended_lost
     elif silence > patience:
       why = $ended_silence

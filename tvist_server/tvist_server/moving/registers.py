@@ -10,8 +10,8 @@ from tvist_server.rtde.wire import Field, Wire
 JOINTS = 6
 KEPT = 4
 """Number of set-points in a package: the newest and those before it."""
-MOST = 2**31 - 1
-"""Largest number of a set-point, and of a run; 1 follows it."""
+MOST = 2**30
+"""Largest number of a set-point, and of a run; 1 follows it. Differences fit into the 32 bits of a register."""
 
 NUMBER = 24
 """Input integer: number n of the newest set-point, 1 more in each control period of the robot; 0: none yet."""
