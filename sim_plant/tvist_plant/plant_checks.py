@@ -1,6 +1,6 @@
 """Checks of a plant, which may be a user's own."""
 
-from typing import Any
+import math
 
 import numpy as np
 
@@ -72,12 +72,14 @@ def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
 def check_sight(sight: Sight, joints: int) -> None:
     """Check what a robot that its own controller moves has said; a `ValueError` names the field that is wrong."""
     felt, load = sight.measured, sight.payload
-    own: dict[str, tuple[Any, int]] = {"target": (sight.target, 4 * joints), "speed": (sight.speed, 1)}
-    own |= {"measured": (np.concatenate((felt.q, felt.qd, felt.moment)), 3 * joints), "tool": (sight.tool, 6)}
-    own |= {"payload": (load and (load.mass, *load.com, *load.inertia), 10), "force": (sight.force, 6)}
-    own |= {"slider": (sight.slider, 1), "tick": (sight.tick, 1), "modes": (sight.modes, 3)}
-    for name, (said, count) in own.items():
-        if said is not None and (np.size(said) != count or not np.isfinite(said).all()):
+    measured = np.concatenate((felt.q, felt.qd, felt.moment)).tolist()
+    body = None if load is None else (load.mass, *load.com, *load.inertia)
+    for name, said, count in (  # whose sums are finite only if they are, and quicker to see than by numpy
+        ("target", np.ravel(sight.target).tolist(), 4 * joints), ("measured", measured, 3 * joints),
+        ("modes", sight.modes, 3), ("speed", (sight.speed,), 1), ("tick", (sight.tick,), 1),
+        ("tool", sight.tool, 6), ("force", sight.force, 6), ("payload", body, 10),
+    ):  # fmt: skip
+        if said is not None and (len(said) != count or not math.isfinite(sum(said))):
             raise ValueError(f"{name} is {said}: must be {count} finite numbers")
     if sight.slider is not None and not 0.0 <= sight.slider <= 1.0:
         raise ValueError(f"slider is {sight.slider:g}: must be 0 to 1")
