@@ -137,5 +137,5 @@ class RtdeClient:
             wrong = [value for value in values if not least <= value <= most]  # or no number
             if wrong:
                 raise RtdeError(f"its {name} is {wrong[0]:g}: must be {least:g} to {most:g}")
-            at += wire.length
+            at += len(values)
         return (row,)
