@@ -1,11 +1,15 @@
 """A tab of the live page, and what it has been told."""
 
+import asyncio
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from tvist_view.pictures import NOTES_EVERY, pictures
 from tvist_view.signals import Running, after_stop
 from tvist_view.stage import Tab
+
+MOST_WAITING = 100
+"""Largest number of messages that wait for a slow tab when a sentence is added."""
 
 
 class Watched(Protocol):
@@ -26,6 +30,8 @@ class Watcher:
     tab: Tab
     robot: Watched | None = None
     waiting: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
+    tasks: set[asyncio.Task[Any]] = field(default_factory=set)
+    """What is being done for it."""
     status: dict[str, Any] = field(default_factory=dict)
     count: int = 0
     free: bool = True
@@ -37,7 +43,8 @@ class Watcher:
 
     def say(self, sentence: str) -> None:
         """Say a sentence."""
-        self.put("notice", {"text": sentence})
+        if len(self.waiting) < MOST_WAITING:
+            self.put("notice", {"text": sentence})
 
     async def tell(self) -> None:
         """Tell the tab what is new, picture by picture; a slow tab gets fewer."""
