@@ -40,8 +40,7 @@ def named(error: BaseException, said: str | None = None) -> str:
 
 def one_line(text: str) -> str:
     """Return a text in one line that can be shown anywhere: printable, and not too long."""
-    words = " ".join(text.split())
-    shown = words if len(words) <= LONGEST_LINE else f"{words[:LONGEST_LINE]}…"
+    shown = " ".join(text.split())[:LONGEST_LINE]
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in shown)
 
 

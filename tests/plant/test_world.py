@@ -360,12 +360,9 @@ def test_the_scenes_stand_still_and_leave_room_for_the_arm(name, ur5e):
 
 
 BOX = '<body name="{0}" pos="-0.5 0 0.2"><freejoint/><geom type="box" size="{1} {1} {1}" mass="{2}"/></body>'
-HEIGHTS = (
-    '<mujoco><asset><hfield name="h" nrow="{0}" ncol="{0}" size="1 1 1 1"/></asset><worldbody>'
-    '<geom type="hfield" hfield="h" pos="3 3 3"/></worldbody></mujoco>'
-)
+HEIGHTS = '<mujoco><asset><hfield name="h" nrow="{0}" ncol="{0}" size="1 1 1 1"/></asset></mujoco>'
 FILES = "<asset>" + "".join(f'<mesh file="{number}.stl"/>' for number in range(20_001)) + "</asset>"
-PEA = BOX.format("pea", 0.005, 1e-4)
+PEA, EVIL = BOX.format("pea", 0.005, 1e-4), BOX.format("&#x9b;2J" + 9999 * "a", 1, 1)
 
 
 @pytest.mark.parametrize(
@@ -390,26 +387,15 @@ PEA = BOX.format("pea", 0.005, 1e-4)
             + "</worldbody></mujoco>",
             "too many for real time",
         ),
-        (HEIGHTS.format(65536), "MuJoCo ends with exit code -11: look for numbers, counts or files"),
-        (HEIGHTS.format(20000), "MuJoCo fails: .*: look for numbers, counts or files"),
+        (HEIGHTS.format(65536), "MuJoCo ends with exit code -11: a scene may take 30 s and 768 MiB"),
+        (HEIGHTS.format(20000), "MuJoCo fails: "),
         (
-            '<mujoco><asset><model name="m" file="scene.xml"/></asset><worldbody/></mujoco>',
-            "MuJoCo ends with exit code -11",
+            '<mujoco><worldbody><geom size="0.1" solref="-inf nan"/></worldbody></mujoco>',
+            "has a solref that is",
         ),
-        (
-            '<mujoco><worldbody><geom size="0.1" pos="3 3 3" solref="-inf nan"/></worldbody></mujoco>',
-            'has a solref that is not "-N/m -N s/m"',
-        ),
-        pytest.param(
-            f"<mujoco><worldbody>{2 * BOX.format('&#x9b;2J' + 'a' * 9999, 1, 1)}</worldbody></mujoco>",
-            "\N{REPLACEMENT CHARACTER}2Ja",
-            id="long name",
-        ),
+        pytest.param(f"<mujoco><worldbody>{EVIL}{EVIL}</worldbody></mujoco>", "\ufffd2Ja", id="long name"),
         ('<mujoco><include file="pipe"/></mujoco>', "file .*pipe is a pipe, not a file"),
-        (
-            '<mujoco><compiler meshdir="/dev"/><asset><mesh file="zero"/></asset></mujoco>',
-            "/dev/zero is a device",
-        ),
+        ('<mujoco><compiler meshdir="/dev"/><asset><mesh file="null"/></asset></mujoco>', "null is a device"),
         ('<mujoco><asset><mesh file="large.stl"/></asset></mujoco>', "more than 256 MiB"),
         pytest.param(f"<mujoco>{FILES}</mujoco>", "it names too many files", id="many files"),
     ],
@@ -417,7 +403,7 @@ PEA = BOX.format("pea", 0.005, 1e-4)
 def test_a_bad_scene_is_one_sentence(tmp_path, text, said):
     os.mkfifo(tmp_path / "pipe")
     with (tmp_path / "large.stl").open("wb") as large:
-        large.truncate(1 << 40)
+        large.truncate(1 << 29)
     with pytest.raises((SceneError, PlantError), match=said) as raised:
         world(tmp_path, text).reset(still(DOWN))
     assert str(raised.value).isprintable()
@@ -427,7 +413,7 @@ def test_a_bad_scene_is_one_sentence(tmp_path, text, said):
 def test_a_scene_for_which_mujoco_takes_too_long_is_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setattr(apart, "LONGEST", 1)
     shapes = 60_000 * '<geom size="0.1" pos="3 3 3"/>'
-    with pytest.raises(SceneError, match="MuJoCo takes more than 1 s"):
+    with pytest.raises(SceneError, match="exit code -14: a scene may take 1 s"):
         world(tmp_path, f"<mujoco><worldbody>{shapes}</worldbody></mujoco>")
 
 

@@ -76,7 +76,7 @@ class LivePage:
     async def _leave(self, shown: ShownRobot, watcher: Watcher) -> None:
         """Let a tab go; the connection of a robot that no tab shows any more ends, unless it is the first one."""
         await shown.go(watcher)
-        if shown.idle and shown.name != self._first and self._shown.get(shown.name) is shown:
+        if not shown.watchers and shown.name != self._first and self._shown.get(shown.name) is shown:
             del self._shown[shown.name]
             shown.task.cancel()
             await asyncio.wait([shown.task])

@@ -66,7 +66,7 @@ class ShownRobot:
         self._place, self.name, self._judge, self._meshes = place, name, judge, meshes
         self.running: Running | None = None
         self._way = RealArm()
-        self._watchers: set[Watcher] = set()
+        self.watchers: set[Watcher] = set()
         self._ends: list[Callable[[], None]] = []
         self._robot: Robot | None = None
         self._doer: Doer | None = None
@@ -80,14 +80,14 @@ class ShownRobot:
 
     def come(self, watcher: Watcher) -> None:
         """A tab shows this robot now."""
-        self._watchers.add(watcher)
+        self.watchers.add(watcher)
         watcher.robot = self
         self._introduce(watcher)
         self._listen()
 
     async def go(self, watcher: Watcher) -> None:
         """A tab does not show it any more: its motion is stopped, its control given back."""
-        self._watchers.discard(watcher)
+        self.watchers.discard(watcher)
         watcher.robot = None
         if self._doer is not None:
             await self._doer.pilot.gone(watcher.tab.number)
@@ -96,11 +96,6 @@ class ShownRobot:
             if self._doer is not None:  # one may have taken control meanwhile
                 await self._doer.pilot.gone(watcher.tab.number)
         self._listen()
-
-    @property
-    def idle(self) -> bool:
-        """Whether no tab shows it."""
-        return not self._watchers
 
     def _introduce(self, watcher: Watcher) -> None:
         watcher.status, watcher.count = {}, 0 if self.running is None else max(self.running.count - 1, 0)
@@ -131,7 +126,7 @@ class ShownRobot:
         if sentence != self._absent:
             self._absent = sentence
             log.warning("%s; waiting for the robot", why)
-            for watcher in self._watchers:
+            for watcher in self.watchers:
                 self._introduce(watcher)
 
     async def _shows(self, robot: Robot, info: Info) -> None:
@@ -153,7 +148,7 @@ class ShownRobot:
         pilot = Pilot(robot, f"view-{os.getpid()}", self._say)
         self._doer = Doer(robot, look, pilot, self._judge, self._say, self._result)
         self._described = described(info, look, self.robots, self._meshes)
-        for watcher in self._watchers:
+        for watcher in self.watchers:
             self._introduce(watcher)
         self._listen()
         try:
@@ -166,7 +161,7 @@ class ShownRobot:
 
     def _listen(self) -> None:
         """Hear the robot while a tab shows it: its truth is computed for those who want it only."""
-        if not self._watchers:
+        if not self.watchers:
             self._deaf()
         elif self._robot is not None and self.running is not None and not self._ends:
             robot, running = self._robot, self.running
@@ -222,11 +217,11 @@ class ShownRobot:
 
     def _result(self, result: dict[str, Any]) -> None:
         self._way.compared()
-        for watcher in self._watchers:
+        for watcher in self.watchers:
             watcher.put("result", result)
 
     def _say(self, sentence: str) -> None:
-        for watcher in self._watchers:
+        for watcher in self.watchers:
             watcher.say(sentence)
 
     async def do(self, watcher: Watcher, message: asked.Message) -> None:

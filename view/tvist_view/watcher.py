@@ -8,9 +8,6 @@ from tvist_view.pictures import NOTES_EVERY, pictures
 from tvist_view.signals import Running, after_stop
 from tvist_view.stage import Tab
 
-MOST_WAITING = 100
-"""Largest number of messages that wait for a slow tab when a sentence is added."""
-
 
 class Watched(Protocol):
     """The robot that a tab shows."""
@@ -43,8 +40,7 @@ class Watcher:
 
     def say(self, sentence: str) -> None:
         """Say a sentence."""
-        if len(self.waiting) < MOST_WAITING:
-            self.put("notice", {"text": sentence})
+        self.put("notice", {"text": sentence})
 
     async def tell(self) -> None:
         """Tell the tab what is new, picture by picture; a slow tab gets fewer."""

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 
-import mujoco
 import numpy as np
 
 from tvist_plant.description import Payload, RobotDescription
@@ -20,33 +19,23 @@ from tvist_plant.world.second_opinion import SecondOpinion
 
 LONGEST, MOST_MEMORY = 30, 768 << 20
 """Longest time [s] and largest memory [byte] that MuJoCo may take for a scene."""
-HINT = "look for numbers, counts or files that are too large"
+Asked = tuple[RobotDescription, Payload, SceneFile, float, Hand | None]
+"""Arguments of `build`."""
 
 
-def build_apart(
-    description: RobotDescription, payload: Payload, scene: SceneFile, timestep: float, hand: Hand | None
-) -> World:
-    """Put an arm into a scene as `build` does.
-
-    Raises:
-        SceneError: The file is no scene, no arm can stand in it, or MuJoCo fails with it.
-    """
+def build_apart(asked: Asked) -> World:
+    """Put an arm into a scene as `build` does; a `SceneError` also says that MuJoCo fails with it."""
     done = subprocess.run(  # noqa: S603
         [sys.executable, "-P", "-m", __name__],
-        input=pickle.dumps((LONGEST, description, payload, scene, timestep, hand)),
+        input=pickle.dumps((LONGEST, asked)),
         capture_output=True,
         check=False,
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # the memory of others would be counted
     )
-    if done.returncode == -signal.SIGALRM:
-        found = f"MuJoCo takes more than {LONGEST} s for it: make it simpler"
-    elif done.returncode != 0:
-        found = f"MuJoCo ends with exit code {done.returncode}: {HINT}"
-    else:
-        found = pickle.loads(done.stdout)  # noqa: S301  it comes from the process above
-    if isinstance(found, World):
+    found = f"MuJoCo ends with exit code {done.returncode}: a scene may take {LONGEST} s and {MOST_MEMORY >> 20} MiB"
+    if done.returncode == 0 and isinstance(found := pickle.loads(done.stdout), World):  # noqa: S301  from above
         return found
-    raise SceneError(f"world {scene.name}: {found}")
+    raise SceneError(f"world {asked[2].name}: {found}")
 
 
 def _main() -> None:
@@ -54,19 +43,18 @@ def _main() -> None:
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # MuJoCo prints warnings, and writes a log of them where it is
     os.chdir("/")
-    longest, description, *more = pickle.load(sys.stdin.buffer)  # noqa: S301  see above
+    longest, asked = pickle.load(sys.stdin.buffer)  # noqa: S301  from above
+    description, payload, _, timestep, _ = asked
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
     signal.alarm(longest)  # also ends what waits inside MuJoCo, and what nobody waits for any more
+    found: World | str
     try:
-        world, still = build(description, *more), np.zeros(description.joints)
-        SecondOpinion(description, more[0], more[2], world.model).reset(DriveCommand(still, still, still))
-        found = pickle.dumps(world)
-    except (ValueError, mujoco.FatalError) as error:  # among them SceneError
-        found = pickle.dumps(one_line(str(error)))
-    except Exception as error:  # noqa: BLE001  also of memory, and what MuJoCo does not know itself
-        found = pickle.dumps(f"MuJoCo fails: {named(error)}: {HINT}")
+        still, found = np.zeros(description.joints), build(*asked)
+        SecondOpinion(description, payload, timestep, found.model).reset(DriveCommand(still, still, still))
+    except Exception as error:  # noqa: BLE001  of all kinds, also of memory
+        found = one_line(str(error)) if isinstance(error, SceneError) else f"MuJoCo fails: {named(error)}"
     with answer:
-        answer.write(found)
+        pickle.dump(found, answer)
 
 
 if __name__ == "__main__":

@@ -72,10 +72,6 @@ def _named(root: Element, folder: Path) -> list[Path]:
     """Return the files that a scene in a folder names, and those that included ones name.
 
     Missing files are left out: MuJoCo reports them.
-
-    Raises:
-        UserFileError: One is no regular file, or they are too many or too large.
-        OSError: One cannot be looked at.
     """
     folders, names, elements, included = {folder}, set[str](), list(root.iter()), 0
     for one in elements:  # they become more with each included file
@@ -94,8 +90,7 @@ def _named(root: Element, folder: Path) -> list[Path]:
                 f"it names too many files: at most {MOST_PLACES}, and {LARGEST >> 20} MiB included"
             )
     places = sorted({place / name for place in folders for name in names})
-    found = [place for place in places if place.exists() and not place.is_dir()]
-    for place in found:
+    for place in (found := [place for place in places if place.exists() and not place.is_dir()]):
         check_is_file(place, "file")
     if sum(place.stat().st_size for place in found) > LARGEST_FILES:
         raise UserFileError(f"the files that it names have more than {LARGEST_FILES >> 20} MiB")

@@ -44,7 +44,7 @@ class WorldArm(MujocoArm):
         self._seeded(0)
 
     def _made(self, payload: Payload) -> SecondOpinion:
-        self._world = build_apart(self._description, payload, self._scene, TIMESTEP, self._hand)
+        self._world = build_apart((self._description, payload, self._scene, TIMESTEP, self._hand))
         self._bodies, self._own = (
             np.array(one, dtype=np.int64) for one in (self._world.bodies, self._world.arm)
         )
