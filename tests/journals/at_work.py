@@ -221,17 +221,18 @@ def boxes_of_a_world(path):
     with started(path, OVER_THE_TABLE, *options) as hand:
         program(
             hand,
-            "rq_activate_and_wait()",
+            "rq_activate()",
             "rq_set_force(100)",
             "movel(p[-0.52, -0.25, 0.2, 2.2214, 2.2214, 0], a=2, v=0.5)",
             "movel(p[-0.52, -0.25, 0.15, 2.2214, 2.2214, 0], a=0.8, v=0.25)",
+            "rq_activate_and_wait()",
             "rq_close_and_wait()",
             "set_payload(1.32, [0, 0, 0.09])",
             "movel(p[-0.52, -0.25, 0.2, 2.2214, 2.2214, 0], a=1.2, v=0.5)",
             "movel(p[-0.36, -0.32, 0.2, 2.2214, 2.2214, 0.0], a=2, v=0.5)",
             "rq_open_and_wait()",
             "sleep(0.2)",
-            ticks=2200,
+            ticks=1700,
         )
 
 
