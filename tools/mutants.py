@@ -34,7 +34,7 @@ def draw(path: Path, count: int, seed: int) -> list[Mutant]:
     mutants, chosen, drawn = product()[0], random.Random(seed + len(listed)), []  # noqa: S311
     for old in listed:
         same = [new for new in mutants if all(new[name] == old[name] for name in SAME)]
-        drawn += sorted(same, key=lambda new: abs(new["line"] - old["line"]))[:1]
+        drawn += sorted(same, key=lambda new: [abs(new[way] - old[way]) for way in ("line", "column")])[:1]
     print(f"{len(drawn)} of {len(listed)} are still there; {count - len(drawn)} are drawn")
     while len(drawn) < count:
         kind = chosen.choice(("operator", "constant", "branch"))

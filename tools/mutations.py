@@ -21,7 +21,7 @@ PAIRS = (
     "Mod Mult", "Pow Mult", "USub UAdd",
 )  # fmt: skip
 """Operators that replace each other. `|` and `&` are left out, as they are types' more often than numbers'."""
-OTHER = dict(reversed(pair.split()) for pair in PAIRS[7::-1]) | dict(map(str.split, PAIRS))
+OTHER = {new: old for old, new in map(str.split, PAIRS[:8])} | dict(map(str.split, PAIRS))
 Mutant = dict[str, Any]
 
 
