@@ -18,8 +18,9 @@ AT_START = """
 import atexit, os, runpy, sys
 def begin():
     import coverage
-    test = os.environ["PYTEST_CURRENT_TEST"].rpartition(" ")[0]
-    one = coverage.Coverage({data!r}, True, config_file={rc!r}, context=test)
+    test, _, when = os.environ["PYTEST_CURRENT_TEST"].rpartition(" ")
+    whose = test if when == "(call)" else test.partition("::")[0]  # what a fixture starts is the file's
+    one = coverage.Coverage({data!r}, True, config_file={rc!r}, context=whose)
     one.start()
     atexit.register(lambda: (one.stop(), one.save()))
 def after_begin(run):
@@ -29,7 +30,7 @@ if "tests.nursery" in sys.orig_argv:
 elif "PYTEST_CURRENT_TEST" in os.environ:
     begin()
 """
-"""What a program of a test does first, or when it has been forked. A variable tells it whose it is."""
+"""What a program of a test does first, or when it has been forked; a variable names the test."""
 
 
 def cover(folder: Path, arguments: list[str]) -> None:
@@ -50,13 +51,12 @@ def cover(folder: Path, arguments: list[str]) -> None:
 
 @cache
 def executed(folder: Path, file: str) -> dict[int, set[str]]:
-    """Return the tests that execute the lines of a file, by the line."""
+    """Return the tests, or files of tests, that execute the lines of a file, by the line."""
     data = import_module("coverage").CoverageData(str(folder.resolve() / "coverage"))
     data.read()
     lines: dict[int, list[str]] = data.contexts_by_lineno(str(ROOT / file))
     return {
-        line: {re.sub(r"(@[^]@]*)?([|].*)?$", "", one) for one in of if "::" in one}
-        for line, of in lines.items()
+        line: {re.sub(r"(@[^]@]*)?([|].*)?$", "", one) for one in of if one} for line, of in lines.items()
     }
 
 
@@ -68,7 +68,8 @@ def shortest(tests: set[str], together: float) -> list[str]:
     def seconds(test: str) -> float:
         function = test.partition("[")[0]
         file, _, name = function.partition("::")
-        return float(kept.get(file, {}).get(name, 0.1)) / cases[function]
+        of_file = kept.get(file, {})
+        return float(of_file.get(name, 0.1) / cases[function] if name else sum(of_file.values()))
 
     chosen = []
     for test in sorted(tests, key=lambda one: (seconds(one), one)):

@@ -25,7 +25,7 @@ from tools.mutations import SOURCES, Mutant, product
 LIMIT, HANGS, COMPILING = 60.0, 20, 400.0
 """Seconds that pytest has, that one test has, and that the kernels have to be compiled before."""
 SAME = ("file", "owner", "text", "kind", "before", "after")
-"""What tells that a mutant is still there."""
+"""What tells that a mutant is still there, wherever its line is."""
 
 
 def draw(path: Path, count: int, seed: int) -> list[Mutant]:
@@ -92,32 +92,28 @@ def judged(mutant: Mutant, where: Path, folder: Path) -> Mutant:
     there, tests, file = tests_of(mutant, folder), [], where / mutant["file"]
     whole, before, start = file.read_bytes(), mutant["before"].encode(), time.monotonic()
     at = sum(map(len, whole.splitlines(keepends=True)[: mutant["line"] - 1])) + mutant["column"]
+    assert whole[at:].startswith(before), "the checkout differs from its last commit"
     changed = whole[:at] + mutant["after"].encode() + whole[at + len(before) :]
     while tests := shortest(there, LIMIT / 2):
         file.write_bytes(changed)
         code, said = ran(where, tests)
         file.write_bytes(whole)
         failed = re.findall(r"^(?:FAILED|ERROR) (tests/\S+::.*?)(?: - .*)?$", said, re.MULTILINE)[:1]
-        if code != 1 or not failed or ran(where, failed)[0] == 0:
+        missing = {one for one in tests if "ERROR: not found: " in said and f"/{one}\n" in said}
+        if not missing and (code != 1 or not failed or ran(where, failed)[0] == 0):
             hung = code is None or "Timeout (>" in said
             outcome = "timed out" if hung else "survived" if code == 0 else "found"
-            by = failed or said.splitlines()[-1:]
-            return {
-                "outcome": outcome,
-                "by": by,
-                "tests": [len(tests), len(there)],
-                "seconds": time.monotonic() - start,
-            }
-        there -= {*failed}
+            took, of = round(time.monotonic() - start, 1), [len(tests), len(there)]
+            return {"outcome": outcome, "by": failed or said.splitlines()[-1:], "tests": of, "seconds": took}
+        there -= missing or {*failed, failed[0].partition("::")[0]}
     return {"outcome": "no test"}
 
 
 def main(what: str, path: Path, *more: str) -> None:
     """Draw mutants or run them."""
     if what == "draw":
-        path.write_text(
-            json.dumps(draw(path, *map(int, more)), indent=1, ensure_ascii=False), encoding="utf-8"
-        )
+        drawn = draw(path, *map(int, more))
+        path.write_text(json.dumps(drawn, indent=1, ensure_ascii=False), encoding="utf-8")
         return
     mutants, numbers = json.loads(path.read_text(encoding="utf-8")), [int(one) for one in more[1:]]
     with tempfile.TemporaryDirectory() as temporary:
@@ -127,9 +123,8 @@ def main(what: str, path: Path, *more: str) -> None:
             for number in numbers or range(len(mutants)):
                 one = mutants[number]
                 one |= judged(one, where, Path(more[0]).resolve())
-                print(
-                    number, *(one[key] for key in ("outcome", "file", "line", "before", "after")), flush=True
-                )
+                told = (one[key] for key in ("outcome", "file", "line", "before", "after"))
+                print(number, *told, flush=True)
                 path.write_text(json.dumps(mutants, indent=1, ensure_ascii=False), encoding="utf-8")
         finally:
             subprocess.run(["git", "worktree", "remove", "--force", where], cwd=ROOT, check=True)
