@@ -99,7 +99,8 @@ def judged(mutant: Mutant, where: Path, folder: Path) -> Mutant:
         code, said = ran(where, tests)
         file.write_bytes(whole)
         failed = re.findall(r"^(?:FAILED|ERROR) (tests/\S+::.*?)(?: - .*)?$", said, re.MULTILINE)[:1]
-        missing = {one for one in tests if re.search(rf"not found: .*{re.escape(one)}$", said, re.MULTILINE)}
+        gone = re.findall(r"not found: \S*?(tests/[^[\n]*)", said)
+        missing = {one for one in tests if one.partition("[")[0] in gone}
         if not missing and (code != 1 or not failed or ran(where, failed)[0] == 0):
             hung = code is None or "Timeout (>" in said
             outcome = "timed out" if hung else "survived" if code == 0 else "found"
