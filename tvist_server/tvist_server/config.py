@@ -182,6 +182,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ur_allow: tuple[str, ...] = ()
     """Let programs open sockets to this machine too, repeatable: an IP address, a network such as 192.168.1.0/24, or a
     name as programs write it [only the machine that sent the program]."""
+    reserve_inputs: tuple[str, ...] = ()
+    """Answer IN_USE to clients of RTDE that ask for this input, repeatable, as a robot does while a fieldbus holds it:
+    speed_slider_mask, for example, or a pattern such as 'input_int_register_*'."""
 
     def setups(self) -> list[Setup]:
         """Return the initial setup of every robot's controller.
