@@ -495,3 +495,17 @@ def test_numbers_that_overflow_are_refused_by_their_line_alone(tmp_path):
     file.write_text("\n".join([",".join(["timestamp", "actual_q_0", "actual_q_1", *names]), *rows]) + "\n")
     with pytest.raises(RecordingError, match=r"line 2, .*no number of a robot"):
         read(file)
+
+
+@pytest.mark.parametrize("without", [(), ("target_q",)])
+def test_a_pause_of_any_length_changes_no_figure_and_takes_no_memory(without, tmp_path):
+    log = SyntheticLog().without(*without)
+    expected = analyze(read(log.csv(tmp_path / "log.csv")))
+    middle = len(log.columns["timestamp"]) // 2
+    for pause in (86_400.0, 7e8):
+        log.columns["timestamp"][middle:] = 100.0 + 0.002 * np.arange(middle, 2 * middle) + pause
+        found = analyze(read(log.csv(tmp_path / "log.csv")))
+        assert [one.f_d_hz for one in found] == pytest.approx([one.f_d_hz for one in expected], rel=0.01)
+        assert [one.stop_s for one in found] == pytest.approx(
+            [expected[0].stop_s, expected[1].stop_s + pause], abs=0.005
+        )
