@@ -56,8 +56,13 @@ class MotionRows:
 
     def later(self, rows: int) -> "MotionRows":
         """Return the same motion in a recording with more rows before it."""
-        moved = (getattr(self, name) + rows for name in ("start", "reference_stop", "shaped_stop", "end"))
-        return MotionRows(*moved, self.id, self.stopped, self.lag)
+        return replace(
+            self,
+            start=self.start + rows,
+            reference_stop=self.reference_stop + rows,
+            shaped_stop=self.shaped_stop + rows,
+            end=self.end + rows,
+        )
 
     def arm_stop(self, recording: Recording) -> int:
         """First row from which the arm is not driven any more, so that it only vibrates."""
