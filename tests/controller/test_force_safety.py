@@ -323,8 +323,8 @@ def test_set_points_that_come_late_in_free_air_are_no_contact(sensor, mass, late
     start(robot, "thread watch():", "s = 0", "while True:", "s = s + tool_contact(get_actual_tcp_speed())",
           "write_output_integer_register(0, s)", "sync()", "end", "end", "t = run watch()",
           "q = get_target_joint_positions()", "i = 0", "while i < 600:", "k = 1",
-          f"if i % 125 > {124 - late}:", "k = 0", "elif i % 125 == 0:", f"k = {late + 1}", "end",
-          f"d = k * {0.002 * speed}",
+          f"if i % 125 > {124 - late}:", "k = 0", "elif i % 125 == 0:",
+          f"k = {late + 1}", "end", f"d = k * {0.002 * speed}",
           "q = [q[0]+d, q[1], q[2]+0.7*d, q[3]-0.2*d, q[4]-d, q[5]-0.5*d]",
           "servoj(q, t=0.002, lookahead_time=0.03, gain=2000)", "i = i + 1", "end", "stopj(5)")  # fmt: skip
     robot.tick(750)

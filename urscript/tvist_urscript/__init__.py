@@ -46,18 +46,13 @@ __all__ = [
     "signature",
     "signatures",
     "to_str",
-    "unportable",
 ]
 
 if TYPE_CHECKING:
-    from tvist_urscript.checker import check, unportable
+    from tvist_urscript.checker import check
     from tvist_urscript.compiler import compile_script
 
-_PLACES = {
-    "check": "tvist_urscript.checker",
-    "unportable": "tvist_urscript.checker",
-    "compile_script": "tvist_urscript.compiler",
-}
+_PLACES = {"check": "tvist_urscript.checker", "compile_script": "tvist_urscript.compiler"}
 """Module of what is imported when it is first used: a robot starts without what compiles programs."""
 
 

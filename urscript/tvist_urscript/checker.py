@@ -7,7 +7,7 @@ from dataclasses import fields
 from tvist_urscript import tree
 from tvist_urscript.compiler import program_of, translate
 from tvist_urscript.errors import ScriptError
-from tvist_urscript.names import Scope, scopes
+from tvist_urscript.names import scopes
 from tvist_urscript.signatures import Signatures
 
 
@@ -23,41 +23,23 @@ def check(text: str, signatures: Signatures) -> list[ScriptError]:
 def unportable(text: str) -> list[ScriptError]:
     """Return what runs here and not on a robot of UR's, of a script that `check` has no errors of."""
     program, *inner = scopes(program_of(text))
-    theirs = {name for name in program.globals if not _set_globally(program.function, name)}
+    assigned = [node for node in _nodes(program.function) if isinstance(node, tree.Assign)]
+    own = program.globals - {node.target.name for node in assigned if node.qualifier == "global"}
     found = _framed_short(text)
     for scope in inner:
-        if scope.function.kind == "thread":
-            found += [
-                ScriptError(
-                    name.line,
-                    name.column,
-                    f"{name.name}: a robot of UR's does not find this variable in the thread {scope.function.name}: "
-                    "write global before its first assignment",
-                )
-                for name in _read(scope, theirs)
-            ]
+        left = own - scope.assigned - scope.local if scope.function.kind == "thread" else set()
+        for node in _nodes(*scope.function.body):
+            if isinstance(node, tree.Name) and node.name in left:
+                left.remove(node.name)
+                why = f"{node.name}: a robot of UR's does not find this variable in the thread {scope.function.name}"
+                why += ": write global before its first assignment"
+                found.append(ScriptError(node.line, node.column, why))
     return found
 
 
-def _set_globally(program: tree.Function, name: str) -> bool:
-    assigned = [
-        node for node in _nodes(program) if isinstance(node, tree.Assign) and node.target.name == name
-    ]
-    return any(node.qualifier == "global" for node in assigned)
-
-
-def _read(thread: Scope, theirs: set[str]) -> Iterator[tree.Name]:
-    """Yield the first place at which a thread reads each of the program's own variables."""
-    left = theirs - thread.assigned - thread.local
-    for node in _nodes(*thread.function.body):
-        if isinstance(node, tree.Name) and node.name in left:
-            left.remove(node.name)
-            yield node
-
-
-def _nodes(*roots: tree.Node) -> Iterator[tree.Node]:
+def _nodes(*roots: object) -> Iterator[tree.Node]:
     """Yield nodes and all below them, in the order of the text."""
-    waiting: list[object] = list(reversed(roots))
+    waiting = list(reversed(roots))
     while waiting:
         one = waiting.pop()
         if isinstance(one, tree.Node):
@@ -75,7 +57,7 @@ def _framed_short(text: str) -> list[ScriptError]:
     for number, line in enumerate(lines, 1):
         if re.match(r"end\b", line):
             try:
-                parse("\n".join(lines[begun:number]) + "\n")
+                parse("\n".join([*lines[begun:number], ""]))
             except ScriptError:
                 why = "a robot of UR's that gets this text takes it to end here, at an end in column 1"
                 return [ScriptError(number, 1, f"{why}: indent what is inside")]

@@ -7,7 +7,8 @@ from typing import Literal
 
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import known_signatures
-from tvist_urscript import METHOD, PURE, ScriptError, check, compile_script, unportable
+from tvist_urscript import METHOD, PURE, ScriptError, check, compile_script
+from tvist_urscript.checker import unportable
 
 _SIMULATED = {name: one for name, one in known_signatures().items() if name not in SUBJECTS}
 _NAMES = {name.lower(): name for name in (*known_signatures(), *PURE)}

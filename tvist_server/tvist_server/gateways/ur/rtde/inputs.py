@@ -63,13 +63,8 @@ def matching(patterns: Iterable[str]) -> list[str]:
     Raises:
         ValueError: A pattern names none.
     """
-    found = []
-    for pattern in patterns:
-        names = [name for name in INPUTS if fnmatchcase(name, pattern)]
-        if not names:
-            raise ValueError(
-                f"reserve_inputs has {pattern!r}: must be the name of an RTDE input, such as speed_slider_mask or "
-                "input_int_register_*"
-            )
-        found += names
-    return found
+    found = {pattern: [name for name in INPUTS if fnmatchcase(name, pattern)] for pattern in patterns}
+    if wrong := [pattern for pattern, names in found.items() if not names]:
+        why = "must be the name of an RTDE input, such as speed_slider_mask or input_int_register_*"
+        raise ValueError(f"reserve_inputs has {wrong[0]!r}: {why}")
+    return [name for names in found.values() for name in names]
