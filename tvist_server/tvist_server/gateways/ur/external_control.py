@@ -1,7 +1,7 @@
 """Programs with a node External Control, which get a part of their text from the client that plays them."""
 
-import logging
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Final
 
@@ -10,8 +10,6 @@ from tvist_protocol.programs import MAX_SCRIPT
 from tvist_server.polyscope import program, with_external_control
 from tvist_server.polyscope_nodes import EXTERNAL_CONTROL
 from tvist_server.program_folder import ProgramFolder
-
-log = logging.getLogger(__name__)
 
 FILE: Final = "external_control.urp"
 """Program that consists of the node alone, which exists without a file."""
@@ -47,12 +45,8 @@ class ExternalControl:
     @staticmethod
     def _text(name: str, folder: ProgramFolder | None) -> str | None:
         text = None
-        try:
+        with suppress(UserFileError):  # loading it says what is wrong
             text = None if folder is None else folder.read(name)
-        except UserFileError:  # loading it says what is wrong
-            pass
-        except Exception:
-            log.exception("the program %r could not be read", name)
         if text is None and name == FILE:
             return ALONE
         return text if text is not None and EXTERNAL_CONTROL in text else None

@@ -314,7 +314,11 @@ class UrInterfaces(Gateway):
         """Read a file in a thread of its own, which nobody waits for, and call back in the interfaces' thread."""
 
         def reading() -> None:
-            text = read()
+            text = None
+            try:
+                text = read()
+            except Exception:
+                log.exception("a program could not be read")
             self._soon(lambda: then(text))
 
         threading.Thread(target=reading, name="tvist-ur-file", daemon=True).start()
