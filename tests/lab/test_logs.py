@@ -509,3 +509,20 @@ def test_a_pause_of_any_length_changes_no_figure_and_takes_no_memory(without, tm
         assert [one.stop_s for one in found] == pytest.approx(
             [expected[0].stop_s, expected[1].stop_s + pause], abs=0.005
         )
+
+
+def test_a_column_of_text_that_is_not_needed_is_left_out_and_one_that_is_needed_is_refused(tmp_path):
+    t = 0.012 * np.arange(60)
+    rows = [f"2024-01-02 03:04:05,{1e3 * s + 5e8:.0f},ä,{57.3 * np.sin(s):.4f},{s}" for s in t]
+    header = "Timestamp,IPOC,state,AIPos.A1,AIPos.A2"
+    (path := tmp_path / "rsi.csv").write_text("\n".join([header, *rows, ""]))
+    for columns in (None, "time=IPOC:ms,q=AIPos.A{}:deg"):
+        found = read(path, columns)
+        assert found.time == pytest.approx(5e5 + t, abs=1e-3)
+        assert any("Timestamp" in note and "state" in note for note in found.notes)
+    with pytest.raises(RecordingError, match=r"line 2, column Timestamp.*is no number; .*IPOC"):
+        read(path, "time=Timestamp,q=AIPos.A{}:deg")
+    with pytest.raises(
+        RecordingError, match=r"no column timestamp.*its columns are Timestamp, IPOC, .*AIPos.A2"
+    ):
+        read(path, "q=AIPos.A{}:deg")
