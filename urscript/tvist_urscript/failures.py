@@ -58,6 +58,15 @@ def line_of(steps: Any) -> int | None:
     return None if found is None else found.f_lineno or 1
 
 
+def name_of(steps: Any) -> str | None:
+    """Return the name of the outermost function in which a generator waits, such as that of a thread."""
+    while (frame := getattr(steps, "gi_frame", None)) is not None:
+        if frame.f_code.co_filename == FILE:
+            return str(frame.f_code.co_name.partition("_")[2])
+        steps = steps.gi_yieldfrom
+    return None
+
+
 def _places(traceback: TracebackType | None) -> list[tuple[int, int]]:
     places = []
     while traceback is not None:

@@ -105,7 +105,7 @@ class ForceFunctions:
 
     enable_external_ft_sensor = ft_rtde_input_enable
 
-    @costs(60)
+    @costs(250)
     def tool_contact(self, direction: object = None) -> int:
         """Return the number of steps since just before the tool touched something in a direction; 0 if it does not."""
         way = (0.0,) * 3 if direction is None else numbers("direction", direction, 6)[:3]

@@ -7,6 +7,7 @@ from tvist_controller.programs.arguments import bounds, number, numbers, pose
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.journey import DELAY, Turns
 from tvist_controller.programs.moves import OWN_TOKEN
+from tvist_plant.plant import PERIOD
 from tvist_plant.robot_checks import lacking_inertia
 from tvist_plant.robot_tables import Tensor
 from tvist_protocol.commands import SetPayload
@@ -64,7 +65,7 @@ class SettingFunctions:
     def set_target_payload(
         self, m: object, cog: object, inertia: object = None, transition_time: object = 0
     ) -> Turns:
-        """Declare a payload with its inertia, Ixx Iyy Izz Ixy Ixz Iyz, in a time."""
+        """Declare a payload with its inertia, Ixx Iyy Izz Ixy Ixz Iyz; clients see it change in a time."""
         seconds = number("transition_time", transition_time, 0.0, 3600.0)
         xx, yy, zz, xy, xz, yz = (0.0,) * 6 if inertia is None else numbers("inertia", inertia, 6, Moment)
         full = self._as_a_body((xx, xy, xz, yy, yz, zz))
@@ -116,7 +117,9 @@ class SettingFunctions:
         ordered = self._access.plans.later(command)
         for _ in range(DELAY):
             yield
+        before, ticks, now = self._access.declared(), round(seconds / PERIOD), self._access.latest().tick + 1
         self._send(command, ordered())
+        self._access.peripherals.payload_change = (before, ticks, now + ticks) if ticks else None
 
     def _send(self, command: SetTcp | SetPayload | ZeroFtsensor, plan: Plan | None = None) -> None:
         try:
