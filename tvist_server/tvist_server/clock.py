@@ -132,7 +132,7 @@ class Clock(ABC):
         if self._thread.is_alive():
             self._thread.join(LONGEST_TICK)
             if self._thread.is_alive():
-                log.error("a call of the arm has not returned for %g s", LONGEST_TICK)
+                log.error("a tick, or a call of the arm, has not returned for %g s", LONGEST_TICK)
 
     @abstractmethod
     def punctuality(self, robot: Mailbox) -> Punctuality | None:
