@@ -52,8 +52,8 @@ lint: setup
 
 # Calls that another system does not have: everything runs on macOS, and what a client needs on Windows, too.
 elsewhere: setup
-	$(BIN)/mypy --platform darwin
-	$(BIN)/mypy --platform win32 $(addprefix --package ,tvist_client tvist_protocol tvist_shaping tvist_urscript)
+	$(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin
+	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 $(addprefix --package ,tvist_client tvist_protocol tvist_shaping tvist_urscript)
 
 bench: setup
 	$(BIN)/python -m proof bench

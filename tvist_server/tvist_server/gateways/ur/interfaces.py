@@ -91,7 +91,7 @@ class UrInterfaces(Gateway):
             Notices(lambda line: log.warning("robot %s: %s", name, line)) for _ in range(3)
         )
         self._requests = ProgramRequests()
-        external = ExternalControl(programs, self._requests.fetch)
+        external = ExternalControl(programs, self._requests.fetch, self._aside)
         self.robot = UrRobot(description, name, self._tell, external, self._scripts.tell, self._refusals.tell)
         self.robot.inputs.take(reserved, self)
         self._instruments, self._boards = Instruments(description), defaultdict[int, Board](Board)
@@ -309,6 +309,19 @@ class UrInterfaces(Gateway):
         if loop is not None:
             with contextlib.suppress(RuntimeError):  # the loop is closed at shutdown
                 loop.call_soon_threadsafe(action)
+
+    def _aside(self, read: Callable[[], str | None], then: Callable[[str | None], None]) -> None:
+        """Read a file in a thread of its own, which nobody waits for, and call back in the interfaces' thread."""
+
+        def reading() -> None:
+            text = None
+            try:
+                text = read()
+            except Exception:
+                log.exception("a program could not be read")
+            self._soon(lambda: then(text))
+
+        threading.Thread(target=reading, name="tvist-ur-file", daemon=True).start()
 
     async def _keep_alive(self) -> None:
         while True:
