@@ -39,13 +39,13 @@ def note(client: str, version: str, outcomes: Mapping[str, str], why: Mapping[st
 def with_results(page: str, results: Mapping[str, Any]) -> str:
     """Return the page with these results in place of those that it has."""
     lines = ["| client | version | on | TVIST | tests or calls | passed |", "|---|---|---|---|---:|---:|"]
-    for client, one in results.items():
+    for client, one in sorted(results.items()):
         count = len(one["passed"])
         cells = client, one["version"], one["date"], f"`{one['tvist']}`", count + len(one["others"]), count
         lines.append(f"| {' | '.join(map(str, cells))} |")
-    for client, one in results.items():
+    for client, one in sorted(results.items()):
         lines += ["", f"{client}, not passed:", ""] if one["others"] else []
-        lines += [f"- `{name}`: {came}" for name, came in one["others"].items()]
+        lines += [f"- `{name}`: {came}" for name, came in sorted(one["others"].items())]
     before, _, rest = page.partition(BEGIN)
     return before + BEGIN + "\n" + "\n".join(lines) + "\n\n" + END + rest.partition(END)[2]
 
