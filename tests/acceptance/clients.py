@@ -17,14 +17,6 @@ from tests.places import own_address
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.timeout(1800)]
 CALLS = Path(__file__).parent / "calls"
-CELL = """[[tools]]
-name = "2F-85"
-mass = 0.92
-cog = [0.0, 0.0, 0.058]
-tcp = [0.0, 0.0, 0.163, 0.0, 0.0, 0.0]
-[gripper]
-model = "2F-85"
-"""
 TORQUE = "needs a controller of version 5.23, and this one reports 5.22"
 KNOWN = {
     "getForwardKinematics": "without a tool the client sends none, so that what is left in the registers counts",
@@ -34,8 +26,8 @@ KNOWN = {
 }  # fmt: skip
 CLIENTS = {
     "ur_rtde": (["ur-rtde==1.6.5"], ["--world", "table"], KNOWN),
-    "urkit": (["urkit==0.6.0"], ["--cell", "cell.toml"], {}),
-    "airo_robots": (["airo-robots==2026.10.1", "ur-rtde==1.6.5"], ["--cell", "cell.toml"], {}),
+    "urkit": (["urkit==0.6.0"], ["--cell", str(CALLS / "cell.toml")], {}),
+    "airo_robots": (["airo-robots==2026.10.1", "ur-rtde==1.6.5"], ["--cell", str(CALLS / "cell.toml")], {}),
     "universal_robots_clients": (["universal-robots-clients==0.4.0", "ur-rtde==1.6.5"], [], {}),
 }
 """What is installed, options of `tvist serve`, and calls that are known not to work, with the reason."""
@@ -48,7 +40,6 @@ def test_the_calls_of_a_client_work_but_those_that_are_known_not_to(name, tmp_pa
     subprocess.run([sys.executable, "-m", "venv", python.parents[1]], check=True)
     subprocess.run([python, "-m", "pip", "install", "--quiet", *packages], check=True)
     monkeypatch.chdir(tmp_path)
-    Path("cell.toml").write_text(CELL)
     address = own_address(7)
     with Served("--ur", "--ur-address", address, *options):
         command = [python, CALLS / "run.py", CALLS / f"{name}.txt", address]

@@ -162,15 +162,7 @@ def server(
 
 
 class Library:
-    """The built library.
-
-    Args:
-        sources: Folder of its sources.
-        build: Folder of its build.
-        logs: Folder for what its programs print.
-        names: The namespaces.
-        limit: Longest time that a test or an example may take [s].
-    """
+    """The built library; a test or an example may take `limit` seconds."""
 
     def __init__(self, sources: Path, build: Path, logs: Path, names: Namespaces, limit: float) -> None:
         self._sources, self._build, self._logs = sources, build, logs
