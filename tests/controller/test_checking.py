@@ -57,7 +57,6 @@ THREAD = ("thread job():", "x = {}", "sync()", "end", "t = run job()")
         ("hold = [1, 2]", "hold[0]", True),
         ("global hold = 0.5", "hold", False),
         ("hold = 1\nglobal hold = 2", "hold", False),
-        ("hold = 1", "0", False),
         ("hold = 1", "1\nhold = 2\nx = hold", False),
     ],
 )
@@ -76,7 +75,6 @@ def test_a_variable_that_a_robot_does_not_find_in_a_thread_is_a_warning(before, 
         ("# a\ndef p():\n  if True:\n    sync()\nend # if\n  sleep(1)\nend\n", [5]),
         ("def f():\n  sync()\nend\ndef p():\ndef g():\nend\nf()\nend\np()\n", [6]),
         ("def p():\n  while True:\n    sync()\n  end\nend_force_mode()\nend\n", []),
-        ("def f():\n  sync()\nend\nif True:\n  f()\nend\n", []),
         ("def p():\r\n  sync()\r\nend\r\n", []),
     ],
 )

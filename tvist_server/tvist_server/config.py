@@ -36,8 +36,7 @@ DEFAULT_NAME = "ur5e"
 SPEED_CAP = 0.5
 """Largest speed of a robot that is moved, unless another is given [rad/s]."""
 TOOL_IN_WORLD = 1.0
-"""Mass of the disc on the flange in a scene if the profile has none: without it the wrist touches, which a sensor in
-the flange does not feel [kg]."""
+"""Mass on the flange in a scene if the profile has none: its sensor does not feel what the wrist touches [kg]."""
 _REAL = ("enable_motion", "speed_cap", "tcp", "servo_lag")
 MOST_LAG, LEAST_GAIN = 0.15, 50.0
 """Largest time and smallest gain of a `servoj` that can be compensated [s, 1/s²]."""

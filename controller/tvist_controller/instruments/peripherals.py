@@ -3,8 +3,6 @@
 from collections.abc import Callable, Sequence
 from typing import ClassVar, Protocol, TypeVar
 
-import msgspec
-
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.command_row import Call, Row
 from tvist_protocol.io import (
@@ -324,9 +322,11 @@ class Peripherals:
         if left == 0.0:
             self.payload_change = None
             return after
-        pairs = [zip(a, b, strict=True) for a, b in zip(_properties(before), _properties(after), strict=True)]
-        (mass,), com, inertia = (tuple(left * a + (1.0 - left) * b for a, b in pair) for pair in pairs)
-        return msgspec.convert({"mass": mass, "com": com, "inertia": inertia}, Payload)
+        old, new = ((one.mass, *one.com, *one.inertia) for one in (before, after))
+        mass, x, y, z, xx, xy, xz, yy, yz, zz = (
+            left * a + (1.0 - left) * b for a, b in zip(old, new, strict=True)
+        )
+        return Payload(mass=mass, com=(x, y, z), inertia=(xx, xy, xz, yy, yz, zz))
 
     def _analog_output(self, number: int) -> float:
         return analog_value(self._analog_ratios[number], voltage=self.output_is_voltage(number))
@@ -337,10 +337,6 @@ class Peripherals:
         Row(SetTcp, lambda self, call: self.set_tcp(call.command.offset), changes_io=True),
         Row(SimulationSetInputs, lambda self, call: self.set_inputs(call.command), changes_io=True),
     )
-
-
-def _properties(payload: Payload) -> tuple[tuple[float, ...], ...]:
-    return (payload.mass,), payload.com, payload.inertia
 
 
 def _with(values: list[Number], first: int, new: list[Number]) -> list[Number]:

@@ -73,11 +73,7 @@ class ToolForces:
         """Return the force that the drives' torques and the measured motion tell, shape (3,) [N].
 
         Unlike `felt`, it does not contain what accelerates links that lag behind their reference, as they do when they
-        ring or a set-point comes late; the rotors are taken to follow it. Nothing counts as zero.
-
-        Args:
-            sample: Signals of the tick, with the arm driven.
-            qd_before: Measured joint velocities a tick ago, shape (n,) [rad/s].
+        ring or a set-point comes late; the rotors are taken to follow it.
         """
         measured = sample.measured
         motion = np.array([measured.q, measured.qd, (measured.qd - qd_before) / PERIOD])

@@ -51,7 +51,7 @@ class Forces(Protocol):
         """Return force and torque at the tool centre point in a tick, base frame, shape (6,) [N, N m]."""
 
     def estimated(self, sample: Sample, qd_before: Floats) -> Floats:
-        """Return the force at the tool that drives' torques and measured accelerations tell, shape (3,) [N]."""
+        """Return the force that the drives' torques and, with the velocities before, the accelerations tell [N]."""
 
     def unexplained(self, sample: Sample, wrench: Floats, *, zeroed: bool) -> Floats:
         """Return the force in a sensor's wrench that is neither weight nor inertia of the payload, shape (3,) [N]."""

@@ -54,9 +54,7 @@ class PortSession(ABC):
     over = False
     """Whether the client has asked to end the connection, which is then closed."""
     client_begins = False
-    """Whether the interface sends nothing to a client that requests nothing, so that it may be disconnected to make
-    room.
-    """
+    """Whether nothing is sent to a client that requests nothing, so that it may be disconnected to make room."""
 
     @property
     def served(self) -> bool:
