@@ -47,7 +47,7 @@ AS_MADE = MADE_ON.read_text(encoding="utf-8").strip() == processor()
 
 
 def test_the_runs_are_those_that_can_be_made_again():
-    assert {path.stem for path in RUNS} <= {run.__name__ for run in make.RUNS}
+    assert {path.stem for path in RUNS} == {run.__name__ for run in make.RUNS}
     assert sum(path.name.startswith("live") for path in RUNS) == 6
 
 

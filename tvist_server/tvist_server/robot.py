@@ -118,8 +118,9 @@ class ServedRobot:
                 setup, students, self._studies.later, lambda lesson, on: planner.for_lesson(lesson, on.basis)
             )
         self._host = Host(
-            self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience
-        )
+            self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience,
+            survives=True,
+        )  # fmt: skip
         if learnt is not None:
             learnt.recall(self._host)
         plant = self.controller.cycle.line.plant  # also where the setup has none

@@ -46,7 +46,7 @@ def translate(
         errors.setdefault((line, column, why), ScriptError(line, column, why))
 
     try:
-        program = _program(text) if after is None else _statements(text)
+        program = program_of(text) if after is None else _statements(text)
     except ScriptError as error:
         return None, [error]
     found = scopes(program) if after is None else scopes(program, after.scope, after.scopes)
@@ -76,7 +76,12 @@ def translate(
     )
 
 
-def _program(text: str) -> tree.Function:
+def program_of(text: str) -> tree.Function:
+    """Return a script's tree: its `def` or `sec`, or its statements as one.
+
+    Raises:
+        ScriptError: The text is no program.
+    """
     statements = _parsed(text)
     head = statements[0]
     if not isinstance(head, tree.Function) or not (

@@ -274,7 +274,8 @@ class Machine:
             raise
         except Exception as error:
             wrong = failure(error)
-            raise ScriptError(wrong.line, wrong.column, f"{wrong.text} (in {title})") from error
+            text = f"{wrong.text} (in {title})"
+            raise ScriptError(wrong.line, wrong.column, text, wrong.internal) from error
         finally:
             self._main.added = False
         self._main.spent = 0  # many short statements are no endless loop

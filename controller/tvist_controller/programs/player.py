@@ -83,6 +83,8 @@ class ProgramPlayer:
         """The one whose turn it is."""
         self._failed = False
         """Whether the program ends by an error or a stop."""
+        self.raised: list[Exception] = []
+        """Exceptions with which functions have failed that blame no argument, until a log has them."""
         self.line = 0
         """Present line, or the one with which playing would resume, counted from 1; 0 if there is none."""
         self.label: ProgramLabel | None = None
@@ -221,6 +223,8 @@ class ProgramPlayer:
 
     def _fail(self, running: _Running, error: ScriptError) -> None:
         self._failed |= running is self._main
+        if error.internal is not None:
+            self.raised.append(error.internal)
         self._emit(
             "warning", why=readable(error.text), line=error.line, column=error.column, program=running.name
         )
