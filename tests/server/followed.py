@@ -5,13 +5,12 @@ from tests.controller.robots import NoArm, Robot
 from tests.controller.scripts import URSIM
 
 from tvist_controller.programs.library import known_signatures
-from tvist_controller.programs.player import GUIDED
 from tvist_protocol.io import Registers, SetRegisters
 from tvist_protocol.programs import ProgramRun
 from tvist_server.moving import registers as r
 from tvist_server.moving.program import MARGIN, program
 from tvist_server.moving.window import Window
-from tvist_urscript import EVALUATIONS, Array, Machine, compile_script
+from tvist_urscript import EVALUATIONS, GUIDED, Array, Machine, compile_script
 
 H, RUN = 0.002, 71
 HERE = np.array(URSIM)

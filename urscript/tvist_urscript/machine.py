@@ -4,32 +4,18 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
 from typing import Any
 
+from tvist_urscript.costs import EVALUATIONS, OVERDRAFT, PATIENCE
 from tvist_urscript.errors import Fault, ScriptError
 from tvist_urscript.failures import TooDeep, failure, line_of, position_of
 from tvist_urscript.functions import DEEPEST_CALLS
 from tvist_urscript.namespace import Namespace
 from tvist_urscript.pieces import HERE, MISSING
 from tvist_urscript.script import Script
-from tvist_urscript.threads import MOST_THREADS, Thread
+from tvist_urscript.threads import MOST_THREADS, Halted, Killed, Thread, halt
 from tvist_urscript.values import Value
-
-EVALUATIONS = 500
-"""Budget of a tick: evaluations of all threads together."""
-PATIENCE = 1_000_000
-"""Evaluations of a thread without waiting for time to pass, or reading what has come, after which it is endless."""
-OVERDRAFT = 2000
-"""Most evaluations by which one statement may exceed the budget."""
 
 _MISSING = object()
 Steps = Generator[Any, None, Any]
-
-
-class Halted(Exception):  # noqa: N818  no error: the script has said `halt`
-    """Raised by `halt` to unwind the thread that runs; the machine then ends all threads."""
-
-
-class Killed(Exception):  # noqa: N818  no error: the script has killed the thread that runs
-    """Raised to unwind the thread that runs, since it has killed itself or a thread that it belongs to."""
 
 
 class Machine:
@@ -132,6 +118,22 @@ class Machine:
                 failed = failed or error
         if failed is not None:
             raise failure(failed) from failed
+
+    def settle(self) -> None:
+        """Let threads whose `join` is over come to their next statement, or their end, without any budget."""
+        self.left = 0
+        while over := [one for one in self._threads if one.joins and one.joins.ended and not one.ended]:
+            self._turn(over[0])
+
+    def late(self, number: int) -> bool:
+        """Return whether a thread has not come to the end of its turn in the last tick."""
+        return any(one.number == number and (one.owes > 0 or one in self._missed) for one in self._threads)
+
+    def place(self, number: int) -> str:
+        """Return name and line of a thread, for people."""
+        thread = next(one for one in self._threads if one.number == number)
+        title = f"thread {thread.name}" if number else "the main thread"
+        return f"{title} in line {line_of(thread.steps) or 1}"
 
     def progress(self) -> None:
         """Note that the thread that runs has got something from outside, so it is not in an endless loop."""
@@ -269,7 +271,8 @@ class Machine:
         if len(self._threads) >= MOST_THREADS:
             raise Fault(f"a program has at most {MOST_THREADS} threads")
         self._started += 1
-        thread = Thread(self._started, self._body(function), self._running, added=self._running.added)
+        name = function.__name__.partition("_")[2]
+        thread = Thread(self._started, self._body(function), self._running, name, added=self._running.added)
         self._threads.append(thread)
         self._turns.append(thread)
         return self._started
@@ -298,8 +301,10 @@ class Machine:
         if thread is None:
             return
         yield from self._finish()
+        waiting, waiting.joins = self._running, thread
         while not thread.ended:
             yield
+        waiting.joins = None
 
     def _enter(self) -> Steps:
         thread = self._running
@@ -330,7 +335,7 @@ class Machine:
             "join": self._join,
             "enter_critical": self._enter,
             "exit_critical": self._exit,
-            "halt": _halt,
+            "halt": halt,
             "label": self._label,
             "too_deep": _too_deep,
         }
@@ -338,10 +343,6 @@ class Machine:
 
 def _nothing() -> Steps:
     yield from ()
-
-
-def _halt() -> None:
-    raise Halted
 
 
 def _too_deep() -> None:

@@ -11,7 +11,7 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import Segment
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity, after
-from tvist_urscript import Fault
+from tvist_urscript import Fault, Machine
 
 BRAKING = 2.0
 """Deceleration of the fastest joint where a move follows a motion that has not ended [rad/s^2]."""
@@ -47,7 +47,7 @@ class ProgramArm:
         self._allowance = Allowance(access.motion, access.latest)
         self._inside: object | None = None
         """Thread whose move has not returned."""
-        self._driver: object | None = None
+        self._driver: tuple[object, int] | None = None
         """Thread that began the guided motion."""
         self._journeys: dict[object, Journey] = {}
         """Moves of each thread that are blended, until the last of them is done."""
@@ -334,6 +334,17 @@ class ProgramArm:
     def moves(self) -> bool:
         """Whether a planned motion of the program is running."""
         return self._journey is not None and self._journey.number is not None
+
+    @property
+    def driver(self) -> tuple[object, int] | None:
+        """The thread whose guided motion is running: its program and its number."""
+        return self._driver
+
+    @property
+    def secondary(self) -> bool:
+        """Whether the program that runs now is a secondary one."""
+        machine = self._thread()[0]
+        return isinstance(machine, Machine) and machine.script.secondary
 
     @property
     def guides(self) -> bool:

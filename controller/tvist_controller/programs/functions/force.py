@@ -9,7 +9,7 @@ from tvist_controller.programs.arguments import flag, integer, number, numbers, 
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.journey import Turns
 from tvist_controller.trajectory import ForceTask
-from tvist_urscript import Array, Fault, costs
+from tvist_urscript import Array, Fault
 
 MOST_LIMIT = 1e3
 """Largest limit of an axis that is passed on: nothing reaches it [m/s, m, rad]."""
@@ -29,7 +29,6 @@ class ForceFunctions:
         self._access, self._arm = access, arm
         self._damping, self._gain = ForceTask.damping, ForceTask.gain
 
-    @costs(120)
     def force_mode(
         self, task_frame: object, selection_vector: object, wrench: object, type: object, limits: object
     ) -> Turns:
@@ -44,7 +43,6 @@ class ForceFunctions:
         )
         yield from self._arm.give_way(lambda: self._access.force.begin(task, feature, kind))
 
-    @costs(100)
     def end_force_mode(self) -> None:
         """Hold the position again; a motion in the other axes ends, too."""
         self._arm.hold_again(by_hand=False)
@@ -57,13 +55,11 @@ class ForceFunctions:
         """Scale how strongly force mode answers a difference of forces, from 0 to 2; above 1 it may get unstable."""
         self._gain = number("scaling", scaling, 0.0, 2.0)
 
-    @costs(120)
     def freedrive_mode(self, freeAxes: object = ALL, feature: object = "base") -> Turns:
         """Let the arm be moved by hand along and about the axes of a frame that are free."""
         axes, frame = _choice("freeAxes", freeAxes), _feature(feature)
         yield from self._arm.give_way(lambda: self._access.force.free(axes, frame))
 
-    @costs(100)
     def end_freedrive_mode(self) -> None:
         """Hold the position again."""
         self._arm.hold_again(by_hand=True)
@@ -72,12 +68,10 @@ class ForceFunctions:
         """Return 0, or 1 where a singular posture hinders the arm from being moved by hand, 2 where it forbids it."""
         return self._access.force.hindrance
 
-    @costs(120)
     def teach_mode(self) -> Turns:
         """Let the arm be moved by hand in all directions."""
         yield from self.freedrive_mode()
 
-    @costs(100)
     def end_teach_mode(self) -> None:
         """Hold the position again."""
         self._arm.hold_again(by_hand=True)
@@ -102,7 +96,6 @@ class ForceFunctions:
 
     enable_external_ft_sensor = ft_rtde_input_enable
 
-    @costs(60)
     def tool_contact(self, direction: object = None) -> int:
         """Return the number of steps since just before the tool touched something in a direction; 0 if it does not."""
         way = (0.0,) * 3 if direction is None else numbers("direction", direction, 6)[:3]

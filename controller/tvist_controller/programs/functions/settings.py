@@ -12,7 +12,7 @@ from tvist_plant.robot_tables import Tensor
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.forces import ZeroFtsensor
 from tvist_protocol.io import SetTcp
-from tvist_urscript import Array, Fault, costs
+from tvist_urscript import Array, Fault
 
 GRAVITY = 9.82
 """Gravity that programs declare, within `TOLERANCE`; the simulated arm stands upright and knows no other [m/s^2]."""
@@ -34,32 +34,27 @@ class SettingFunctions:
     def __init__(self, access: Access, arm: ProgramArm) -> None:
         self._access, self._arm = access, arm
 
-    @costs(5)
     def set_tcp(self, tcp: object, tcp_name: object = "") -> Turns:
         """Set the tool centre point in the flange frame."""
         del tcp_name  # names are for people
         yield from self._arm.finish()
         self._send(SetTcp(token=OWN_TOKEN, offset=pose("tcp", tcp)))
 
-    @costs(20)
     def set_payload(self, m: object, cog: object = None) -> Turns:
         """Declare a payload without inertia; without a centre of mass, it is at the tool centre point."""
         com = self._access.motion.tcp[:3] if cog is None else numbers("cog", cog, 3)
         yield from self._declare(number("m", m, 0.0), com, (0.0,) * 6)
 
-    @costs(20)
     def set_payload_mass(self, m: object) -> Turns:
         """Change the mass of the declared payload."""
         declared = self._access.declared()
         yield from self._declare(number("m", m, 0.0), declared.com, declared.inertia)
 
-    @costs(20)
     def set_payload_cog(self, cog: object) -> Turns:
         """Change the centre of mass of the declared payload."""
         declared = self._access.declared()
         yield from self._declare(declared.mass, numbers("cog", cog, 3), declared.inertia)
 
-    @costs(20)
     def set_target_payload(
         self, m: object, cog: object, inertia: object = None, transition_time: object = 0
     ) -> Turns:
@@ -102,7 +97,6 @@ class SettingFunctions:
         """Return the gravity that the arm has, which is installed upright [m/s^2]."""
         return Array((0.0, 0.0, GRAVITY))
 
-    @costs(80)
     def zero_ftsensor(self) -> None:
         """Take the present force and torque at the tool as zero."""
         self._send(ZeroFtsensor(token=OWN_TOKEN))
