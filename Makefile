@@ -15,7 +15,7 @@ DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 # The folders of what they install.
 SOURCES := cli clients controller lab protocol shaping sim_plant testing tvist_server urscript view
 
-.PHONY: checksums page docs docs-serve rehearse release setup demo notebooks test test-all lint elsewhere bench soak dist format lock schemas clean
+.PHONY: checksums page docs docs-serve rehearse release setup demo notebooks test test-all lint elsewhere bench nightly soak dist format lock schemas clean
 
 setup: $(READY)
 
@@ -52,15 +52,18 @@ lint: setup
 
 # Calls that another system does not have: everything runs on macOS, and what a client needs on Windows, too.
 elsewhere: setup
-	$(BIN)/mypy --platform darwin
-	$(BIN)/mypy --platform win32 $(addprefix --package ,tvist_client tvist_protocol tvist_shaping tvist_urscript)
+	$(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin
+	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 $(addprefix --package ,tvist_client tvist_protocol tvist_shaping tvist_urscript)
 
 bench: setup
 	$(BIN)/python -m proof bench
 
-# The tests that take minutes each, a release rehearsed, and a search for an hour of what `.ci/run` searches for a minute.
-soak: setup elsewhere rehearse
-	$(BIN)/pytest -m nightly
+# The tests that take minutes each or need Podman: under an hour in two processes.
+nightly: setup elsewhere
+	$(BESIDE) -m nightly --durations 20
+
+# Those, a release rehearsed, and a search for an hour of what `.ci/run` searches for a minute.
+soak: nightly rehearse
 	$(BIN)/python -m proof search --stops 2000 --streams 500 --changes 500 --sequences 3000 --flexible --robot ur3e ur5e ur16e ur30 tests/plant/urdf/seven.urdf
 
 format: setup

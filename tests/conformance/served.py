@@ -41,20 +41,21 @@ class Served:
         router: Where it connects to instead.
         around: Words before the command line, such as `ip netns exec`.
         cold: Whether it starts from nothing, as its environment or its start matters.
+        python: The Python of another environment that runs it; it then starts from nothing.
     """
 
     program = ("-m", "tvist_cli", "serve")
     """What Python runs."""
 
-    def __init__(self, *options, name="ur5e", endpoint=None, router=None, around=(), cold=False):
+    def __init__(self, *options, name="ur5e", endpoint=None, router=None, around=(), cold=False, python=None):
         self.name, self.endpoint = name, router or endpoint or free_endpoint()
         self.lines = []
         where = "--listen" if router is None else "--connect"
         named = () if name is None else ("--name", name)
         self._news = threading.Condition()
-        start = subprocess.Popen if around or cold else forked.Popen
+        start = subprocess.Popen if around or cold or python else forked.Popen
         self.process = start(
-            [*around, sys.executable, *self.program, where, self.endpoint, *named, *options],
+            [*around, python or sys.executable, *self.program, where, self.endpoint, *named, *options],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

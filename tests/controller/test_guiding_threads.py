@@ -1,236 +1,208 @@
-"""Threads that guide the arm get a turn in every tick; where one does not, the arm does not go on without it."""
+"""Threads that guide the arm in every tick beside others, with the loops and calls of programs that clients send."""
 
-import numpy as np
+from itertools import pairwise
+
 import pytest
+from tests.controller.scripts import a_robot, finish, said, script, start
 
-from tvist_controller.programs import driver_watch, player
-from tvist_controller.programs.driver_watch import SILENT
-from tvist_urscript import EVALUATIONS, GUIDED
+from tvist_controller.programs import player
+from tvist_protocol.programs import ProgramRun
+from tvist_urscript import EVALUATIONS
 
-from .scripts import a_robot, playing, said, start
-
-TICKS = 600
-HOME = "[-1.6, -1.727, -2.203, -0.808, 1.595, -0.031]"
-SPLINE = """largest = 0
-def largest_of(values):
-  local found = norm(values[0])
-  local k = 1
-  while k < get_list_length(values):
-    local one = norm(values[k])
-    if one > found:
-      found = one
+SPLINE = (
+    """
+def steepest(speeds):
+  local i = 1
+  local most = norm(speeds[0])
+  while i < get_list_length(speeds):
+    if norm(speeds[i]) > most:
+      most = norm(speeds[i])
     end
-    k = k + 1
+    i = i + 1
   end
-  return found
+  return most
 end
-def rates(c1, c2, c3, c4, c5, x):
-  return c1 + 2 * x * c2 + 3 * pow(x, 2) * c3 + 4 * pow(x, 3) * c4 + 5 * pow(x, 4) * c5
-end
-asked = [0, 0, 0, 0, 0, 0]
-thread guide():
+turns = 0
+ready = False
+thread spline():
   local zero = [0, 0, 0, 0, 0, 0]
-  local part = [1.0, 0, 0, 0.2, 0, 0.1]
-  local x = 0.0
-  while x < 1.198:
-    local left = 1.2 - x
-    if left < 0.42:
-      local ahead = rates(zero, zero, part * 2.8935, part * -3.6169, part * 1.2056, x + get_steptime())
-      largest = largest_of(ahead)
+  local cubic = [10 * 0.4, 0, 0, 0, 0, 0]
+  local quartic = [-15 * 0.4, 0, 0, 0, 0, 0]
+  local quintic = [6 * 0.4, 0, 0, 0, 0, 0]
+  local t = 0.0
+  local last = zero
+  while 1.0 - t > 0.5 * get_steptime():
+    t = t + get_steptime()
+    qd = zero + 2.0 * t * zero + 3.0 * pow(t, 2) * cubic + 4.0 * pow(t, 3) * quartic + 5.0 * pow(t, 4) * quintic
+    qdd = 2.0 * zero + 6.0 * t * cubic + 12.0 * pow(t, 2) * quartic + 20.0 * pow(t, 3) * quintic
+    u = t + get_steptime()
+    next = zero + 2.0 * u * zero + 3.0 * pow(u, 2) * cubic + 4.0 * pow(u, 3) * quartic + 5.0 * pow(u, 4) * quintic
+    if steepest(next - qd) > 15.0:
+      stopj(15)
     end
-    x = x + get_steptime()
-    local before = asked
-    asked = rates(zero, zero, part * 2.8935, part * -3.6169, part * 1.2056, x)
-    bend = 2 * zero + 6 * x * part + 12 * pow(x, 2) * part + 20 * pow(x, 3) * part
-    asked = asked * 1.0
-    most = largest_of((asked - before) / get_steptime())
-    write_output_float_register(1, x)
     turns = turns + 1
-    speedj(asked, most + 0.001, get_steptime())
+    speedj(qd, steepest((qd - last) / get_steptime()) + 0.001, get_steptime())
+    last = qd
   end
-  stopj(4)
+  stopj(5)
+  ready = True
 end
-def look():
-  enter_critical
-  local words = [8, 20000, 100000, -200000, 300000, 400000, 500000, 600000, 3]
-  local by = 1000000
-  local q = [words[2] / by, words[3] / by, words[4] / by, words[5] / by, words[6] / by, words[7] / by]
-  local wait = words[1] / 1000.0
-  if words[8] == 2:
-    textmsg(q)
-  elif words[8] == 3 and wait > 30:
-    textmsg(wait)
-  end
-  exit_critical
-end"""
-REGISTERS = f"""goal = {HOME}
-mode = 7
-thread guide():
-  while True:
+handle = run spline()
+ticks = 0
+while not ready:
+  packet = socket_read_binary_integer(9, "reverse", 0.02)
+  scaled = [packet[0] / 1000000, packet[0] / 1000000, packet[0] / 1000000, packet[0] / 1000000, packet[0] / 1000000]
+  ticks = ticks + 1
+  sync()
+end
+""",
+    500,
+)
+REGISTERS = (
+    """
+turns = 0
+target = get_target_joint_positions()
+thread servo():
+  while turns < 300:
+    enter_critical
+    q = target
+    exit_critical
     turns = turns + 1
-    servoj(goal, 0, 0, get_steptime(), 0.1, 300)
+    servoj(q, 0, 0, get_steptime(), 0.1, 300)
   end
 end
-def number(at):
-  return read_input_integer_register(at + 0)
-end
-def real(at):
-  return read_input_float_register(at + 0)
-end
-def look():
-  local order = number(0)
-  local k = 1
-  while k < 14:
-    if order == k:
-      textmsg(k)
+handle = run servo()
+ticks = 0
+while turns < 300:
+  command = read_input_integer_register(20)
+  if command == 0:
+    enter_critical
+    i = 0
+    q = target
+    while i < 6:
+      q[i] = target[i] + read_input_float_register(24 + i)
+      i = i + 1
     end
-    k = k + 1
+    target = q
+    exit_critical
   end
-  local step = [real(0), real(1), real(2), real(3), real(4), real(5)]
-  here = get_target_tcp_pose()
-  goal = get_inverse_kin(pose_trans(here, p[step[0], step[1], step[2], 0, 0, 0]), {HOME})
-  ok = is_within_safety_limits(here)
-  write_output_integer_register(0, 2)
-  write_output_float_register(0, real(0))
-  if is_steady():
-    write_output_integer_register(1, 1)
-  end
-end"""
-GRIPPER = """thread guide():
-  while True:
+  speed = read_input_float_register(30) + read_input_float_register(31) + read_input_float_register(32)
+  pose = get_inverse_kin(get_actual_tcp_pose(), target)
+  force = get_tcp_force()
+  write_output_integer_register(20, ticks)
+  write_output_float_register(24, norm(force))
+  ticks = ticks + 1
+  sync()
+end
+""",
+    300,
+)
+GRIPPER = (
+    """
+turns = 0
+state = [-1, -1, -1, -1, -1, -1, -1, -1, -1]
+def ask(name, socket):
+  answer = socket_get_var(name, socket)
+  return answer
+end
+thread jog():
+  while turns < 300:
     turns = turns + 1
-    speedl([0, 0, 0.01 - 0.00003 * turns, 0, 0, 0], 0.5, get_steptime())
+    speedl([0, 0, 0.01, 0, 0, 0], 0.5, get_steptime())
   end
 end
-widths = [0, 85, 140, 50]
-def is_answer(bytes):
-  if bytes[0] != 3 or bytes[1] != 97 or bytes[2] != 99 or bytes[3] != 107:
-    return False
-  end
-  return True
-end
-def rounded(x):
-  if x % 1 < 0.5:
-    return floor(x)
-  end
-  return ceil(x)
-end
-def scaled(x, low, high):
-  local slope = (high - low) / (widths[1] - widths[0])
-  local value = slope * (x - widths[0]) + low
-  if value > high:
-    value = high
-  elif value < low:
-    value = low
-  end
-  return rounded(value * 100) / 100
-end
-def look():
-  local which = turns % 14
-  local name = ""
-  local k = 0
-  while k < 14:
-    if which == k:
-      name = str_cat("V", k)
+handle = run jog()
+ticks = 0
+while turns < 300:
+  i = 0
+  while i < 9:
+    enter_critical
+    if state[i] < 0:
+      text = str_cat("gripper ", to_str(i))
+      state[i] = str_len(text) * (i % 2) - 1
     end
-    k = k + 1
+    exit_critical
+    i = i + 1
   end
-  enter_critical
-  socket_set_var(name, scaled(turns % 85, 0, 255), "none")
-  socket_send_string(str_cat("GET ", name), "none")
-  if is_answer([3, 97, 99, 107]):
-    place = scaled(rounded(turns / 3), 0, 100)
-  end
-  exit_critical
-end"""
-
-
-def beside(program):
-    """A program whose thread guides the arm while the main thread does in each tick what such programs do."""
-    lines = ["turns = 0", "looks = 0", f"movej({HOME})", *program.splitlines(), "handle = run guide()"]
-    return [*lines, "while True:", "  look()", "  looks = looks + 1", "  write_output_integer_register(20, turns)",
-            "  write_output_integer_register(21, looks)", "  sync()", "end"]  # fmt: skip
-
-
-def warnings(robot):
-    return [event.why for event in robot.events if event.kind == "warning"]
-
-
-@pytest.mark.parametrize("program", [SPLINE, REGISTERS, GRIPPER], ids=["spline", "registers", "gripper"])
-def test_loops_like_those_of_ur_s_clients_turn_once_a_tick_with_a_third_of_the_budget(program, monkeypatch):
-    """The loops of UR's external_control, of ur_rtde's control program and of a gripper's preamble, beside a motion."""
-    monkeypatch.setattr(player, "EVALUATIONS", GUIDED + (EVALUATIONS - GUIDED) // 3)
-    robot = a_robot()
-    start(robot, *beside(program))
-    robot.tick(20)
-    began = robot.controller.io().output_int_register
-    robot.tick(TICKS - 30)
-    turned = np.subtract(robot.controller.io().output_int_register, began)[20:22]
-    assert playing(robot)
-    assert turned.tolist() == [TICKS - 30] * 2
-    assert warnings(robot) == []
-
-
-def test_a_spline_of_velocities_ends_where_it_was_asked_to():
-    robot = a_robot()
-    start(robot, *beside(SPLINE))
-    robot.tick(TICKS + 300)
-    moved = np.subtract(robot.states[-1].reference_q, robot.states[0].reference_q)
-    assert moved[:3] == pytest.approx([0.5, 0, 0], abs=1e-3)
-
-
-BUSY = (
-    "thread guide():",
-    "  speedj([0.3, 0, 0, 0, 0, 0], 2, 0.5)",
-    "  k = 0",
-    "  while k < 30000:",
-    "    k = k + 1",
-    "  end",
-    "  textmsg(k)",
-    "  speedj([0.3, 0, 0, 0, 0, 0], 2, 0.5)",
-    "end",
-    "handle = run guide()",
-    "join handle",
+  object = state[1] * 64 + state[2] * 8 + state[3] * 4 + state[4]
+  socket_send_string("GET POS", "gripper_socket")
+  textmsg("object ", object)
+  ticks = ticks + 1
+  sync()
+end
+""",
+    300,
 )
 
 
-OTHER = ("thread other():", "  while True:", "    x = 1", "  end", "end", "run other()")
-
-
-@pytest.mark.parametrize("beside", [(), OTHER], ids=["alone", "beside another that computes"])
-def test_a_guided_motion_whose_thread_misses_its_ticks_is_told_once_and_the_arm_brakes(beside, monkeypatch):
-    monkeypatch.setattr(player, "EVALUATIONS", GUIDED + 200)
-    monkeypatch.setattr(driver_watch, "EVALUATIONS", GUIDED + 200)
+@pytest.mark.parametrize(
+    ("text", "turns"), [SPLINE, REGISTERS, GRIPPER], ids=["spline", "registers", "gripper"]
+)
+def test_each_thread_has_its_turn_in_every_tick_with_a_third_of_the_evaluations(text, turns, monkeypatch):
+    monkeypatch.setattr(player, "EVALUATIONS", EVALUATIONS // 3)
     robot = a_robot()
-    start(robot, *BUSY[:-1], *beside, "join handle")
-    robot.tick(240)
-    assert warnings(robot) == []
-    robot.tick(SILENT + 100)
-    speeds = np.array([state.target_qd[0] for state in robot.states])
-    (why,) = warnings(robot)
-    assert "thread guide in line " in why
-    assert f"{GUIDED + 200} evaluations" in why
-    assert speeds[240] == pytest.approx(0.3)
-    assert abs(speeds[-1]) < 1e-6
-    assert playing(robot)
+    start(robot, *text.strip().splitlines(), 'textmsg("turns ", turns)', 'textmsg("ticks ", ticks)')
+    finish(robot)
+    *_, done, ticks = said(robot)
+    assert done == f"turns {turns}"
+    assert int(ticks.split()[1]) <= turns + 5  # a stop included
+    assert not [event for event in robot.events if event.kind == "warning" and "had no turn" in event.why]
 
 
-def test_its_next_call_moves_the_arm_again(monkeypatch):
-    monkeypatch.setattr(player, "EVALUATIONS", GUIDED + 1500)
+BUSY = "thread guide():", "  while True:", "    speedj([0.2, 0, 0, 0, 0, 0], 4, 0.002)", "{}", "  end", "end"
+
+
+def guiding(work):
+    """A robot whose program guides the arm by a thread that works for a while after each of its commands."""
     robot = a_robot()
-    start(robot, *BUSY)
-    robot.tick(1200)
-    speeds = np.array([state.target_qd[0] for state in robot.states])
-    rests = np.flatnonzero(np.abs(speeds[250:]) < 1e-6)
-    assert said(robot) == ["30000"]
-    assert speeds[250 + rests[0] :].max() == pytest.approx(0.3)
+    text = script(*BUSY, "handle = run guide()", "while True:", "  sync()", "end").format(work)
+    robot.send(ProgramRun, text=text)
+    return robot
 
 
-@pytest.mark.parametrize("waits", ["sleep(1)", "while read_input_integer_register(0) == 0:\n  sync()\nend"])
-def test_a_motion_goes_on_while_its_thread_waits(waits):
-    """UR's programs rely on it: `speedj` keeps its speed until the next command."""
+def test_a_thread_that_misses_turns_is_named_once():
+    robot = guiding("    i = 0\n    while i < 1100:\n      i = i + 1\n    end")
+    robot.tick(200)
+    (warning,) = [event.why for event in robot.events if event.kind == "warning"]
+    assert warning.startswith("guide, line ")
+    assert f"had no turn within the {EVALUATIONS} evaluations" in warning
+    assert robot.states[-1].target_qd[0] == pytest.approx(0.2)
+
+
+def test_the_arm_comes_to_rest_while_the_thread_that_guides_it_computes_and_goes_on_afterwards():
+    robot = guiding("    i = 0\n    while i < 200000:\n      i = i + 1\n    end")
+    speeds = []
+    for _ in range(1000):
+        robot.tick()
+        speeds.append(robot.states[-1].target_qd[0])
+    first = next(k for k, speed in enumerate(speeds) if speed > 0.0)
+    assert max(speeds) < 0.1  # it slowed down before it reached 0.2
+    assert sum(speed == 0.0 for speed in speeds[first:]) > 500
+    assert sum(a == 0.0 < b for a, b in pairwise(speeds)) >= 2
+    assert [event for event in robot.events if event.kind == "warning" and "slows down" in event.why]
+
+
+LAST = {
+    "the last statement": ["protective_stop()"],
+    "before halt": ["protective_stop()", "halt"],
+    "in a branch": ["if True:", "  protective_stop()", "else:", "  sync()", "end"],
+    "in a function": ["def f():", "  protective_stop()", "end", "f()"],
+    "during a motion": ["speedj([0.1, 0, 0, 0, 0, 0], 1, 0.1)", "protective_stop()"],
+}
+
+
+@pytest.mark.parametrize("lines", LAST.values(), ids=LAST)
+def test_a_program_ends_with_a_protective_stop_that_nothing_follows(lines):
     robot = a_robot()
-    start(robot, "speedj([0.3, 0, 0, 0, 0, 0], 2, 0.2)", *waits.splitlines())
-    robot.tick(400)
-    assert robot.states[-1].target_qd[0] == pytest.approx(0.3)
-    assert warnings(robot) == []
+    start(robot, *lines)
+    finish(robot)
+    assert robot.controller.programs.state == "STOPPED"
+    assert {"protective_stop", "program_stopped"} <= set(robot.kinds())
+
+
+@pytest.mark.parametrize("follows", ["x = 1", 'popup("a", blocking=True)', "sync()"])
+def test_it_is_paused_where_something_follows(follows):
+    robot = a_robot()
+    start(robot, "protective_stop()", follows)
+    finish(robot)
+    assert robot.controller.programs.state == "PAUSED"

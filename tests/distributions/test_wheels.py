@@ -5,11 +5,13 @@ import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tomllib
 import zipfile
 from pathlib import Path
 
 import pytest
+from pathspec import PathSpec
 from tests.conformance.served import PATIENCE, Served
 from tools.release import environments
 from tools.release.environments import clean
@@ -47,9 +49,24 @@ def run(*words, cwd=ROOT / "docs"):
 @pytest.fixture(scope="module")
 def wheels(tmp_path_factory):
     """The folder that `make dist` would fill."""
-    made = tmp_path_factory.mktemp("dist")
+    return build(ROOT, tmp_path_factory.mktemp("dist"))
+
+
+@pytest.fixture(scope="module")
+def image_wheels(tmp_path_factory):
+    """The folder of the wheels that an image installs, built from the files that its build context has."""
+    context = tmp_path_factory.mktemp("context")
+    ignored = PathSpec.from_lines("gitignore", (ROOT / ".dockerignore").read_text().splitlines())
+    for name in ignored.match_files(run("git", "ls-files", cwd=ROOT).splitlines(), negate=True):
+        (context / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, context / name)
+    return build(context, tmp_path_factory.mktemp("image"))
+
+
+def build(root, made):
+    """Build the wheel of each distribution below a folder."""
     for folder in FOLDERS.values():
-        run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", made, cwd=ROOT / folder)
+        run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", made, cwd=root / folder)
     return made
 
 
@@ -95,6 +112,13 @@ class TestContents:
             assert [name for name in names if name.endswith("licenses/NOTICE")]
             assert [name for name in names if name.endswith("py.typed")]
 
+    def test_an_image_is_built_from_the_same_files(self, wheels, image_wheels):
+        def files(folder):
+            every = [zipfile.ZipFile(wheel).infolist() for wheel in folder.glob("*.whl")]
+            return {info.filename: info.CRC for infos in every for info in infos}
+
+        assert files(image_wheels) == files(wheels)
+
     @pytest.mark.parametrize("name", FOLDERS)
     def test_each_has_its_name_the_common_version_and_licence(self, name):
         own, common = project(FOLDERS[name]), project(".")
@@ -137,6 +161,24 @@ class TestFresh:
             assert "ok" in run(client, "-m", "tvist_client", "check", served.endpoint)
             program = blocking.replace("tcp/127.0.0.1:7447", served.endpoint)
             assert re.fullmatch(r"\d+ \d+\n", run(client, "-c", program))
+
+    def test_a_robot_of_an_image_answers(self, image_wheels, tmp_path):
+        venv = tmp_path / "venv"
+        run(sys.executable, "-m", "venv", "--without-pip", venv)
+        python, site = venv / "bin" / "python", Path(sysconfig.get_path("purelib"))
+        wheels = image_wheels.glob("*.whl")
+        run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index", *wheels)
+        own = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip())
+        # The libraries are those of this environment, whose path files, and so the checkout, are not followed.
+        (own / "libraries.pth").write_text(
+            f"{site}\n{site / 'cmeel.prefix' / site.relative_to(sys.prefix)}\n"
+        )
+        for kernel in ROOT.glob("*/tvist_*/**/__pycache__/*.kernel"):  # compiled from equal sources
+            there = own.joinpath(*kernel.relative_to(ROOT).parts[1:])
+            there.parent.mkdir(exist_ok=True)
+            shutil.copy(kernel, there)
+        with Served("--clock", "lockstep", python=python) as served:
+            assert "ok" in run(python, "-m", "tvist_client", "check", served.endpoint)
 
     def test_the_program_says_what_to_install(self, client):
         ended = subprocess.run(

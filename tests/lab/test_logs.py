@@ -495,3 +495,34 @@ def test_numbers_that_overflow_are_refused_by_their_line_alone(tmp_path):
     file.write_text("\n".join([",".join(["timestamp", "actual_q_0", "actual_q_1", *names]), *rows]) + "\n")
     with pytest.raises(RecordingError, match=r"line 2, .*no number of a robot"):
         read(file)
+
+
+@pytest.mark.parametrize("without", [(), ("target_q",)])
+def test_a_pause_of_any_length_changes_no_figure_and_takes_no_memory(without, tmp_path):
+    log = SyntheticLog().without(*without)
+    expected = analyze(read(log.csv(tmp_path / "log.csv")))
+    middle = len(log.columns["timestamp"]) // 2
+    for pause in (86_400.0, 7e8):
+        log.columns["timestamp"][middle:] = 100.0 + 0.002 * np.arange(middle, 2 * middle) + pause
+        found = analyze(read(log.csv(tmp_path / "log.csv")))
+        assert [one.f_d_hz for one in found] == pytest.approx([one.f_d_hz for one in expected], rel=0.01)
+        assert [one.stop_s for one in found] == pytest.approx(
+            [expected[0].stop_s, expected[1].stop_s + pause], abs=0.005
+        )
+
+
+def test_a_column_of_text_that_is_not_needed_is_left_out_and_one_that_is_needed_is_refused(tmp_path):
+    t = 0.012 * np.arange(60)
+    rows = [f"2024-01-02 03:04:05,{1e3 * s + 5e8:.0f},ä,{57.3 * np.sin(s):.4f},{s}" for s in t]
+    header = "Timestamp,IPOC,state,AIPos.A1,AIPos.A2"
+    (path := tmp_path / "rsi.csv").write_text("\n".join([header, *rows, ""]))
+    for columns in (None, "time=IPOC:ms,q=AIPos.A{}:deg"):
+        found = read(path, columns)
+        assert found.time == pytest.approx(5e5 + t, abs=1e-3)
+        assert any("Timestamp" in note and "state" in note for note in found.notes)
+    with pytest.raises(RecordingError, match=r"line 2, column Timestamp.*is no number; .*IPOC"):
+        read(path, "time=Timestamp,q=AIPos.A{}:deg")
+    with pytest.raises(
+        RecordingError, match=r"no column timestamp.*its columns are Timestamp, IPOC, .*AIPos.A2"
+    ):
+        read(path, "q=AIPos.A{}:deg")

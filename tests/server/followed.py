@@ -5,12 +5,13 @@ from tests.controller.robots import NoArm, Robot
 from tests.controller.scripts import URSIM
 
 from tvist_controller.programs.library import known_signatures
+from tvist_controller.programs.player import GUIDED
 from tvist_protocol.io import Registers, SetRegisters
 from tvist_protocol.programs import ProgramRun
 from tvist_server.moving import registers as r
 from tvist_server.moving.program import MARGIN, program
 from tvist_server.moving.window import Window
-from tvist_urscript import EVALUATIONS, GUIDED, Array, Machine, compile_script
+from tvist_urscript import EVALUATIONS, Array, Machine, compile_script
 
 H, RUN = 0.002, 71
 HERE = np.array(URSIM)
@@ -173,9 +174,10 @@ class Alone(Followed):
         return self._ints[r.NUMBER]
 
 
-def packages(path, count, order=RUN):
-    """The input packages of set-points: rows of a path, from the first on."""
+def packages(path, count, order=RUN, before=0):
+    """The input packages of set-points: rows of a path, from the first on, with the numbers after `before`."""
     window, made = Window(), []
+    window.number = before
     for row in path[:count]:
         window.add(tuple(row))
         made.append(window.values(order))

@@ -3,9 +3,9 @@
 import pytest
 
 from tvist_urscript import Machine, ScriptError, compile_script
-from tvist_urscript.costs import OVERDRAFT
 from tvist_urscript.dry_functions import Memory
 from tvist_urscript.expressions import MOST_OPERATIONS
+from tvist_urscript.machine import OVERDRAFT
 
 from .programs import spoilt, valid
 

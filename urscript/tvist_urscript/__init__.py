@@ -3,10 +3,10 @@
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tvist_urscript.costs import EVALUATIONS, GUIDED
+from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault, ScriptError
 from tvist_urscript.library import PURE
-from tvist_urscript.machine import Machine
+from tvist_urscript.machine import EVALUATIONS, Machine
 from tvist_urscript.names import METHOD
 from tvist_urscript.script import Script
 from tvist_urscript.signatures import (
@@ -23,7 +23,6 @@ from tvist_urscript.values import LONGEST, Array, Pose, Struct, Value, to_str
 
 __all__ = [
     "EVALUATIONS",
-    "GUIDED",
     "LONGEST",
     "METHOD",
     "PURE",
@@ -41,6 +40,7 @@ __all__ = [
     "Value",
     "check",
     "compile_script",
+    "costs",
     "names",
     "parameters",
     "signature",

@@ -7,7 +7,6 @@ from functools import reduce
 from itertools import repeat
 from typing import Any, TypeAlias
 
-from tvist_urscript.costs import LIST
 from tvist_urscript.errors import Fault
 from tvist_urscript.values import (
     HIGHEST,
@@ -93,7 +92,7 @@ def _beside(of: Callable[[Any, Any], Value], a: Value, b: Value, done: str, work
 def _elementwise(of: Callable[[Any, Any], Value], a: Array, b: Array, done: str, work: Work) -> Array:
     if len(a.items) != len(b.items):
         raise Fault(f"lists of {len(a.items)} and {len(b.items)} elements cannot be {done}")
-    work(LIST + len(a.items))
+    work(len(a.items))
     if of in _PLAIN and of is not _quotient and only_numbers(a) and only_numbers(b):
         return _whole(map(_PLAIN[of], a.items, b.items))
     return Array(
@@ -169,7 +168,7 @@ def _scaled(
     a: Array, by: Number, of: Callable[[Any, Any], Value], work: Work, *, turned: bool = False
 ) -> Array:
     """Compute `of(x, by)` of each element x of a list and of the lists inside it; `of(by, x)` if it is turned."""
-    work(LIST + len(a.items))
+    work(len(a.items))
     if of in _PLAIN and only_numbers(a) and not (of is _quotient and (turned or by == 0)):
         plain, numbers = _PLAIN[of], a.items
         return _whole(map(plain, repeat(by), numbers) if turned else map(plain, numbers, repeat(by)))
@@ -196,7 +195,7 @@ def _list_product(a: Array, b: Array, work: Work) -> Value:
         )
     if (products := len(left) * inner * len(right[0])) > MOST_PRODUCTS:
         raise Fault(f"these matrices need {products} multiplications: the limit is {MOST_PRODUCTS}")
-    work(LIST + 2 * products)
+    work(2 * products // 3)
     result = [[_dot(row, column) for column in zip(*right, strict=True)] for row in left]
     if rows is None:
         return Array(result[0])

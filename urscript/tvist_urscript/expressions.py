@@ -4,7 +4,6 @@ import ast
 from collections.abc import Callable, Sequence
 
 from tvist_urscript import tree
-from tvist_urscript.costs import ARITHMETIC, POSED, START
 from tvist_urscript.errors import name_not_found
 from tvist_urscript.members import Members
 from tvist_urscript.names import BUILT_IN_ARRAYS, Scope
@@ -12,10 +11,12 @@ from tvist_urscript.pieces import DEPTH, MISSING, Position
 from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
 from tvist_urscript.values import LONGEST, NUMBERS, Array, Pose
 
-MOST_OPERATIONS = 2500
-"""Most evaluations of one statement, within which nothing can interrupt it: two of the dearest calls fit."""
+MOST_OPERATIONS = 1000
+"""Most evaluations of one statement, within which nothing can interrupt it."""
+START = 20
+"""Evaluations that the start of a thread costs, which limits the threads that start in a tick."""
 
-OPERATORS = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
+ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
 ORDER: dict[str, type[ast.cmpop]] = {"<": ast.Lt, ">": ast.Gt, "<=": ast.LtE, ">=": ast.GtE}
 EQUALITY: dict[str, tuple[type[ast.cmpop], str]] = {
     "==": (ast.Eq, "is_equal"),
@@ -31,8 +32,7 @@ class Expressions(Members):
     Attributes:
         scope: The names that the present function can use.
         cost: Evaluations of what has been translated since it was set to 0.
-        works: Whether the code translated since it was reset may spend the budget: it works on lists, which takes more
-            than `cost`, or calls what may take time or end in a protective stop.
+        works: Whether the code translated since it was reset may work on lists, which takes more than `cost`.
         used: Built-in functions that the script calls.
         constants: Lists and default values, by the names that compiled functions have for them.
     """
@@ -111,10 +111,9 @@ class Expressions(Members):
         at = Position.of(node)
         self.cost += 1
         left, right = self.value(node.left), self.value(node.right)
-        if node.operator in OPERATORS:
-            self.cost += ARITHMETIC - 1
+        if node.operator in ARITHMETIC:
             self.works = True
-            return at.call(OPERATORS[node.operator], left, right)
+            return at.call(ARITHMETIC[node.operator], left, right)
         if node.operator in ORDER:
             return at.compare(left, ORDER[node.operator](), right)
         operator, function = EQUALITY[node.operator]
@@ -169,14 +168,14 @@ class Expressions(Members):
             return at.constant(None)
         if array := self.built_in_array(value):
             return self.call_built_in(Position.of(value), BUILT_IN_ARRAYS[array][0], indices)
-        self.cost += 1 if len(indices) == 1 else ARITHMETIC
+        self.cost += 1
         function = "element" if len(indices) == 1 else "element_of_matrix"
         return at.call(function, self.value(value), *(self.value(index) for index in indices))
 
     def pose(self, node: tree.Index) -> ast.expr:
         """Translate a pose of six expressions."""
         at = Position.of(node.value)
-        self.cost += POSED
+        self.cost += 1
         values = [item.value for item in node.indices if isinstance(item, tree.Constant)]
         if len(values) == 6 and all(type(value) in NUMBERS for value in values):
             return at.name(self.keep(Pose(values)))
@@ -221,7 +220,6 @@ class Expressions(Members):
                 (parameter.name, MISSING if default is not None else None)
                 for parameter, default in scope.function.parameters
             ]
-            self.works = True  # a protective stop inside it holds the statement after it
             deeper = ast.BinOp(at.name(DEPTH), ast.Add(), at.constant(1), **at.given)
             return at.waiting(at.call(scope.code_name, deeper, *self.arguments(node, parameters)))
         signature = self.signatures.get(node.name)
@@ -232,7 +230,7 @@ class Expressions(Members):
             return at.constant(None)
         self.used.add(node.name)
         self.cost += signature.cost - 1
-        self.works = self.works or signature.linear or signature.blocks
+        self.works = self.works or signature.linear
         known = [
             (parameter.name, None if parameter.default is REQUIRED else self.default(node.name, parameter))
             for parameter in signature.parameters

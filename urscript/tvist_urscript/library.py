@@ -54,7 +54,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "wrench_trans": poses.wrench_trans,
 }
 
-LINEAR = {
+WEIGHTS = {
     "binary_list_to_integer": 1,
     "inv": 9,
     "make_list": 0,
@@ -71,9 +71,6 @@ ANEW: Mapping[str, Callable[[], Callable[..., Any]]] = MappingProxyType({"random
 """Functions that remember something: what makes one for each program."""
 
 PURE: Mapping[str, tuple[Signature, Callable[..., Any]]] = MappingProxyType(
-    {
-        name: (signature(function, name=name, linear=name in LINEAR), function)
-        for name, function in _FUNCTIONS.items()
-    }
+    {name: (signature(function, linear=name in WEIGHTS), function) for name, function in _FUNCTIONS.items()}
 )
 """Each with its signature. The machine adds them to the functions of the controller."""

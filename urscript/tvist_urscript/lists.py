@@ -3,6 +3,7 @@
 import math
 
 from tvist_urscript.arithmetic import MOST_PRODUCTS, matrix
+from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault
 from tvist_urscript.poses import pose_inv
 from tvist_urscript.values import (
@@ -56,6 +57,7 @@ def normalize(v: Value) -> Array:
     return Array(x / whole for x in numbers)
 
 
+@costs(20)
 def integer_to_binary_list(x: Value) -> Array:
     """Return the 32 bits of an integer, the lowest first."""
     bits = integer(x, "the argument of integer_to_binary_list")
@@ -88,6 +90,7 @@ def transpose(m: Value) -> Array:
     return Array(Array(column) for column in zip(*rows, strict=True))
 
 
+@costs(80)
 def inv(m: Value) -> Array:
     """Return the inverse of a pose or of a square matrix, by Gauss and Jordan with pivots."""
     if type(m) is Pose:

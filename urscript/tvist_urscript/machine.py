@@ -1,21 +1,36 @@
 """Runs a compiled script, a tick at a time."""
 
+import sys
 from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
 from typing import Any
 
-from tvist_urscript.costs import EVALUATIONS, OVERDRAFT, PATIENCE
 from tvist_urscript.errors import Fault, ScriptError
-from tvist_urscript.failures import TooDeep, failure, line_of, position_of
+from tvist_urscript.failures import FILE, TooDeep, failure, line_of, name_of, position_of
 from tvist_urscript.functions import DEEPEST_CALLS
 from tvist_urscript.namespace import Namespace
 from tvist_urscript.pieces import HERE, MISSING
 from tvist_urscript.script import Script
-from tvist_urscript.threads import MOST_THREADS, Halted, Killed, Thread, halt
+from tvist_urscript.threads import MOST_THREADS, Thread
 from tvist_urscript.values import Value
+
+EVALUATIONS = 2000
+"""Budget of a tick: evaluations of all threads together."""
+PATIENCE = 1_000_000
+"""Evaluations of a thread without waiting for time to pass, or reading what has come, after which it is endless."""
+OVERDRAFT = 2000
+"""Most evaluations by which one statement may exceed the budget."""
 
 _MISSING = object()
 Steps = Generator[Any, None, Any]
+
+
+class Halted(Exception):  # noqa: N818  no error: the script has said `halt`
+    """Raised by `halt` to unwind the thread that runs; the machine then ends all threads."""
+
+
+class Killed(Exception):  # noqa: N818  no error: the script has killed the thread that runs
+    """Raised to unwind the thread that runs, since it has killed itself or a thread that it belongs to."""
 
 
 class Machine:
@@ -49,6 +64,7 @@ class Machine:
         self.thread = 0
         self.halted = False
         self.label: tuple[int, str] | None = None
+        self._held = False
         self._finish = finish or _nothing
         self._started = 0
         self._holder: Thread | None = None
@@ -71,10 +87,31 @@ class Machine:
         return [thread.number for thread in self._threads if not thread.ended]
 
     @property
+    def at_end(self) -> bool:
+        """Whether the main thread runs, and nothing follows the built-in function that it is in."""
+        frame = sys._getframe() if self._running is self._main and not self._main.added else None  # noqa: SLF001
+        ends = frame is not None
+        while ends and frame is not None:
+            ends = frame.f_code.co_filename != FILE or frame.f_lineno in self.script.last_lines
+            frame = frame.f_back
+        return ends
+
+    @property
     def line(self) -> int:
         """The present line of the main thread."""
         self._line = line_of(self._main.steps) or self._line
         return self._line
+
+    def missed(self, number: int) -> bool:
+        """Return whether a thread could not go on in the last tick, since the budget was spent."""
+        thread = self._find(number) if number else self._main
+        return thread is not None and (thread.owes > 0 or thread in self._missed)
+
+    def place(self, number: int) -> tuple[str, int]:
+        """Return the name and the present line of a thread that has begun."""
+        thread = self._find(number) if number else self._main
+        steps = None if thread is None else thread.steps
+        return name_of(steps) or self.script.name, line_of(steps) or 1
 
     def resume(self, budget: int = EVALUATIONS) -> int:
         """Run all threads for one tick.
@@ -90,18 +127,22 @@ class Machine:
         Raises:
             ScriptError: A thread has failed, in the script or in a built-in function. All threads have ended.
         """
-        self.left = budget
+        self.left, self._held = budget, False
         missed, self._missed = self._missed, []
         self._turns = missed + [thread for thread in self._threads if thread not in missed]
         for thread in self._turns:  # it grows where a thread starts another
             if thread.ended:
                 continue
-            short = self.left <= 0 or self.left < min(thread.owes, budget)
+            short = self._held or self.left <= 0 or self.left < min(thread.owes, budget)
             if short or not self._may_enter(thread):
                 self._missed.append(thread)
             else:
                 self._turn(thread)
         return self.left
+
+    def hold(self) -> None:
+        """Give no further thread a turn in this tick; the one that runs goes on to its next statement that waits."""
+        self._held = True
 
     def end(self) -> None:
         """End all threads: GeneratorExit reaches the blocking functions in which they wait.
@@ -118,22 +159,6 @@ class Machine:
                 failed = failed or error
         if failed is not None:
             raise failure(failed) from failed
-
-    def settle(self) -> None:
-        """Let threads whose `join` is over come to their next statement, or their end, without any budget."""
-        self.left = 0
-        while over := [one for one in self._threads if one.joins and one.joins.ended and not one.ended]:
-            self._turn(over[0])
-
-    def late(self, number: int) -> bool:
-        """Return whether a thread has not come to the end of its turn in the last tick."""
-        return any(one.number == number and (one.owes > 0 or one in self._missed) for one in self._threads)
-
-    def place(self, number: int) -> str:
-        """Return name and line of a thread, for people."""
-        thread = next(one for one in self._threads if one.number == number)
-        title = f"thread {thread.name}" if number else "the main thread"
-        return f"{title} in line {line_of(thread.steps) or 1}"
 
     def progress(self) -> None:
         """Note that the thread that runs has got something from outside, so it is not in an endless loop."""
@@ -249,7 +274,8 @@ class Machine:
             raise
         except Exception as error:
             wrong = failure(error)
-            raise ScriptError(wrong.line, wrong.column, f"{wrong.text} (in {title})") from error
+            text = f"{wrong.text} (in {title})"
+            raise ScriptError(wrong.line, wrong.column, text, wrong.internal) from error
         finally:
             self._main.added = False
         self._main.spent = 0  # many short statements are no endless loop
@@ -271,8 +297,7 @@ class Machine:
         if len(self._threads) >= MOST_THREADS:
             raise Fault(f"a program has at most {MOST_THREADS} threads")
         self._started += 1
-        name = function.__name__.partition("_")[2]
-        thread = Thread(self._started, self._body(function), self._running, name, added=self._running.added)
+        thread = Thread(self._started, self._body(function), self._running, added=self._running.added)
         self._threads.append(thread)
         self._turns.append(thread)
         return self._started
@@ -301,10 +326,8 @@ class Machine:
         if thread is None:
             return
         yield from self._finish()
-        waiting, waiting.joins = self._running, thread
         while not thread.ended:
             yield
-        waiting.joins = None
 
     def _enter(self) -> Steps:
         thread = self._running
@@ -335,7 +358,7 @@ class Machine:
             "join": self._join,
             "enter_critical": self._enter,
             "exit_critical": self._exit,
-            "halt": halt,
+            "halt": _halt,
             "label": self._label,
             "too_deep": _too_deep,
         }
@@ -343,6 +366,10 @@ class Machine:
 
 def _nothing() -> Steps:
     yield from ()
+
+
+def _halt() -> None:
+    raise Halted
 
 
 def _too_deep() -> None:

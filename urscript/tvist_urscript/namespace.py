@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Mapping
 from types import FunctionType
 from typing import Any
 
-from tvist_urscript.library import ANEW, LINEAR, PURE
+from tvist_urscript.library import ANEW, PURE, WEIGHTS
 from tvist_urscript.operators import operators
 from tvist_urscript.script import Script
 from tvist_urscript.values import Array
@@ -79,7 +79,7 @@ class Namespace:
         if not signature.linear:
             return function
 
-        weight = LINEAR[name]
+        weight = WEIGHTS[name]
 
         def charged(*arguments: Any) -> Any:
             self._charge(weight * sum(argument.size for argument in arguments if isinstance(argument, Array)))

@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault
 from tvist_urscript.rotations import (
     Quaternion,
@@ -34,6 +35,7 @@ def _pose(position: Vector, turn: Quaternion) -> Pose:
     return Pose((*position, *rotation_vector(turn)))
 
 
+@costs(30)
 def pose_trans(p_from: Value, p_from_to: Value) -> Pose:
     """Return p_from_to, which is given in the frame p_from, in the frame of p_from itself."""
     (x, y, z), turn = _parts(p_from, "p_from")
@@ -42,6 +44,7 @@ def pose_trans(p_from: Value, p_from_to: Value) -> Pose:
     return _pose((x + dx, y + dy, z + dz), product(turn, inner))
 
 
+@costs(25)
 def pose_inv(p_from: Value) -> Pose:
     """Return the pose of the base in the frame p_from."""
     (x, y, z), turn = _parts(p_from, "p_from")
@@ -49,6 +52,7 @@ def pose_inv(p_from: Value) -> Pose:
     return _pose(turned(back, (-x, -y, -z)), back)
 
 
+@costs(30)
 def pose_add(p_1: Value, p_2: Value) -> Pose:
     """Return the sum of the positions and the rotation p_2 followed by p_1: R = R_1 R_2."""
     a, turn = _parts(p_1, "p_1")
@@ -56,6 +60,7 @@ def pose_add(p_1: Value, p_2: Value) -> Pose:
     return _pose((a[0] + b[0], a[1] + b[1], a[2] + b[2]), product(turn, second))
 
 
+@costs(30)
 def pose_sub(p_to: Value, p_from: Value) -> Pose:
     """Return the difference of the positions and the rotation from p_from to p_to: R = R_to R_fromᵀ."""
     a, turn = _parts(p_to, "p_to")
@@ -63,11 +68,13 @@ def pose_sub(p_to: Value, p_from: Value) -> Pose:
     return _pose((a[0] - b[0], a[1] - b[1], a[2] - b[2]), product(turn, inverse(second)))
 
 
+@costs(5)
 def pose_dist(p_from: Value, p_to: Value) -> float:
     """Return the distance of two positions [m]."""
     return math.dist(pose(p_from, "p_from").numbers[:3], pose(p_to, "p_to").numbers[:3])
 
 
+@costs(5)
 def point_dist(p_from: Value, p_to: Value) -> float:
     """Return the distance of two points [m]: poses, or lists whose first three elements are the position."""
     a, b = vector(p_from, "p_from"), vector(p_to, "p_to")
@@ -76,6 +83,7 @@ def point_dist(p_from: Value, p_to: Value) -> float:
     return math.dist(a[:3], b[:3])
 
 
+@costs(40)
 def interpolate_pose(p_from: Value, p_to: Value, alpha: Value) -> Pose:
     """Return the pose on the line and the shortest rotation between two, at the share alpha."""
     a, turn = _parts(p_from, "p_from")
@@ -87,6 +95,7 @@ def interpolate_pose(p_from: Value, p_to: Value, alpha: Value) -> Pose:
     return _pose((x, y, z), product(step, turn))
 
 
+@costs(30)
 def wrench_trans(T_from_to: Value, w_from: Value) -> Array:
     """Return a wrench at the origin of the frame "from", seen from and at the frame "to".
 
@@ -103,11 +112,13 @@ def wrench_trans(T_from_to: Value, w_from: Value) -> Array:
     return Array((*turned(back, force), *moment))
 
 
+@costs(20)
 def rpy2rotvec(rpy_vector: Value) -> Array:
     """Return the rotation vector of roll, pitch and yaw [rad] about fixed axes."""
     return Array(rotation_vector(from_rpy(*_three(rpy_vector, "rpy_vector"))))
 
 
+@costs(20)
 def rotvec2rpy(rotation_vector: Value) -> Array:
     """Return roll, pitch and yaw [rad] about fixed axes."""
     return Array(to_rpy(_turn(_three(rotation_vector, "rotation_vector"), "rotation_vector")))

@@ -54,14 +54,14 @@ class Signature:
 Signatures = Mapping[str, Signature]
 
 
-def signature(function: Callable[..., Any], *, name: str = "", linear: bool = False) -> Signature:
+def signature(function: Callable[..., Any], *, linear: bool = False) -> Signature:
     """Return how scripts call a function of Python: with its parameters by their names, and its defaults.
 
-    It blocks if it returns a generator, by its annotation or, without one, because it is a generator function.
+    It blocks if it returns a generator, by its annotation or, without one, because it is a generator function. Its cost
+    is that of `costs`.
 
     Args:
         function: A function, or a method of an object. Scripts always give all arguments, in order.
-        name: What scripts call it, which tells its cost; the function's own name by default.
         linear: See `Signature`.
     """
     found = inspect.signature(function)
@@ -76,7 +76,7 @@ def signature(function: Callable[..., Any], *, name: str = "", linear: bool = Fa
             for name, one in found.parameters.items()
         ),
         blocks,
-        cost_of(name or getattr(function, "__name__", "")),
+        cost_of(function),
         linear,
     )
 

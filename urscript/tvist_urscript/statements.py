@@ -4,9 +4,8 @@ import ast
 from itertools import count
 
 from tvist_urscript import tree
-from tvist_urscript.costs import REPLACED, START
 from tvist_urscript.errors import syntax_error
-from tvist_urscript.expressions import MOST_OPERATIONS, Expressions, Report, first
+from tvist_urscript.expressions import MOST_OPERATIONS, START, Expressions, Report, first
 from tvist_urscript.names import BUILT_IN_ARRAYS
 from tvist_urscript.pieces import Position
 from tvist_urscript.signatures import Signatures
@@ -91,7 +90,7 @@ class Statements(Expressions):
                     if works:
                         flush(at)
                         since += PIECE
-        if cost or piece:
+        if cost:
             flush(Position.of(body[-1]) if body else Position(1, 1))
         return result, since
 
@@ -195,7 +194,6 @@ class Statements(Expressions):
             case tree.Evaluate():
                 return [at.statement(self.value(statement.value))]
             case tree.Return():
-                self.cost = 0  # after a protective stop, nothing follows but the end
                 value = at.constant(None) if statement.value is None else self.value(statement.value)
                 return [
                     *([at.statement(value)] if self.is_part else []),
@@ -227,9 +225,6 @@ class Statements(Expressions):
                         syntax_error(statement.line, f"{statement.word} is outside of a loop"),
                     )
                 return [ast.Break(**at.given) if statement.word == "break" else ast.Continue(**at.given)]
-            case "halt":
-                self.cost = 0  # as for `return`
-                return [at.statement(at.call("halt"))]
             case "enter_critical":
                 return [at.statement(at.waiting(at.call("enter_critical")))]
             case _:
@@ -248,7 +243,7 @@ class Statements(Expressions):
         value = self.value(statement.value)
         if indices:
             here = Position(*first(indices[0]))
-            self.cost += REPLACED * len(indices)
+            self.cost += len(indices)
             self.works = True
             places = at.tuple(
                 [

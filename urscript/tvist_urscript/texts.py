@@ -2,6 +2,7 @@
 
 import re
 
+from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault
 from tvist_urscript.values import Value, integer, short, text, to_bytes, to_str, to_text, whole
 
@@ -10,6 +11,7 @@ _HEXADECIMAL = re.compile(r"\s*[+-]?0[xX][0-9a-fA-F]+\s*", re.ASCII)
 DECIMAL = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 
 
+@costs(20)
 def str_cat(op1: Value, op2: Value) -> str:
     """Return two values as one text."""
     whole_text = to_str(op1) + to_str(op2)

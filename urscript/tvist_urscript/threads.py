@@ -8,19 +8,6 @@ MOST_THREADS = 100
 """Most threads of a program at the same time."""
 
 
-class Halted(Exception):  # noqa: N818  no error: the script has said `halt`
-    """Raised by `halt` to unwind the thread that runs; the machine then ends all threads."""
-
-
-class Killed(Exception):  # noqa: N818  no error: the script has killed the thread that runs
-    """Raised to unwind the thread that runs, since it has killed itself or a thread that it belongs to."""
-
-
-def halt() -> None:
-    """Halt the program."""
-    raise Halted
-
-
 @dataclass(eq=False)
 class Thread:
     """A thread of a script.
@@ -30,11 +17,9 @@ class Thread:
         steps: The generator that runs it, None when it has ended.
         parent: The thread that has started it, or the nearest thread before that which has not ended; None for the main
             thread.
-        name: What the script calls it.
         critical: How many critical sections it is in.
         spent: Evaluations since it has waited for time to pass, or has got something from outside.
         owes: Evaluations of what it does first in its next turn, which that tick has to bear.
-        joins: The thread for whose end it waits at `join`.
         added: Whether it was started by statements that were added to the program, or is the main thread and runs such
             statements now.
     """
@@ -42,11 +27,9 @@ class Thread:
     number: int
     steps: Generator[Any, None, Any] | None
     parent: "Thread | None"
-    name: str = ""
     critical: int = 0
     spent: int = 0
     owes: int = 0
-    joins: "Thread | None" = None
     added: bool = False
 
     @property

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import ClassVar, Protocol, TypeVar
 
+import msgspec
+
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.command_row import Call, Row
 from tvist_protocol.io import (
@@ -91,6 +93,8 @@ class Peripherals:
         """True if `io` has to be published, since something in it has changed; whoever publishes it resets this."""
         self.wrench_zero: list[float] | None = None
         """Force and torque that count as zero [N, N m]: at the tool in the base frame, or by a sensor at the flange."""
+        self.payload_change: tuple[Payload, int, int] | None = None
+        """Payload from which a program goes over to the declared one, the ticks that takes, and the tick at its end."""
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
 
@@ -293,7 +297,7 @@ class Peripherals:
             output_int_register=list(self._ints["output_int"]),
             output_double_register=list(self._doubles["output_double"]),
             tcp_offset=list(self.tcp_offset),
-            payload=payload,
+            payload=self._payload_at(tick, payload),
             target_speed_fraction=speed,
             program=program.name,
             program_state=program.state,
@@ -311,6 +315,19 @@ class Peripherals:
             actual_TCP_force=wrench,
         )
 
+    def _payload_at(self, tick: int, after: Payload) -> Payload:
+        """Return the payload of a tick, each of whose properties changes evenly, as on a robot of UR's."""
+        if self.payload_change is None:
+            return after
+        before, ticks, last = self.payload_change
+        left, self.changed = max((last - tick) / ticks, 0.0), True
+        if left == 0.0:
+            self.payload_change = None
+            return after
+        pairs = [zip(a, b, strict=True) for a, b in zip(_properties(before), _properties(after), strict=True)]
+        (mass,), com, inertia = (tuple(left * a + (1.0 - left) * b for a, b in pair) for pair in pairs)
+        return msgspec.convert({"mass": mass, "com": com, "inertia": inertia}, Payload)
+
     def _analog_output(self, number: int) -> float:
         return analog_value(self._analog_ratios[number], voltage=self.output_is_voltage(number))
 
@@ -320,6 +337,10 @@ class Peripherals:
         Row(SetTcp, lambda self, call: self.set_tcp(call.command.offset), changes_io=True),
         Row(SimulationSetInputs, lambda self, call: self.set_inputs(call.command), changes_io=True),
     )
+
+
+def _properties(payload: Payload) -> tuple[tuple[float, ...], ...]:
+    return (payload.mass,), payload.com, payload.inertia
 
 
 def _with(values: list[Number], first: int, new: list[Number]) -> list[Number]:

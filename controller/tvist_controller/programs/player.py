@@ -7,10 +7,10 @@ from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.built_in import built_in
-from tvist_controller.programs.driver_watch import DriverWatch
 from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.kept import Kept, KeptPrograms
 from tvist_controller.programs.library import MOVING, functions
+from tvist_controller.programs.missed_turns import MissedTurns
 from tvist_controller.programs.popups import Popups
 from tvist_controller.programs.runstate import RunstateOutputs
 from tvist_controller.programs.sockets import Sockets
@@ -21,10 +21,12 @@ from tvist_protocol.modes import RobotMode
 from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
-from tvist_urscript import EVALUATIONS, GUIDED, Machine, Script, ScriptError
+from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
 
 TOLD_EVERY = 50
 """Ticks between two changes of the line in `io`, which changes with almost every tick."""
+GUIDED = 100
+"""Evaluations that the step of a guided motion of the program takes from the budget of its tick."""
 MAX_BESIDE = 8
 """Number of secondary programs that may run at once."""
 
@@ -53,7 +55,7 @@ class ProgramPlayer:
     def __init__(self, access: Access, safety: SafetyControl) -> None:
         self._access, self._motion, self._safety, self._emit = access, access.motion, safety, access.emit
         self.arm = ProgramArm(access, self._thread, self._lives, lambda work: self._machine().charge(work))
-        self._driver = DriverWatch(self.arm, access.guidance.stop_joints, access.emit)
+        self._missed_turns = MissedTurns(self.arm, access.emit)
         self.popups = Popups(access.emit, self._machine)
         self._watchdogs = Watchdogs(access.peripherals)
         self.sockets = Sockets(
@@ -81,6 +83,8 @@ class ProgramPlayer:
         """The one whose turn it is."""
         self._failed = False
         """Whether the program ends by an error or a stop."""
+        self.raised: list[Exception] = []
+        """Exceptions with which functions have failed that blame no argument, until a log has them."""
         self.line = 0
         """Present line, or the one with which playing would resume, counted from 1; 0 if there is none."""
         self.label: ProgramLabel | None = None
@@ -137,7 +141,6 @@ class ProgramPlayer:
             self.arm.advance()
             self._now = None
         left -= GUIDED if self.arm.guides else 0
-        stands = left <= 0
         # Whoever got nothing of the last tick's evaluations comes first, else the oldest.
         for running in sorted(self._all, key=lambda one: one not in self._starved) if left > 0 else ():
             if running not in self._all or (running is self._main and self._held):
@@ -148,9 +151,8 @@ class ProgramPlayer:
             else:
                 self._starved.add(running)
         self._left = left
-        if self._main is not None and not self._held:
-            starved = stands or self._main in self._starved
-            self._driver.look(self._main.machine, self._main.name, missed=starved)
+        if not self._held:
+            self._missed_turns.look({one.machine for one in self._starved})
         self.arm.settle()
         if self._main is not None and (self.line == 0 or tick % TOLD_EVERY == 0):
             self._find_line(self._main.machine)
@@ -173,8 +175,6 @@ class ProgramPlayer:
         self._now = running
         try:
             running.machine.resume(left)
-            if running is self._main and self.state == "PAUSED":  # a protective stop in this tick
-                running.machine.settle()
         except ScriptError as error:
             self._fail(running, error)
         self._now = None
@@ -223,6 +223,8 @@ class ProgramPlayer:
 
     def _fail(self, running: _Running, error: ScriptError) -> None:
         self._failed |= running is self._main
+        if error.internal is not None:
+            self.raised.append(error.internal)
         self._emit(
             "warning", why=readable(error.text), line=error.line, column=error.column, program=running.name
         )
@@ -252,7 +254,6 @@ class ProgramPlayer:
         self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
         if running is self._main:
             self._main, self.state, self.line, self.label = None, "STOPPED", 0, None
-            self._driver.forget()
             self._runstate.tell(runs=False, failed=self._failed)
             self._watchdogs.clear()
             self.statements.close()
@@ -265,7 +266,7 @@ class ProgramPlayer:
         assert self._now is not None, "only programs call their functions"
         return self._now.machine
 
-    def _thread(self) -> tuple[object, int]:
+    def _thread(self) -> tuple[Machine, int]:
         """What identifies the thread that runs now: its program and its number."""
         machine = self._machine()
         return machine, machine.thread
@@ -296,6 +297,7 @@ class ProgramPlayer:
         self._main = self._begin(self.loaded.script, self.name or self.loaded.script.name, origin)
         self.state, self.line, self._failed = "PLAYING", 1, False
         self._runstate.tell(runs=True)
+        self._missed_turns.clear()
         self.statements.open(self._main.machine)
 
     def play_beside(self, script: Script, origin: str | None) -> None:
@@ -337,4 +339,4 @@ class ProgramPlayer:
         self._runstate.tell(runs=False, failed=failed)
         if self._main is not None:
             self._find_line(self._main.machine)
-            self._main.machine.left = 0
+            self._main.machine.hold()

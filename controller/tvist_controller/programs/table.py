@@ -6,7 +6,6 @@ from inspect import getdoc
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import FAMILIES, known_signatures
 from tvist_urscript import METHOD, REQUIRED, Signature, signatures
-from tvist_urscript.costs import ORDINARY
 
 HEAD = """# Functions of programs
 
@@ -21,7 +20,7 @@ next move; what it writes to outputs, registers and the log on the way is done w
 reads is of the present. A function that waits ends the path: the arm then stops at the point of the last move.
 """
 COSTS = """Evaluations that a call takes from [the budget](urscript.md#5-threads), in proportion to its time; all others
-take 20. Inverse kinematics takes 900 more where a joint is free, since it then searches a curve of postures, or where
+take one. Inverse kinematics takes 900 more where a joint is free, since it then searches a curve of postures, or where
 an arm has no closed form."""
 
 
@@ -34,9 +33,7 @@ def page() -> str:
             for name, one in signatures(functions).items()
         ]
         parts.append(f"## {title}\n\n{_table(('function', '', 'what'), rows)}\n")
-    costs = sorted(
-        {one.cost for one in known_signatures().values() if one.cost not in {1, ORDINARY}}, reverse=True
-    )
+    costs = sorted({one.cost for one in known_signatures().values() if one.cost > 1}, reverse=True)
     dear = [
         (
             str(cost),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tvist_lab.metrics.measured_motion import SMALLEST, measured_spans
 from tvist_lab.metrics.servo_lag import servo_lag
+from tvist_lab.metrics.vibration import parts
 from tvist_lab.recordings import Floats, Recording
 
 MOVING = 1e-7
@@ -53,6 +54,16 @@ class MotionRows:
     lag: float | None = None
     """Time by which the arm follows its target, in a log of another controller [s]; None if that is not known."""
 
+    def later(self, rows: int) -> "MotionRows":
+        """Return the same motion in a recording with more rows before it."""
+        return replace(
+            self,
+            start=self.start + rows,
+            reference_stop=self.reference_stop + rows,
+            shaped_stop=self.shaped_stop + rows,
+            end=self.end + rows,
+        )
+
     def arm_stop(self, recording: Recording) -> int:
         """First row from which the arm is not driven any more, so that it only vibrates."""
         if not self.lag:
@@ -84,11 +95,23 @@ def motions(recording: Recording) -> list[MotionRows]:
     They are taken from the events `motion_started`, `motion_done` and `motion_stopped` if there are any, otherwise
     from the reference itself, and in a log without reference from the target's speed, the target or the measured
     angles: many robots publish the measured angles as a target while they rest. Motions without any movement are left
-    out, and in logs of other controllers those of less than 5 mrad wherever noise could be taken for one.
+    out, and in logs of other controllers those of less than 5 mrad wherever noise could be taken for one. None goes on
+    across a long gap of the log.
 
     Raises:
         RecordingError: There is neither `reference_q` nor `target_q` nor `actual_q`.
     """
+    tick, (first, *others) = recording["tick"], parts(recording.time)
+    if not others:
+        return _motions(recording)
+    found = []
+    for rows in (first, *others):
+        part = recording.between(int(tick[rows.start]), int(tick[rows.stop - 1]))
+        found += [motion.later(rows.start) for motion in _motions(part)]
+    return found
+
+
+def _motions(recording: Recording) -> list[MotionRows]:
     if len(recording) < 2:
         return []
     if "target_q" not in recording:

@@ -1,6 +1,7 @@
 """α, the acceleration of the tool measured by its accelerometer, without gravity."""
 
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -17,6 +18,8 @@ TRUTH = "truth_tool_acceleration"
 TRUE_POSE = "truth_flange_pose"
 
 
+LONG_GAP = 1.0
+"""Time without rows on both sides of which a log is two [s]; shorter ones are filled with straight lines."""
 ALL = slice(None)
 """All rows of a recording."""
 
@@ -74,18 +77,29 @@ def low_pass(signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
 def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
     """Low-pass filter samples of which some are missing: these are interpolated before, and left out after.
 
+    Parts of a log on both sides of a long gap are filtered each by itself: to fill a day would take the memory.
+
     Args:
         time: Times of the samples, increasing, shape (T,) [s].
         signal: The samples, shape (T, k).
         period: Time between samples where none is missing [s].
         cut_off: Cut-off frequency [Hz].
     """
-    if len(time) < 2:
-        return signal
-    grid = np.arange(time[0], time[-1] + 0.5 * period, period)
-    even = np.column_stack([np.interp(grid, time, axis) for axis in signal.T])
-    below = low_pass(even, period, cut_off)
-    return np.column_stack([np.interp(time, grid, axis) for axis in below.T])
+    filtered = np.array(signal)
+    for rows in parts(time):
+        if len(own := time[rows]) > 1:
+            grid = np.arange(own[0], own[-1] + 0.5 * period, period)
+            below = low_pass(
+                np.column_stack([np.interp(grid, own, axis) for axis in signal[rows].T]), period, cut_off
+            )
+            filtered[rows] = np.column_stack([np.interp(own, grid, axis) for axis in below.T])
+    return filtered
+
+
+def parts(time: Floats) -> list[slice]:
+    """Rows between the long gaps of increasing times."""
+    ends = [0, *(np.flatnonzero(np.diff(time) > LONG_GAP) + 1).tolist(), len(time)]
+    return [slice(first, past) for first, past in pairwise(ends)]
 
 
 def band_pass(signal: Floats, period: float, band: tuple[float, float] = BAND) -> Floats:

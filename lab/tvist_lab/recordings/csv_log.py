@@ -12,11 +12,14 @@ import polars as pl
 from tvist_lab.recordings.log_columns import (
     ROBOT,
     STRANGE,
+    TIME,
     LogError,
     Needs,
     Rows,
     check_known,
     check_names,
+    found_columns,
+    is_measured,
     recording_of,
 )
 from tvist_lab.recordings.named_columns import in_si, named
@@ -78,11 +81,17 @@ def read_csv(path: Path, columns: str | None = None, needs: Needs = ROBOT) -> Re
         OSError: The file cannot be read.
     """
     lines = _lines(path, needs, known=columns is None)
-    values = _numbers(path, lines)
     names, units, whose = _named(path, lines.names, columns)
+    needed = [name == TIME or is_measured(name) if columns is None else bool(name) for name in names]
+    values, texts = _numbers(path, lines, needed)
+    if texts:
+        names = ["" if place in texts else name for place, name in enumerate(names)]
+        there = ", ".join(lines.names[place] for place in texts)
+        whose = (*whose, f"columns that hold text are left out: {there}")
     values, notes = in_si(names, values, units)
+    notes = (*lines.notes, *whose, *notes)
     return recording_of(
-        Rows(path, names, values, lines.numbers, notes=(*lines.notes, *whose, *notes), needs=needs)
+        Rows(path, names, values, lines.numbers, notes=notes, needs=needs, header=lines.names)
     )
 
 
@@ -140,8 +149,6 @@ def _lines(path: Path, needs: Needs, *, known: bool) -> _Lines:
     if not whole.any():
         raise LogError(f"{path} holds no rows" if not body else f"{path} holds no complete row: {notes[0]}")
     kept = [body[at] for at in np.flatnonzero(whole)]
-    if (strange := next((at for at, line in kept if not line.isascii()), None)) is not None:
-        raise LogError(f"{path}, line {strange}: there is something else than numbers")
     text = b"\n".join(line for _, line in kept) + b"\n"
     return _Lines(
         names,
@@ -172,7 +179,7 @@ def _header(path: Path, lines: list[bytes], needs: Needs, *, known: bool) -> tup
     ]
     if len(names) == 1:
         raise LogError(
-            f"{path} {STRANGE}: its line {top + 1} does not name columns, as in timestamp,actual_q_0"
+            f"{path} {STRANGE}: its line {top + 1} has one cell; a header names several, as in timestamp,actual_q_0"
         )
     if not known and all(name in EMPTY or _NUMBER.fullmatch(name) for name in names):
         return top - 1, [str(place) for place in range(1, len(names) + 1)], separator
@@ -200,8 +207,9 @@ def _top(lines: list[bytes]) -> int | None:
     return None
 
 
-def _numbers(path: Path, lines: _Lines) -> Floats:
-    """Values of all cells, shape (T, columns); NaN where a cell is empty."""
+def _numbers(path: Path, lines: _Lines, needed: list[bool]) -> tuple[Floats, list[int]]:
+    """Values of all cells, shape (T, columns), NaN where one is empty; and columns with text that are not needed."""
+    texts: list[int] = []
     names = [str(place) for place in range(len(lines.names))]
     try:
         frame = _frame(lines, dict.fromkeys(names, pl.Float64()))
@@ -209,8 +217,8 @@ def _numbers(path: Path, lines: _Lines) -> Floats:
         text = _frame(lines, dict.fromkeys(names, pl.String()))
         text = text.select(pl.col(names).str.strip_chars().str.strip_chars('"'))
         frame = text.select(pl.col(names).cast(pl.Float64, strict=False))
-        _check_cells(path, lines, text, frame)
-    return np.asarray(frame.to_numpy().astype(np.float64))
+        texts = _check_cells(path, lines, text, frame, needed)
+    return np.asarray(frame.to_numpy().astype(np.float64)), texts
 
 
 def _frame(lines: _Lines, schema: dict[str, pl.DataType]) -> pl.DataFrame:
@@ -222,15 +230,27 @@ def _frame(lines: _Lines, schema: dict[str, pl.DataType]) -> pl.DataFrame:
         schema=schema,
         null_values=list(EMPTY),
         truncate_ragged_lines=True,
+        encoding="utf8-lossy",
     )
 
 
-def _check_cells(path: Path, lines: _Lines, text: pl.DataFrame, frame: pl.DataFrame) -> None:
-    """Refuse a cell that has something but no number, with its line and column."""
+def _check_cells(
+    path: Path, lines: _Lines, text: pl.DataFrame, frame: pl.DataFrame, needed: list[bool]
+) -> list[int]:
+    """Refuse a cell that has something but no number, with its line and column; return columns not needed with such."""
+    texts = []
     for place, name in enumerate(lines.names):
         cells, numbers = text.to_series(place), frame.to_series(place)
         bad = (numbers.is_null() & cells.is_not_null() & ~cells.is_in(EMPTY)).arg_true()
-        if len(bad):
+        if len(bad) and needed[place]:
             cell = cells[bad[0]]
             where = f"{path}, line {int(lines.numbers[bad[0]])}, column {name}"
-            raise LogError(f"{where}: {cell[:40]!r} is no number")
+            raise LogError(f"{where}: {cell[:40]!r} is no number{_instead(lines, name)}")
+        texts += [place] * bool(len(bad))
+    return texts
+
+
+def _instead(lines: _Lines, name: str) -> str:
+    """What to do about a column of times that is text."""
+    others = found_columns([other for other in lines.names if other != name])
+    return f"; name another column of times with --columns time=…: {others}" if name.lower() in TIMES else ""

@@ -61,6 +61,7 @@ class Needs:
 
 
 ROBOT = Needs(("target_q", "actual_q"), "--columns time=…,q=joint_{}", "--columns time=1,q=2-7")
+ROBOT_OR_SENSOR = Needs((*ROBOT.columns, ACCELEROMETER), ROBOT.option, ROBOT.positions)
 SENSOR = Needs(
     (ACCELEROMETER,), "--imu-columns time=…,accelerometer=a{}", "--imu-columns time=1,accelerometer=2-4"
 )
@@ -82,6 +83,8 @@ class Rows:
     notes: tuple[str, ...] = ()
     """What the reader of the file left out."""
     needs: Needs = ROBOT
+    header: Sequence[str] = ()
+    """Names that the file itself gives its columns, where they differ."""
 
 
 def recording_of(rows: Rows) -> Recording:
@@ -100,6 +103,11 @@ def recording_of(rows: Rows) -> Recording:
     if TIME not in columns or columns[TIME].ndim != 1:
         raise LogError(f"{rows.path} has no column {TIME}: {_remedy(rows)}")
     if not any(name in columns and columns[name].ndim == 2 for name in rows.needs.columns):
+        if rows.needs == ROBOT and ACCELEROMETER in columns:
+            raise LogError(
+                f"{rows.path} holds an accelerometer alone, no joint angles: tvist log analyze measures frequency and "
+                "damping from it, and --imu joins it with a robot's log"
+            )
         lacking = [f"{name}_0 …" for name in rows.needs.columns]
         has = f"neither {' nor '.join(lacking)}" if len(lacking) > 1 else f"no {lacking[0]}"
         raise LogError(f"{rows.path} has {has}: {_remedy(rows)}")
@@ -115,6 +123,11 @@ def recording_of(rows: Rows) -> Recording:
     return Recording(columns, notes=(*rows.notes, *notes), foreign=not ours)
 
 
+def is_measured(name: str) -> bool:
+    """Return whether a column has one of RTDE's names for what a robot measures or wants."""
+    return _MEASURED.fullmatch(name) is not None
+
+
 def check_names(where: object, names: Sequence[str]) -> None:
     """Refuse a column's name that cannot be shown, as of a damaged file."""
     for name in names:
@@ -127,8 +140,8 @@ def check_known(path: Path, line: int, names: Sequence[str], needs: Needs) -> No
     if not any(name == TIME or _MEASURED.fullmatch(name) for name in names):
         found = f"; {found_columns(names)}" if all(map(is_name, names)) else ""
         raise LogError(
-            f"{path} {STRANGE}: its line {line} does not name columns, as in timestamp,actual_q_0. If it is a log, "
-            f"name them with {needs.option}{found}"
+            f"{path} {STRANGE}: its line {line} has none of the names that are known, as in timestamp,actual_q_0. "
+            f"If it is a log, name its columns with {needs.option}{found}"
         )
 
 
@@ -145,7 +158,7 @@ def _check_numbers(rows: Rows) -> None:
 
 
 def _remedy(rows: Rows) -> str:
-    return f"name them with {rows.needs.option}; {found_columns(rows.names)}"
+    return f"name them with {rows.needs.option}; {found_columns(rows.header or rows.names)}"
 
 
 def found_columns(names: Sequence[str]) -> str:

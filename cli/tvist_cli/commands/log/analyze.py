@@ -1,5 +1,6 @@
 """`tvist log analyze`: measure the motions of a recording or of a robot's log."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,8 @@ def analyze(
     Frequency and damping have 95 % intervals. A dash has its reason in a line below the table. A line says from which
     motion on payload, gears or what rings after stops are not what they were before.
 
+    A log of an accelerometer alone has no motions: its ring-downs, or a sweep of frequencies, are measured.
+
     Args:
         file: Recording of `tvist serve --record`, `tvist log record` or `tvist log export`; or a log of another robot:
             CSV with RTDE's names, a dump of UR's port 30003, a rosbag2 in MCAP.
@@ -40,7 +43,10 @@ def analyze(
     from tvist_lab.recordings import RecordingError
     from tvist_lab.words import counted
 
-    (recording,) = logs.read(file)
+    (recording,) = logs.read(file, sensor=True)
+    if "actual_q" not in recording and "target_q" not in recording:
+        _sensor_alone(file, recording, json=json)
+        return
     with told(RecordingError):
         found = motions(recording)
     results = []
@@ -72,6 +78,31 @@ def analyze(
     table(f"{file}: {counted(len(results), 'motion')}{since}", tuple(COLUMNS), rows)
     for note in (*changed, *grouped_notes(results)):
         out.print(note, markup=False)
+
+
+def _sensor_alone(file: Path, recording: "Recording", *, json: bool) -> None:
+    """Print frequency and damping from a log that has no joint angles."""
+    from tvist_lab.metrics import NotMeasurableError
+    from tvist_lab.metrics.columns import number
+    from tvist_lab.metrics.sensor_alone import free_vibrations
+
+    with told(NotMeasurableError):
+        found = free_vibrations(recording)
+    if json:
+        vibrations, notes = [asdict(one) for one in found], list(recording.notes)
+        print_json({"file": str(file), "motions": [], "free_vibrations": vibrations, "notes": notes})
+        return
+    for note in recording.notes:
+        say(f"{file}: {note}")
+    rows = [
+        [cell.replace("\n", " ") for cell in (
+            one.kind, number(one.start_s - recording.origin, 3), number(one.f_d_hz, 2, one.f_d_interval_hz),
+            number(one.zeta, 3, one.zeta_interval),
+        )]
+        for one in found
+    ]  # fmt: skip
+    names = ("vibration", "start s", "frequency f_d Hz", "damping ζ")
+    table(f"{file}: an accelerometer alone, no joint angles", names, rows)
 
 
 def _draw(recording: "Recording", found: "list[MotionRows]", files: "FigureFiles") -> None:

@@ -7,7 +7,7 @@ from tvist_controller.programs.journey import Turns
 from tvist_controller.programs.popups import Popups
 from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import PopupKind
-from tvist_urscript import Array, Fault, Struct, Value, to_str
+from tvist_urscript import Array, Fault, Struct, Value, costs, to_str
 
 LONGEST_TEXT = 350
 """Elements of a list that fit into a text."""
@@ -27,11 +27,13 @@ class MessageFunctions:
     def __init__(self, access: Access, arm: ProgramArm, popups: Popups) -> None:
         self._access, self._arm, self._popups = access, arm, popups
 
+    @costs(30)
     def textmsg(self, s1: Value, s2: Value = "") -> None:
         """Write a line to the log, which clients of the primary interface get."""
         text = readable(f"{self._written(s1)}{self._written(s2)}")
         self._arm.then(lambda: self._access.emit("text", why=text))
 
+    @costs(20)
     def popup(
         self,
         s: Value,

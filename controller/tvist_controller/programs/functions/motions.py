@@ -17,7 +17,7 @@ from tvist_controller.trajectory import Guided, JointSpeed, ToolSpeed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, Segment
 from tvist_protocol.transitions import Activity
-from tvist_urscript import Array, Fault
+from tvist_urscript import Array, Fault, costs
 
 MAX_BLEND: Final = 10.0
 LONGEST: Final = 3600.0
@@ -44,6 +44,7 @@ class MotionFunctions:
 
     # ------------------------------------------------------------------ planned moves
 
+    @costs(180)
     def movej(self, q: object, a: object = 1.4, v: object = 1.05, t: object = 0, r: object = 0) -> Turns:
         """Move all joints in phase to joint positions, or to those nearest that reach a pose."""
         posture, speed = self._posture("q", q), positive("v", v)
@@ -59,6 +60,7 @@ class MotionFunctions:
         )
         yield from self._follow(segment)
 
+    @costs(60)
     def movel(self, pose: object, a: object = 1.2, v: object = 0.25, t: object = 0, r: object = 0) -> Turns:
         """Move the tool on a straight line to a pose, or to the one at joint positions."""
         segment = LineSegment(
@@ -70,6 +72,7 @@ class MotionFunctions:
         )
         yield from self._follow(segment)
 
+    @costs(60)
     def movep(self, pose: object, a: object = 1.2, v: object = 0.25, r: object = 0) -> Turns:
         """Move the tool on a straight line at a constant speed, also in the blend at its end."""
         segment = ProcessSegment(
@@ -80,6 +83,7 @@ class MotionFunctions:
         )
         yield from self._follow(segment)
 
+    @costs(100)
     def movec(
         self,
         pose_via: object,
@@ -100,11 +104,13 @@ class MotionFunctions:
         )
         yield from self._follow(segment)
 
+    @costs(180)
     def optimovej(self, goal: object, a: object = 0.3, v: object = 0.3, r: object = 0) -> Turns:
         """Move the joints with shares of the arm's largest acceleration and velocity."""
         acceleration, velocity = _share("a", a), _share("v", v)
         yield from self.movej(goal, acceleration * self._acceleration, velocity * self._velocity, 0, r)
 
+    @costs(60)
     def optimovel(self, goal: object, a: object = 0.3, v: object = 0.3, r: object = 0) -> Turns:
         """Move the tool on a line with shares of the largest acceleration and speed, which the joints limit further."""
         acceleration, velocity = _share("a", a), _share("v", v)
@@ -118,6 +124,7 @@ class MotionFunctions:
 
     # ------------------------------------------------------------------ guided motions
 
+    @costs(120)
     def servoj(
         self,
         q: object,
@@ -141,6 +148,7 @@ class MotionFunctions:
 
         yield from self._arm.guide(start, lambda: iter([None] * max(ticks, 1)))
 
+    @costs(200)
     def servoc(self, pose: object, a: object = 1.2, v: object = 0.25, r: object = 0) -> Turns:
         """Move the tool towards a pose at a speed; the next call may replace the pose in motion."""
         goal = self._pose("pose", pose)
@@ -166,6 +174,7 @@ class MotionFunctions:
 
         yield from self._arm.guide(start, wait)
 
+    @costs(100)
     def speedj(self, qd: object, a: object = 1.4, t: object = None) -> Turns:
         """Approach velocities of the joints, and keep them; return after a time, or when they are reached."""
         joints, most = self._access.description.joints, self._access.description.limits.velocity
@@ -178,6 +187,7 @@ class MotionFunctions:
 
         yield from self._arm.guide(start, self._wait(t))
 
+    @costs(120)
     def speedl(self, xd: object, a: object = 1.2, t: object = None, aRot: object = None) -> Turns:
         """Approach a velocity of the tool in the base frame, and keep it; see `speedj`."""
         twist = np.array(numbers("xd", xd, 6))
@@ -189,11 +199,13 @@ class MotionFunctions:
 
         yield from self._arm.guide(start, self._wait(t))
 
+    @costs(150)
     def stopj(self, a: object = 2) -> Turns:
         """Stop with a deceleration of the joints."""
         deceleration = self._within(positive("a", a), "acceleration", self._acceleration)
         yield from self._arm.halt(lambda: self._access.guidance.stop_joints(deceleration))
 
+    @costs(150)
     def stopl(self, a: object = 1.2, aRot: object = None) -> Turns:
         """Stop with a deceleration of the tool."""
         deceleration = _tool("a", a, "acceleration")

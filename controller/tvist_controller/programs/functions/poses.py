@@ -10,7 +10,8 @@ from tvist_controller.programs import arguments
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import a_list, a_pose, is_pose, numbers
 from tvist_controller.programs.kinematics import ProgramKinematics
-from tvist_urscript import Array, Fault, Pose
+from tvist_protocol.io import Length
+from tvist_urscript import Array, Fault, Pose, costs
 
 
 class PoseFunctions:
@@ -26,6 +27,7 @@ class PoseFunctions:
         self._joints = access.description.joints
         self._dynamics = InverseDynamics(access.description, access.motion.cycle.line.dynamics.payload)
 
+    @costs(150)
     def get_inverse_kin(
         self,
         x: object,
@@ -41,6 +43,7 @@ class PoseFunctions:
         del maxPositionError, maxOrientationError
         return a_list(self._kinematics.posture(arguments.pose("x", x), self._near(qnear), _tool(tcp)))
 
+    @costs(150)
     def get_inverse_kin_has_solution(
         self,
         x: object,
@@ -53,10 +56,12 @@ class PoseFunctions:
         del maxPositionError, maxOrientationError
         return self._solution(arguments.pose("x", x), self._near(qnear), _tool(tcp)) is not None
 
+    @costs(80)
     def get_forward_kin(self, q: object = None, tcp: object = None) -> Pose:
         """Return the pose of the tool at joint positions, or at the measured ones."""
         return a_pose(self._kinematics.tool_pose(self._posture(q), _tool(tcp)))
 
+    @costs(200)
     def is_within_safety_limits(self, pose: object, qNear: object = None) -> bool:
         """Return whether the arm can be at a pose or at joint positions: within their range, without a collision."""
         if is_pose(pose):
@@ -71,11 +76,13 @@ class PoseFunctions:
             return False
         return self._access.motion.collisions.meeting(np.array(q)) is None
 
+    @costs(110)
     def get_jacobian(self, q: object = None, tcp: object = None) -> Array:
         """Return the Jacobian of the tool in the base frame, rows for velocity and angular velocity."""
         matrix = self._kinematics.jacobian(self._posture(q), _tool(tcp))
         return Array(tuple(a_list(row) for row in matrix.tolist()))
 
+    @costs(280)
     def get_mass_matrix(self, q: object = None, include_rotors_inertia: object = True) -> Array:
         """Return the inertia matrix of the joints with the declared payload [kg m^2]."""
         self._dynamics.believe(self._access.motion.cycle.line.dynamics.bodies)
@@ -105,4 +112,4 @@ class PoseFunctions:
 
 
 def _tool(tcp: object) -> Sequence[float] | None:
-    return None if tcp is None else arguments.pose("tcp", tcp)
+    return None if tcp is None else arguments.pose("tcp", tcp, Length)

@@ -5,6 +5,7 @@ from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number
 from tvist_controller.programs.arm import ProgramArm
 from tvist_protocol.io import BITS, NUMBERS
+from tvist_urscript import costs
 
 FLAGS = 32
 """Number of flags, which only programs have."""
@@ -46,16 +47,19 @@ class RegisterFunctions:
         """Read an output number, which programs write."""
         return self._registers.doubles("output_double")[integer("address", address, 0, NUMBERS - 1)]
 
+    @costs(8)
     def write_output_boolean_register(self, address: object, value: object) -> None:
         """Write an output bit, which clients read."""
         place, bit = integer("address", address, 0, BITS - 1), flag("value", value)
         self._arm.then(lambda: self._registers.write("output_bit", place, bit))
 
+    @costs(8)
     def write_output_integer_register(self, address: object, value: object) -> None:
         """Write an output integer of 32 bits, which clients read."""
         place, wanted = integer("address", address, 0, NUMBERS - 1), integer("value", value, LEAST, MOST)
         self._arm.then(lambda: self._registers.write("output_int", place, wanted))
 
+    @costs(8)
     def write_output_float_register(self, address: object, value: object) -> None:
         """Write an output number, which clients read."""
         place, wanted = integer("address", address, 0, NUMBERS - 1), number("value", value)
@@ -65,6 +69,7 @@ class RegisterFunctions:
         """Return one of 32 flags, which only programs can read and set."""
         return self._flags[integer("n", n, 0, FLAGS - 1)]
 
+    @costs(3)
     def set_flag(self, n: object, value: object) -> None:
         """Set one of the flags."""
         place, wanted = integer("n", n, 0, FLAGS - 1), flag("value", value)

@@ -7,7 +7,7 @@ from tvist_controller.programs.journey import Turns
 from tvist_controller.programs.moves import OWN_TOKEN
 from tvist_controller.programs.watchdogs import Watchdogs
 from tvist_protocol.commands import PowerOff
-from tvist_urscript import Fault
+from tvist_urscript import Fault, costs
 
 
 class SafetyFunctions:
@@ -22,19 +22,22 @@ class SafetyFunctions:
     def __init__(self, access: Access, arm: ProgramArm, watchdogs: Watchdogs) -> None:
         self._access, self._arm, self._watchdogs = access, arm, watchdogs
 
+    @costs(10)
     def protective_stop(self) -> Turns:
-        """Make a protective stop, which pauses the program if anything follows; a secondary program waits."""
+        """Make a protective stop, which pauses the program here, or ends it if nothing follows; secondary ones wait."""
         motion = self._access.motion
         motion.protect("the program asked for a protective stop")
-        while self._arm.secondary and motion.activity.protective:
+        while motion.activity.protective and not self._arm.ends:
             yield
 
+    @costs(10)
     def powerdown(self) -> Turns:
         """Switch the arm's power off, which ends the program; the controller stays on."""
         yield from self._arm.finish()
         self._access.send(PowerOff(token=OWN_TOKEN), None)
         yield
 
+    @costs(5)
     def rtde_set_watchdog(
         self, variable_name: object, min_frequency: object, action: object = "pause"
     ) -> None:

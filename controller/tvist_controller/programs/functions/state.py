@@ -13,7 +13,7 @@ from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
 from tvist_protocol.stream import State
-from tvist_urscript import Array, Fault, Pose, Value
+from tvist_urscript import Array, Fault, Pose, Value, costs
 from tvist_urscript.values import whole
 
 INTEGRATED = frozenset(
@@ -82,6 +82,7 @@ class StateFunctions:
         """Return the joint accelerations that the program asks for at present [rad/s^2]."""
         return a_list(_target(self._access.latest()).qdd)
 
+    @costs(50)
     def get_actual_tcp_pose(self) -> Pose:
         """Return the pose of the tool by the measured joint positions."""
         return a_pose(self._kinematics.tool_pose(np.array(self._access.latest().actual_q)))
@@ -91,31 +92,38 @@ class StateFunctions:
         state = self._access.latest()
         return self._speed(state.actual_q, state.actual_qd)
 
+    @costs(50)
     def get_target_tcp_pose(self) -> Pose:
         """Return the pose of the tool that the program asks for at present."""
         return a_pose(self._kinematics.tool_pose(np.array(_target(self._access.latest()).q)))
 
+    @costs(50)
     def get_target_tcp_speed(self) -> Array:
         """Return the velocity of the tool that the program asks for at present [m/s, rad/s]."""
         target = _target(self._access.latest())
         return self._speed(target.q, target.qd)
 
+    @costs(50)
     def tool_pose(self) -> Pose:
         """Return `get_target_tcp_pose`: PolyScope's name for the feature Tool, where a program uses one."""
         return self.get_target_tcp_pose()
 
+    @costs(50)
     def get_target_tcp_pose_along_path(self) -> Pose:
         """Return `get_target_tcp_pose`, since nothing offsets the path."""
         return self.get_target_tcp_pose()
 
+    @costs(50)
     def get_target_tcp_speed_along_path(self) -> Array:
         """Return `get_target_tcp_speed`, since nothing offsets the path."""
         return self.get_target_tcp_speed()
 
+    @costs(50)
     def get_actual_tool_flange_pose(self) -> Pose:
         """Return the pose of the flange by the measured joint positions."""
         return a_pose(self._kinematics.tool_pose(np.array(self._access.latest().actual_q), (0.0,) * 6))
 
+    @costs(50)
     def get_target_waypoint(self) -> Pose:
         """Return the pose at the end of the present move; without one, the present target."""
         segment = self._arm.waypoint
@@ -142,14 +150,17 @@ class StateFunctions:
         xx, xy, xz, yy, yz, zz = self._access.declared().inertia
         return a_list((xx, yy, zz, xy, xz, yz))
 
+    @costs(80)
     def get_joint_torques(self) -> Array:
         """Return the external torques on the joints: without what the arm itself needs [N m]."""
         return a_list(self._access.forces.torques())
 
+    @costs(80)
     def get_tcp_force(self) -> Array:
         """Return the external force and torque at the tool in the base frame [N, N m]."""
         return a_list(self._access.forces.wrench())
 
+    @costs(80)
     def force(self) -> float:
         """Return the size of the external force at the tool [N]."""
         return math.hypot(*self._access.forces.wrench()[:3])
@@ -166,6 +177,7 @@ class StateFunctions:
         """Return what the accelerometer in the flange measures, gravity included [m/s^2]."""
         return a_list(self._access.latest().actual_tool_accelerometer)
 
+    @costs(300)
     def get_rtde_value(self, key: object) -> Value:
         """Return an output variable of RTDE, as it was in the last tick.
 
@@ -186,6 +198,7 @@ class StateFunctions:
             return a_list([whole(one) if type(one) is int else float(one) for one in value])
         return whole(value) if type(value) is int else value
 
+    @costs(4)
     def get_actual_joint_positions_history(self, steps: object = 0) -> Array:
         """Return the measured joint positions a number of ticks ago [rad]."""
         past = self._access.steadiness

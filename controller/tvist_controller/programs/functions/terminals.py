@@ -5,7 +5,7 @@ from tvist_controller.programs.arguments import flag, integer, number, shown
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.moves import OWN_TOKEN
 from tvist_protocol.io import SetIo
-from tvist_urscript import Array, Fault
+from tvist_urscript import Array, Fault, costs
 
 STANDARD, CONFIGURABLE, TOOL = range(8), range(8, 16), range(16, 18)
 """Bits of the digital terminals."""
@@ -24,19 +24,23 @@ class TerminalFunctions:
 
     # ------------------------------------------------------------------ digital
 
+    @costs(10)
     def set_digital_out(self, n: object, b: object) -> None:
         """Set a digital output: 0 to 7 standard, 8 and 9 those of the tool, as before configurable ones existed."""
         number_ = integer("n", n, 0, 9)
         self._set(number_ if number_ < len(STANDARD) else TOOL[number_ - 8], flag("b", b))
 
+    @costs(10)
     def set_standard_digital_out(self, n: object, b: object) -> None:
         """Set one of the eight standard digital outputs."""
         self._set(STANDARD[integer("n", n, 0, 7)], flag("b", b))
 
+    @costs(10)
     def set_configurable_digital_out(self, n: object, b: object) -> None:
         """Set one of the eight configurable digital outputs."""
         self._set(CONFIGURABLE[integer("n", n, 0, 7)], flag("b", b))
 
+    @costs(10)
     def set_tool_digital_out(self, n: object, b: object) -> None:
         """Set one of the two digital outputs of the tool."""
         self._set(TOOL[integer("n", n, 0, 1)], flag("b", b))
@@ -77,10 +81,12 @@ class TerminalFunctions:
 
     # ------------------------------------------------------------------ analogue, tool and run state
 
+    @costs(10)
     def set_analog_out(self, n: object, f: object) -> None:
         """Set an analogue output to a share of its range."""
         self.set_standard_analog_out(n, f)
 
+    @costs(10)
     def set_standard_analog_out(self, n: object, f: object) -> None:
         """Set an analogue output to a share of its range."""
         place, share = integer("n", n, 0, 1), number("f", f, 0.0, 1.0)
