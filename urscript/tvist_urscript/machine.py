@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
+from types import FrameType
 from typing import Any
 
 from tvist_urscript.errors import Fault, ScriptError
@@ -89,7 +90,8 @@ class Machine:
     @property
     def at_end(self) -> bool:
         """Whether nothing follows the built-in function that runs, neither in its thread nor where that is joined."""
-        thread, lines, frame = self._running, set[int](), sys._getframe()  # noqa: SLF001
+        thread, lines = self._running, set[int]()
+        frame: FrameType | None = sys._getframe()  # noqa: SLF001
         while frame is not None:
             lines |= {frame.f_lineno} if frame.f_code.co_filename == FILE else set()
             frame = frame.f_back
@@ -146,7 +148,9 @@ class Machine:
             else:
                 self._turn(thread)
         while self._held and (over := [one for one in self._threads if one.joins and one.joins.ended]):
-            self._turn(over[0])  # at its end, too
+            if not all_lines_of(over[0].steps) <= self.script.last_lines:
+                break
+            self._turn(over[0])  # nothing follows there but the end
         return self.left
 
     def hold(self) -> None:
