@@ -87,10 +87,6 @@ EXAMPLES = {
 
 `external_fts_through_rtde` waits for keys, and `direct_torque_control_example` needs PolyScope 5.23.
 """
-KNOWN_EXAMPLES = {
-    "tool_contact_example": "needs something to touch",
-}
-"""Examples that do not end well, and what the simulated robot cannot do."""
 
 
 class Result(NamedTuple):
@@ -307,7 +303,7 @@ def main() -> None:
         print("| program | tests | passed | others | seconds |\n|---|---:|---:|---|---:|", flush=True)
         if options.examples:
             for name in chosen:
-                unknown += report(name, [library.example(name)], KNOWN_EXAMPLES)
+                unknown += report(name, [library.example(name)], {})
         else:
             for program in chosen:
                 tests = library.tests(program, options.filter)
