@@ -100,6 +100,18 @@ def test_lines_waits_and_external_control_of_polyscope_follow_one_another_and_th
         assert whole.index("def step") < whole.index("step()\n") < whole.index("sleep(10)")
 
 
+def test_a_program_that_repeats_definitions_alone_ends(folder):
+    """Repeated, it would be an endless loop; a definition beside what calls it does repeat."""
+    defined = "def step():\n  sync()\nend\n"
+    for name, text, repeats in (("a.urp", defined, False), ("b.urp", defined + "step()", True)):
+        node = f"<Script type='File'><cachedContents>{text}</cachedContents></Script>"
+        (folder.path / name).write_text(
+            polyscope(node).replace("<MainProgram>", "<MainProgram runOnlyOnce='false'>")
+        )
+        assert ("while True" in folder.read(name)) is repeats
+        assert [one for one in problems(folder.read(name)) if one.level == "error"] == []
+
+
 SENT = "# HEADER_BEGIN\ndef step():\n  sync()\nend\n# HEADER_END\nstep()\n# NODE_CONTROL_LOOP_ENDS\n"
 
 

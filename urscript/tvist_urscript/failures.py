@@ -58,6 +58,16 @@ def line_of(steps: Any) -> int | None:
     return None if found is None else found.f_lineno or 1
 
 
+def all_lines_of(steps: Any) -> set[int]:
+    """Return the lines at which a generator, and the functions that it has called, wait in compiled code."""
+    found = set()
+    while (frame := getattr(steps, "gi_frame", None)) is not None:
+        if frame.f_code.co_filename == FILE and frame.f_lasti >= 0:
+            found.add(frame.f_lineno or 1)
+        steps = steps.gi_yieldfrom
+    return found
+
+
 def name_of(steps: Any) -> str | None:
     """Return the name of the outermost function in which a generator waits, such as that of a thread."""
     while (frame := getattr(steps, "gi_frame", None)) is not None:
