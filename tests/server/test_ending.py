@@ -6,6 +6,7 @@ import sys
 import threading
 
 import pytest
+from tests.places import free_endpoint
 
 from tvist_server.ending import signals_held
 
@@ -28,6 +29,33 @@ def test_a_shutdown_that_hangs_is_cut_off_and_says_where(what, where):
     code = HANGING.format(what=what, where=f"signal.raise_signal(signal.SIGTERM); {where}")
     ended = subprocess.run([sys.executable, "-c", code], stderr=subprocess.PIPE, check=False)
     assert (ended.returncode, b"in on_and_on" in ended.stderr) == (1, True)
+
+
+SERVING = """
+import sys
+from tvist_cli.main import main
+from {module} import {owner}
+def on_and_on(*_):
+    while True: pass
+{owner}.{name} = on_and_on
+sys.argv = ["tvist", "serve", "--listen", "{endpoint}"]
+main()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    ("module", "owner", "name", "code", "why"),
+    [("tvist_controller.host", "Host", "tick", 0, "has not returned for 1.5 s"),
+     ("tvist_server.plan_ahead", "PlanAhead", "close", 1, "in on_and_on")],
+)  # fmt: skip
+def test_a_server_that_hangs_ends_at_a_signal_and_says_where(number, module, owner, name, code, why):
+    text = SERVING.format(module=module, owner=owner, name=name, endpoint=free_endpoint())
+    with subprocess.Popen([sys.executable, "-c", text], stderr=subprocess.PIPE, text=True) as serving:
+        assert "ready after" in serving.stderr.readline()
+        serving.send_signal(number)
+        assert why in serving.stderr.read()
+    assert serving.returncode == code
 
 
 @pytest.fixture(autouse=True)
