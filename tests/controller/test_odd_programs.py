@@ -14,13 +14,11 @@ from tvist_protocol import motions as m
 from tvist_protocol.codec import encode
 from tvist_protocol.programs import ProgramRun, ProgramStop
 from tvist_protocol.replies import Done
-from tvist_urscript import EVALUATIONS
-from tvist_urscript.machine import Machine
 
 from .hostile import odd
 from .robots import UR5E, Kept
 from .scripts import URSIM, a_robot, failure, playing, run, start
-from .test_hostile_programs import MOST
+from .test_hostile_programs import MOST, spending
 
 
 @pytest.fixture
@@ -37,14 +35,7 @@ def little_memory():
 @pytest.mark.parametrize("seeds", [range(100), pytest.param(range(100, 3100), marks=pytest.mark.nightly)])
 def test_a_random_program_with_odd_numbers_ends_alone(seeds, little_memory, monkeypatch):
     """Nothing is raised out of a tick, or by a function that does not blame its arguments."""
-    spent, resume = [0], Machine.resume
-
-    def counted(machine, budget=EVALUATIONS):
-        resume(machine, budget)
-        spent[0] += budget - machine.left
-        return max(machine.left, 0)
-
-    monkeypatch.setattr(Machine, "resume", counted)
+    spent = spending(monkeypatch)
     for seed in seeds:
         robot = a_robot()
         robot.send(ProgramRun, text=odd(seed))

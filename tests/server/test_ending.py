@@ -34,10 +34,10 @@ def test_a_shutdown_that_hangs_is_cut_off_and_says_where(what, where):
 SERVING = """
 import sys
 from tvist_cli.main import main
-from {module} import {owner}
+from {module} import {owner} as owner
 def on_and_on(*_):
     while True: pass
-{owner}.{name} = on_and_on
+owner.{name} = on_and_on
 sys.argv = ["tvist", "serve", "--listen", "{endpoint}"]
 main()
 """
