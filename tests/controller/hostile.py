@@ -151,7 +151,10 @@ def begin(seed: int):
     return robot, beside, texts
 
 
-ODD = "0 -1 1e-300 1e-9 0.999999 7 100 -1000 1e5 1e8 -1e8 1e160 -1e160 1e308".split()
+ODD = (
+    *("0", "-1", "1e-300", "1e-9", "0.999999", "7", "100"),
+    *("-1000", "1e5", "1e8", "-1e8", "1e160", "-1e160", "1e308"),
+)
 SETTINGS = (
     *("set_tcp(p[0, 0.01, 0.1, 0, 0, 0.5])", "set_payload(1.5, [0, 0.02, 0.05])", "set_payload_mass(2)", "force()"),
     *("set_target_payload(1, [0, 0, 0.05], [0.01, 0.01, 0.01, 0, 0, 0], 0.01)", "set_payload_cog([0, 0, 0.1])"),
