@@ -134,7 +134,6 @@ rehearse: setup
 schemas: setup
 	$(BIN)/python -m tools.blocking
 	$(BIN)/python -m tvist_protocol.generate
-	$(BIN)/python -m tvist_shaping.reference
 
 clean:
 	rm -rf .venv .venv-docs build dist .mypy_cache .ruff_cache .pytest_cache
