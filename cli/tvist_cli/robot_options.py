@@ -22,7 +22,7 @@ _BOXES = {
         "compensate_sag seed truth"
     ),
     "Real arm": "enable_motion speed_cap tcp servo_lag",
-    "Clock": "clock speed realtime_priority processor lock_memory",
+    "Clock": "clock speed realtime_priority",
     "Recording": "record keep dump",
     "Network": "listen connect namespace metrics security insecure",
     "UR's interfaces": "ur ur_address ur_ports ur_allow reserve_inputs",

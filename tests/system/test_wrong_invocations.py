@@ -73,7 +73,6 @@ MISUSE = [
     (("move",), ["target is missing"]),
     (("log", "analyze"), ["file is missing"]),
     (("keys",), ["folder is missing"]),
-    (("serve", "--processor", "-1"), ["processor", "0"]),
     (("serve", "--compile", "0"), ["compile is 0", "at least 1"]),
     (("move", "Q1", "Q2"), ["'Q2'"]),
     (("log", "replay", "a", "b", "c"), ["'c'"]),

@@ -126,7 +126,6 @@ def drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Co
             PERIOD,
             config.speed,
             priority=config.realtime_priority,
-            processor=config.processor,
         )
         return [courier], [clock]
     couriers = [Courier([robot.publisher]) for robot in robots]

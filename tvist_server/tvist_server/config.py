@@ -138,10 +138,6 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Simulation speed relative to real time."""
     realtime_priority: bool = False
     """Run the control loop with real-time priority (SCHED_FIFO), if the system permits it."""
-    processor: Annotated[int, Meta(ge=0, le=4095)] | None = None
-    """Run the control loop on this processor, counted from 0, and all other threads of the server on others [any]."""
-    lock_memory: bool = False
-    """Keep the server's memory from being swapped out, if the system permits it."""
     start: str | tuple[float, ...] | None = None
     """Pose to start in: a name from the robot file, such as Q1, Q2 or Q3, or joint angles in rad separated by commas
     [Q1; the posture of URSim with a profile]."""

@@ -1,18 +1,19 @@
-"""Runs a script without a robot: `python -m tvist_urscript FILE`."""
+"""Runs a script without a robot."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tvist_urscript.compiler import compile_script
-from tvist_urscript.dry_functions import Memory
 from tvist_urscript.errors import ScriptError
 from tvist_urscript.machine import Machine
 from tvist_urscript.values import Value
 
+from .dry_functions import Memory
+
 BUDGET = 20_000
 """Evaluations of a tick: many more than beside a robot, as nothing else has to run in it."""
-LONGEST_RUN = 100_000
-"""Ticks after which a run is given up: 200 s of the robot's time."""
+LONGEST_RUN = 2_000
+"""Ticks after which a run is given up."""
 
 
 @dataclass
@@ -32,15 +33,12 @@ class DryRun:
     error: ScriptError | None = None
 
 
-def dry_run(
-    text: str, *, inputs: Mapping[str, Sequence[Value]] | None = None, longest: int = LONGEST_RUN
-) -> DryRun:
+def dry_run(text: str, inputs: Mapping[str, Sequence[Value]] | None = None) -> DryRun:
     """Run a script without a robot.
 
     Args:
         text: The script.
         inputs: Contents of the input registers from 0 on, by kind: `int`, `double`, `bit`.
-        longest: Ticks after which it is given up.
     """
     run = DryRun()
     for kind, values in (inputs or {}).items():
@@ -49,7 +47,7 @@ def dry_run(
     try:
         script = compile_script(text, {name: entry[0] for name, entry in table.items()})
         machine = Machine(script, {name: entry[1] for name, entry in table.items()})
-        while machine.running and run.ticks < longest:
+        while machine.running and run.ticks < LONGEST_RUN:
             run.ticks += 1
             machine.resume(BUDGET)
     except ScriptError as error:
