@@ -77,14 +77,6 @@ def _parser() -> argparse.ArgumentParser:
     search.add_argument(
         "--flexible", action="store_true", help="Simulate the flexible arm in stops and streams, too."
     )
-    bound = part(
-        _bound, "bound", "Compute the least time in which moves end without vibration, beside shapers."
-    )
-    bound.add_argument("--random", type=_up_to(100_000), default=30, help="Number of random moves [30].")
-    bound.add_argument("--seed", type=_up_to(2**63 - 1), default=0, help="Seed of the random moves.")
-    bound.add_argument(
-        "--shapers", nargs="+", help="Shapers to compare [zv auto auto-target planned elastic elastic-16]."
-    )
     watch = part(
         _monitor, "monitor", "Count which changes of hidden robots are noticed within three motions."
     )
@@ -304,15 +296,6 @@ def _check_built_in(given: argparse.Namespace) -> None:
 
     if unknown := set(given.shapers or ()) - set(BUILT_IN.names()):
         given.refuse(f"there is no shaper {min(unknown)}")
-
-
-def _bound(given: argparse.Namespace) -> int:
-    from proof.bound.report import SHAPERS, compare, report, tables
-
-    _check_built_in(given)
-    result = report(compare(given.random, given.seed, given.shapers or SHAPERS))
-    _print(result, given.json, tables(result))
-    return 0
 
 
 def _monitor(given: argparse.Namespace) -> int:

@@ -51,7 +51,7 @@ PARTS: dict[str, tuple[str, ...]] = {
 }
 VALUES = {
     "SHAPERS": "The catalogue: every `Shaper` that comes with the package, by its name, shortest first.",
-    "DESIGNS": "Constructors of designs with names: `auto`, `short`, `auto-target`, `planned`, `elastic-auto`.",
+    "DESIGNS": "Constructors of designs with names: `auto`, `short`, `auto-target`, `elastic-auto`.",
     "BUILT_IN": "The `Registry` of the shapers and designs that come with the package.",
 }
 """Exported values, with descriptions, since values have no docstrings at run time."""

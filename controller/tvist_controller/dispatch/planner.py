@@ -11,7 +11,6 @@ from tvist_controller.planning.path_planner import PathPlanner
 from tvist_controller.planning.plan import Basis, Plan
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.programs.compiling import ScriptCompiler
-from tvist_controller.quiet.interior_point import rehearse
 from tvist_controller.setup import Setup
 from tvist_protocol.commands import Command
 from tvist_protocol.lessons import Lesson, MotionLesson
@@ -45,7 +44,6 @@ class Planner:
 
     def rehearse_plans(self) -> None:
         """Compile what is not inverse kinematics."""
-        rehearse()
         self._paths.rehearse()
 
     def rehearse_scripts(self) -> None:
