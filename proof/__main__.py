@@ -168,12 +168,6 @@ def _add_bridge(parts: Any, part: Callable[..., argparse.ArgumentParser]) -> Non
     motions.add_argument(
         "--random", type=_up_to(100_000), default=100, help="Random moves after the paper's motions [100]."
     )
-    learn = part(_learn, "learn", "Let hidden robots learn motions, inside them and in front of them.", among)
-    learn.add_argument(
-        "--robots", type=_up_to(1000), default=2, help="Hidden robots, of two arms in turn [2]."
-    )
-    learn.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one [0].")
-    learn.add_argument("--repetitions", type=_up_to(1000), default=7, help="How often each is made [7].")
     figure = part(_figure, "figure", "Draw the end of a motion that is shaped in front of a robot.", among)
     figure.add_argument("--seed", type=_up_to(2**31 - 1), default=1, help="Seed of the robot [1].")
     figure.add_argument("--output", type=Path, default=Path("bridge.png"), help="File to write [bridge.png].")
@@ -417,14 +411,6 @@ def _identify(given: argparse.Namespace) -> int:
     from proof.bridge.identify import report, tables
 
     result = report(max(given.robots, 1), given.seed, [500 // rate for rate in given.rates], _tell)
-    _print(result, given.json, tables(result))
-    return 0
-
-
-def _learn(given: argparse.Namespace) -> int:
-    from proof.bridge.learning import report, tables
-
-    result = report(max(given.robots, 1), given.seed, max(given.repetitions, 1), _tell)
     _print(result, given.json, tables(result))
     return 0
 
