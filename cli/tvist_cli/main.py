@@ -43,7 +43,7 @@ GROUPS = {
         "view": "Show a robot on a web page, its vibration magnified.",
         "stop": "Stop a served robot, whoever has control; exit code 0 if it is at rest.",
         "unlock": "Make a stopped robot ready to be moved again; exit code 0 if it is.",
-        "forget": "Undo what a served robot has learnt from its motions.",
+        "forget": "Undo what a served robot has learnt of its payload.",
     },
     "Logs": {
         "log": f"Recordings, and other robots' logs: {', '.join(LOG)}.",

@@ -248,7 +248,7 @@ class TestDishonesty:
     def test_who_is_told_the_target_is_said_and_may_know_nothing_else(self, ur5e, modal, task):
         told = {one.name for one in bench(ur5e, modal, None, None) if one.told_target}
         frozen = {"zv_frozen_at_end", "zv_3_modes_frozen_at_end"}
-        assert told == {"auto-target", "planned", *frozen, "double_s_as_zv", "double_s_as_auto"}
+        assert told == {"auto-target", *frozen, "double_s_as_zv", "double_s_as_auto"}
 
         class Untold(Named):
             told_target = False

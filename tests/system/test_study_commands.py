@@ -126,13 +126,6 @@ def pair_by_pair(told, _):
     assert "not held out" in told["held_out"]
 
 
-def ever_less(told, _):
-    """Each plant has a figure of each repetition."""
-    (plant,) = told["plants"]
-    assert (plant["plant"], plant["moves"], len(plant["repetitions"])) == ("springs-30", 1, 3)
-    assert plant["repetitions"][2]["median"] > plant["repetitions"][0]["median"]
-
-
 RANDOM = "evaluate --random 2 --seed 5 --payload uniform --clean --shaper auto --no-baselines --save-moves drawn.json"
 MAP = (
     "study map --points 5 --payload 1 --calibration ur5e_modal --shaper zvd --figures . --format svg --width 1 "
@@ -150,7 +143,6 @@ RUNS = {
         set(),
         pair_by_pair,
     ),
-    "learning": ("study learning --moves 1 --repetitions 2 --plants springs-30 --seed 5", set(), ever_less),
     "paths": (
         "study paths --random 1 --kind arc --shapers zv auto --seed 3 --payload 5 --clean --markdown page.md",
         set(),

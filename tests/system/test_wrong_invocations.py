@@ -113,8 +113,6 @@ MISUSE = [
     (("study", "paths", "--random", "0"), ["random is 0", "1 to 100000"]),
     (("study", "paths", "--kind", "spiral"), ["--kind is 'spiral'", "line, arc, blends"]),
     (("study", "paths", "--shapers", "zzz"), ["'zzz'", "zvd"]),
-    (("study", "learning", "--shaper", "nonsense"), ["'nonsense'", "elastic-auto"]),
-    (("study", "learning", "--shaper", "elastic-7"), ["length of elastic is 7", "8 to 60 ms"]),
     (("study", "tracking", "--speeds", "0"), ["speeds has 0", "at most 3.1"]),
     (("study", "tracking", "--tolerance", "0"), ["tolerance is 0", "more than 0"]),
     (("study", "tracking", "--payload", "9"), ["payload is 9", "0 to 5"]),

@@ -17,7 +17,7 @@ from tvist_cli.serving import leave
 from tvist_server.config import ConfigError, ServeConfig
 
 OPTIONS = {
-    "robot", "profile", "payload", "overload", "adapt", "learn", "shaper", "shape_servo", "plant", "hidden", "start",
+    "robot", "profile", "payload", "overload", "adapt", "shaper", "shape_servo", "plant", "hidden", "start",
     "seed", "record", "truth", "listen", "ur", "ur_allow", "cell", "world",
 }  # fmt: skip
 """Options of `tvist serve` that one robot which ends with its program can do with."""
