@@ -46,10 +46,6 @@ def make(figures, recorded, found):
             for place in range(1, count + 1)
         ]
 
-    def paths():
-        way = {"reduction_percent": 90.0, "in_motion_ratio": 0.9, "off_mm": 0.1}
-        return [{"unshaped_peak_m_s2": 1.0, "shaped": {"zv": {"along": way, "joints": way}}}] * 3
-
     def entries():
         reduction = {"median": 90.0, "p5": 80.0}
         return [
@@ -86,7 +82,6 @@ def make(figures, recorded, found):
         "robustness": lambda: figures.robustness_figure(leaderboard("robustness")),
         "moves": lambda: figures.residual_by_move_figure(judged(4)),
         "one_move": lambda: figures.vibration_figure(recorded[0][0], recorded[1][0], 3),
-        "paths": lambda: figures.path_shaping_figure(paths()),
         "identified": lambda: figures.identified_figure(calibration, q, f_d, zeta, f_d, zeta),
         "map": lambda: figures.workspace_map_figure(found, "f_d_hz", "an arm", 1),
         "map over two columns": lambda: figures.workspace_map_figure(found, "zeta", "an arm", 2),
@@ -103,7 +98,7 @@ def make(figures, recorded, found):
 NAMES = [
     "figure_1", "figure_3", "figure_4", "figure_7", "figure_8", "figure_12", "observed", "figure_15", "figure_16",
     "after_stop", "ring_down", "catalogue", "sensitivity", "settling_against_delay", "elastic", "mean_delay", "pareto",
-    "settling", "robustness", "moves", "one_move", "paths", "identified", "map", "map over two columns",
+    "settling", "robustness", "moves", "one_move", "identified", "map", "map over two columns",
     "no move that counts", "compared", "sweep",
 ]  # fmt: skip
 
