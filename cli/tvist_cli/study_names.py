@@ -5,6 +5,5 @@ STUDY = {
     "robustness": "Compare shapers on arms that are softer, loaded otherwise or worse than they are told.",
     "match": "Compare two shapers on the same moves and plants, with intervals, and say which is better where.",
     "learning": "Make each move several times, and see what a robot that learns its motions leaves each time.",
-    "map": "Map frequency, damping and a shaper's delay over the workspace, identified against true.",
 }
 """Names with their one-line help."""

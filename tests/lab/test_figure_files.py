@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.api.line import load_calibration
-from tvist_lab.studies.workspace_map import WorkspaceMap
+from tvist_lab.identification.workspace_map import WorkspaceMap
 from tvist_shaping import SHAPERS
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -24,7 +24,7 @@ LEAST_POINTS = {1: 5.5, 2: 7.0}
 @pytest.fixture(scope="module")
 def found():
     grid = np.linspace(6.0, 15.0, 9).reshape(3, 3)
-    told = {"f_d_hz": grid, "zeta": 0.02 * grid, "delay_ms": 500.0 / grid}
+    told = {"f_d_hz": grid, "zeta": 0.02 * grid}
     true = {key: 1.03 * value for key, value in told.items()}
     true["zeta"] = true["zeta"] + 0.001 * grid**0.5
     angles = np.linspace(-1.0, 1.0, 3)

@@ -44,14 +44,6 @@ def made_again(told, folder):
     assert not any(word in web_page for word in ("p5", "median", "one of twenty"))
 
 
-def over_two_joints(told, _):
-    """A map is of one arm, with errors of each quantity."""
-    assert (told["robot"], told["payload_kg"], told["shaper"]) == ("ur5e", 1.0, "zvd")
-    for key, maps in told["maps"].items():
-        assert [len(maps[kind]) for kind in ("identified", "true", "error_percent")] == [5, 5, 5]
-        assert told["errors"][key]["median_percent"] < 10.0
-
-
 def as_they_are(told, _):
     """Every shaper is listed as it is."""
     assert (told["f_d_hz"], told["zeta"]) == (6.7, 0.34)
@@ -107,10 +99,6 @@ def ever_less(told, _):
 
 
 RANDOM = "evaluate --random 2 --seed 5 --payload uniform --clean --shaper auto --no-baselines --save-moves drawn.json"
-MAP = (
-    "study map --points 5 --payload 1 --calibration ur5e_modal --shaper zvd --figures . --format svg --width 1 "
-    "--output out.json"
-)
 RUNS = {
     "evaluate": (f"{RANDOM} --figures . --report report.html", {"moves.png", "one_move.png"}, made_again),
     "robustness": (
@@ -124,7 +112,6 @@ RUNS = {
         pair_by_pair,
     ),
     "learning": ("study learning --moves 1 --repetitions 2 --plants springs-30 --seed 5", set(), ever_less),
-    "map": (MAP, {"map_f_d.svg", "map_zeta.svg", "map_delay.svg"}, over_two_joints),
     "shapers": (
         "shapers --f-d 6.7 --zeta 0.34 --figures .",
         {"shapers.png", "settling.png", "mean_delay.png", "elastic.png"},
@@ -138,7 +125,6 @@ RUNS = {
 }
 """Commands, the figures that they write, and what is asked of their results."""
 SAID = {
-    "study map --points 3 --robot one-joint": (["f_d Hz", "error % median"], []),
     "shapers": ([f"{name} " for name in SHAPERS] + [one.description for one in SHAPERS.values()], []),
     "shapers --sensitivity": (["5 % from"], []),
 }  # fmt: skip

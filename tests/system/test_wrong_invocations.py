@@ -113,9 +113,6 @@ MISUSE = [
     (("study", "sweep", "x.toml", "--processes", "2", "--scheduler", "x"), ["either --processes or --scheduler"]),
     (("study", "learning", "--shaper", "nonsense"), ["'nonsense'", "elastic-auto"]),
     (("study", "learning", "--shaper", "elastic-7"), ["length of elastic is 7", "8 to 60 ms"]),
-    (("study", "map", "--points", "2"), ["points is 2", "3 to 501"]),
-    (("study", "map", "--shaper", "auto"), ["shaper is 'auto'", "zvd"]),
-    (("study", "map", "--robot", "one-joint", "--calibration", "ur5e_5kg"), ["ur5e_5kg is for a UR5e"]),
     (("shapers", "--sensitivity", "zzz"), ["shaper is 'zzz'", "zvd"]),
     (("shapers", "--sensitivity", "--errors", "5", "1"), ["errors is 5 1", "-90 to 900"]),
     (("shapers", "--sensitivity", "--zeta", "2"), ["zeta is 2", "less than 1"]),
@@ -178,7 +175,6 @@ MISUSE = [
     # names and choices
     (("identify", "--payloads", "0,5"), ["payloads", "--model modal"]),
     (("identify", "--model", "modal", "--at", "Q1"), ["at is for the polynomial model"]),
-    (("identify", "--model", "modal", "--figures", "x"), ["figures is for the polynomial model"]),
     (("serve", "--dump", "nowhere"), ["dump is 'nowhere'", "a folder"]),
     (("serve", "--ur", "--ur-allow", "300.1.1.1"), ["'300.1.1.1'", "an IP address"]),
     (("serve", "--reserve-inputs", "speed"), ["reserve_inputs has 'speed'", "speed_slider_mask"]),

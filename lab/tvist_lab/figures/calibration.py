@@ -20,17 +20,15 @@ from tvist_lab.figures.style import (
     legend,
     note,
     panels,
-    remark,
     title,
 )
+from tvist_lab.identification.workspace_map import WorkspaceMap
 from tvist_lab.recordings import Floats
-from tvist_lab.studies.workspace_map import WorkspaceMap
 from tvist_protocol.calibration import Calibration
 
 LABELS = {
     "f_d_hz": ("$f_d$", "damped frequency of the lowest mode", "Hz"),
     "zeta": (r"$\zeta$", "damping ratio of the lowest mode", "–"),
-    "delay_ms": (r"$\Delta$", "delay of the shaper", "ms"),
 }
 """Key of a map to its symbol, its meaning and its unit."""
 SMALL = 7.0
@@ -83,7 +81,7 @@ def workspace_map_figure(found: WorkspaceMap, key: str, words: str, columns: int
 
     Args:
         found: The maps.
-        key: "f_d_hz", "zeta" or "delay_ms".
+        key: "f_d_hz" or "zeta".
         words: What they are of, for the heading.
         columns: Columns of the journal.
     """
@@ -136,8 +134,6 @@ def _map(
         note(panel, ", ".join(names), (x, y), (5, 4), fontsize=SMALL)
     for axis in (panel.xaxis, panel.yaxis):
         axis.set_major_locator(MultipleLocator(60.0))
-    if np.isnan(values).all():
-        remark(panel, "no free configuration", (0.5, 0.5), ha="center")
     return drawn
 
 
