@@ -8,13 +8,11 @@ import pytest
 from tests.controller.robots import NoArm
 from tests.lab.test_programs import MOVES, run
 
-from tvist_cli.output import write_report
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.programs.account import as_dict
 from tvist_lab.programs.baseline import BaselineError, changes, read_baseline
 from tvist_lab.programs.junit import junit
 from tvist_lab.programs.limits import Limits
-from tvist_lab.report import programs_page, render
 
 UNCOMPILED = {
     "file": "wrong.script",
