@@ -102,7 +102,7 @@ RANDOM = "evaluate --random 2 --seed 5 --payload uniform --clean --shaper auto -
 RUNS = {
     "evaluate": (f"{RANDOM} --figures . --report report.html", {"moves.png", "one_move.png"}, made_again),
     "robustness": (
-        "study robustness --moves 1 --against zv --output out.json --markdown page.md --figures .",
+        "study robustness --moves 1 --against zv --output out.json --figures .",
         {"robustness.png"},
         with_each_error,
     ),
@@ -147,8 +147,6 @@ def test_a_result_is_right_and_what_is_written_is_what_is_printed(here, name):
     assert all((here / figure).stat().st_size > 5000 for figure in figures)
     if "--output" in words:
         assert json.loads((here / "out.json").read_text(encoding="utf-8")) == told
-    if "--markdown" in words:
-        assert f"```sh\ntvist {words} --json\n```" in (here / "page.md").read_text(encoding="utf-8")
     if "--report" in words:
         assert (here / "report.html").read_text(encoding="utf-8").count("<img") == len(figures)
 
