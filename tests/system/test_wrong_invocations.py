@@ -9,7 +9,6 @@ import pytest
 from tests.conformance.served import free_endpoint
 
 from tvist_cli import main
-from tvist_cli.misuse import INSTEAD
 
 MSGSPEC = re.compile(
     r"Expected `|Object (missing|contains)|Invalid enum|at `\$|is malformed|Traceback|Errno|Unused"
@@ -311,15 +310,6 @@ def test_a_wrong_line_of_the_roles_is_named(called, tmp_path, line, words):
     ended = called("serve", "--security", ".", "--listen", f"tls/{free_endpoint().partition('/')[2]}")
     assert_said(ended, ended[0], ["clients.toml", *words])
     assert ended[0] in {1, 2}
-
-
-@pytest.mark.parametrize("name", INSTEAD)
-def test_a_command_that_has_another_name_now_says_it(called, name):
-    assert_said(called(name), 2, [INSTEAD[name]])
-    program, *words = INSTEAD[name].split()
-    if program == "tvist":
-        code, out, _ = called(*(word for word in words if word != "FILE"), "--help")
-        assert (code, not out) == (0, False)
 
 
 def test_there_are_no_more_commands_than_one_overlooks():
