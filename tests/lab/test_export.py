@@ -205,15 +205,15 @@ class TestCommands:
             writer.finish({})
         return path
 
-    def test_export_names_the_file_after_the_recording_and_replaces_none(self, path, capsys):
+    def test_export_names_the_file_after_the_recording_and_replaces_only_a_named_one(self, path, capsys):
         export_command(path, to="CSV", json=True)
         written = json.loads(capsys.readouterr().out)["written"]
         assert written == [str(path.with_name(name)) for name in ("run.csv", "run.csv-metadata.json")]
-        with pytest.raises(Failure, match=r"run\.csv exists already: give --force"):
+        with pytest.raises(Failure, match=r"run\.csv exists already: choose .* with --output"):
             export_command(path, to="csv")
-        export_command(path, to="csv", force=True)
+        export_command(path, to="csv", output=path.with_name("run.csv"))
         with pytest.raises(Failure, match="is the file to be exported"):
-            export_command(path.with_name("run.csv"), to="csv", force=True)
+            export_command(path.with_name("run.csv"), to="csv")
         with pytest.raises(Failure, match="to is 'xls': must be one of csv"):
             export_command(path, to="xls")
 
