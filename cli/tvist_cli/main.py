@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 ABOUT = "A robot controller for a flexible arm in simulation, with time-varying input shaping."
 LOG = {
     "record": "Record a served robot as MCAP.",
-    "info": "Print what a recording holds.",
-    "analyze": "Measure the motions of a recording, or of another robot's log.",
+    "analyze": "Say what a recording or a log holds and measure its motions, or compare two.",
     "advise": "Say from logs what rings, and which shaper to take.",
-    "compare": "Compare two recordings of the same motions, motion by motion.",
     "report": "Write a web page about recordings: a verdict, tables and figures in one file.",
     "export": "Write a recording as CSV, Parquet, npz or mat, or for Foxglove.",
     "fit": "Fit a robot file to logs, with which a simulated arm does what the robot did.",
