@@ -45,9 +45,8 @@ def test_a_few_ring_downs_make_a_calibration(tmp_path):
 
 @pytest.mark.nightly
 def test_people_get_tables_of_springs_and_of_errors(tmp_path):
-    ended = tvist(
-        "identify", "--model", "modal", "--ring-downs", 4, "--payloads", "5", "--figures", "maps", cwd=tmp_path
-    ).assert_done()
+    options = ("--model", "modal", "--ring-downs", 4, "--payloads", "5", "--figures", "maps")
+    ended = tvist("identify", *options, cwd=tmp_path).assert_done()
     for words in ("gear stiffness", "breakaway", "95 %", "true modes", "calibration.json"):
         assert words in ended.out
     assert {path.name for path in (tmp_path / "maps").iterdir()} == {"map_f_d.png", "map_zeta.png"}
