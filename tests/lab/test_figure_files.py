@@ -150,8 +150,9 @@ def test_axes_have_units_and_text_is_large_enough_and_within_the_figure(make, se
     set_style(WIDTHS[columns])
     figure = make(name)
     from tvist_lab.figures.files import fit
+    from tvist_lab.figures.style import width
 
-    fit(figure)
+    fit(figure, width())
     figure.draw_without_rendering()
     labels = [
         axis.label.get_text()

@@ -79,19 +79,19 @@ def save(figure: Figure, path: str | Path, *, style: str = "") -> Path:
         figure.set_label(style)
         _scale(figure, LARGER)
         figure.set_size_inches(figure.get_figwidth(), LARGER**0.5 * figure.get_figheight())
-    fit(figure)
+    fit(figure, width())
     dpi = own().get("savefig.dpi", DPI)
     with mpl.rc_context(FONTS):
         figure.savefig(file, dpi=dpi, metadata=STABLE.get(file.suffix))
     return file
 
 
-def fit(figure: Figure) -> None:
-    """Give a figure its width, with text that remains readable and within its panel.
+def fit(figure: Figure, wide: float) -> None:
+    """Give a figure a width [inch], with text that remains readable and within its panel.
 
     A figure that has this width already keeps its size.
     """
-    wide, (now, height) = width(), figure.get_size_inches()
+    now, height = figure.get_size_inches()
     if abs(wide - now) > 1e-6:
         lower, smaller = (np.interp(wide, (COLUMN, WIDTH), (share, 1.0)) for share in (LOWER, SMALLER))
         figure.set_size_inches(wide, height * float(lower))
