@@ -66,7 +66,6 @@ MISUSE = [
     (("move", "Q1", "-x"), ["no option -x"]),
     (("move", "--", "-0.5,0", "--endpoint", NOWHERE), ["--endpoint comes after --", "give it before"]),
     (("move",), ["target is missing"]),
-    (("log", "analyze"), ["file is missing"]),
     (("keys",), ["folder is missing"]),
     (("serve", "--processor", "-1"), ["processor", "0"]),
     (("serve", "--compile", "0"), ["compile is 0", "at least 1"]),
