@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from tools.tables.pages import page_of
 
 from tvist_controller.calibrations import load as load_calibration
 from tvist_lab.figures import robustness_figure
-from tvist_lab.studies.pages import page
-from tvist_lab.studies.robustness import ERRORS, PLANT, columns, jobs, report, tables
+from tvist_lab.studies.robustness import ERRORS, PLANT, columns, jobs, report
 from tvist_lab.study.arms import PERTURBED, stiffer
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import bench
@@ -57,11 +57,8 @@ def test_the_report_is_ordered_by_delay_and_names_what_does_not_count(done):
         "reduction_percent_interval": {"median": None, "p5": None},
         "beyond_waiting_percent": {"median": None, "p5": None},
     }
-    about = {"moves": 1, "seed": 0, "robot": "UR5e", "shapers": entries}
-    more = {
-        "plants": [(one.name, one.label) for one, _ in columns()[PLANT].values()],
-    }
-    written = page("robustness", about, "a command", tables=tables(), **more)
+    result = {"moves": 1, "seed": 0, "robot": "UR5e", "hidden": [], "shapers": entries}
+    written = page_of("robustness", result)
     assert all(f"{100 * error:+.0f} %" in written for errors in ERRORS.values() for error in errors)
     assert all(f"| {name} |" in written for name in PERTURBED)
     assert "these moves are not held out" in written

@@ -99,7 +99,7 @@ def run(
         print_json(results[0] if len(file) == 1 else _together(results, failure))
     elif failure is None:
         say(ran[0].account if len(file) == 1 else f"{len(file)} programs ran as they should")
-    files.write(results, limits.given)
+    files.write(results)
     sys.stdout.flush()
     server = ran[0].server
     if server is not None and not server.left:

@@ -1,4 +1,7 @@
-"""A film of recorded runs, for slides and documents: the page's own scene, drawn picture by picture by a browser."""
+"""`python -m tools.film`: makes the film at the top of the README, light and dark.
+
+It is the scene of `tvist view --compare none zv`, drawn picture by picture by a browser.
+"""
 
 import asyncio
 import io
@@ -6,17 +9,21 @@ import shutil
 import tempfile
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from PIL import Image
 from websockets.exceptions import ConnectionClosed
 
+from tvist_cli.output import progress
+from tvist_cli.tracks import MAGNIFY, compared
 from tvist_view.signals import BRAKES_S
 from tvist_view.stage import Tab, open_stage, page
 from tvist_view.track import Track
 
+IMAGES = Path(__file__).parents[1] / "docs" / "images"
+SIZE = (1200, 760)
+"""Width and height of the film [px]."""
 RATE = 25
 """Pictures a second."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
@@ -43,24 +50,13 @@ LEAD_S = 0.25
 HOLD_S = 2.0
 """Time for which the last picture stays [s]."""
 QUALITY = 76
-"""Of a WebP's pictures, of 100."""
+"""Of its pictures, of 100."""
+SHAPERS = ("none", "zv")
+"""Shapers that the film compares."""
 
 
 class FilmError(RuntimeError):
     """The film cannot be made."""
-
-
-@dataclass(frozen=True)
-class Format:
-    """What a film is to look like."""
-
-    width: int = 1200
-    """[px]."""
-    height: int = 760
-    """[px]."""
-    theme: Literal["light", "dark"] = "light"
-    rate: int = RATE
-    """Pictures a second."""
 
 
 class Film:
@@ -70,7 +66,8 @@ class Film:
         tracks: The runs; their times are those of one clock.
         factor: Magnification of the bending.
         result: What the comparison of two runs says, as `playback.said` makes it; None: nothing.
-        look: What it is to look like.
+        theme: Whether it is light or dark.
+        size: Width and height [px].
     """
 
     def __init__(
@@ -78,9 +75,9 @@ class Film:
         tracks: Sequence[Track],
         factor: float,
         result: dict[str, Any] | None = None,
-        look: Format | None = None,
+        theme: str = "light",
+        size: tuple[int, int] = SIZE,
     ) -> None:
-        self._look = look or Format()
         self.start = min(track.start for track in tracks)
         self.end = max(track.end for track in tracks)
         self._stops = [track.stops for track in tracks]
@@ -93,9 +90,9 @@ class Film:
         first = self._stops[0]
         self._boot = {
             "kind": "film",
-            "width": self._look.width,
-            "height": self._look.height,
-            "theme": self._look.theme,
+            "width": size[0],
+            "height": size[1],
+            "theme": theme,
             "factor": factor,
             "tracks": [track.packed(self.start) for track in tracks],
             "most": 1.2 * max(*after, 0.1) if after else max(largest, 0.1),
@@ -109,7 +106,7 @@ class Film:
         """Simulation times of the pictures: in slow motion after each stop [s]."""
         found = [self.start]
         while found[-1] < self.end:
-            found.append(found[-1] + 1.0 / (self._look.rate * (SLOW if self._slow(found[-1]) else 1)))
+            found.append(found[-1] + 1.0 / (RATE * (SLOW if self._slow(found[-1]) else 1)))
         return found[:-1] or found
 
     def _slow(self, time: float) -> bool:
@@ -152,21 +149,18 @@ class Film:
             return found
 
     def write(self, file: Path, progress: Callable[[], None] = lambda: None) -> None:
-        """Write all pictures as an animated WebP or GIF, by the file's suffix.
+        """Write all pictures as an animated WebP.
 
         Raises:
             FilmError: See `pictures`.
             OSError: The file cannot be written.
         """
-        pictures = asyncio.run(self.pictures(self.times(), progress))
-        tick = round(1000 / self._look.rate)
-        durations = [tick] * (len(pictures) - 1) + [round(1000 * HOLD_S)]
-        options: dict[str, Any] = {"quality": QUALITY, "method": 4, "minimize_size": True}
-        if file.suffix.lower() == ".gif":
-            options = {"optimize": True}
-            pictures = [one.quantize(colors=128, dither=Image.Dither.NONE) for one in pictures]
-        first, *later = pictures
-        first.save(file, save_all=True, append_images=later, duration=durations, loop=0, **options)
+        first, *later = asyncio.run(self.pictures(self.times(), progress))
+        durations = [round(1000 / RATE)] * len(later) + [round(1000 * HOLD_S)]
+        first.save(
+            file, save_all=True, append_images=later, duration=durations, loop=0, quality=QUALITY, method=4,
+            minimize_size=True,
+        )  # fmt: skip
 
 
 def browser() -> str | None:
@@ -191,3 +185,16 @@ async def _browser(url: str) -> AsyncIterator[asyncio.subprocess.Process]:
             with suppress(ProcessLookupError):
                 process.kill()
             await process.wait()
+
+
+def main() -> None:
+    """Simulate both arms, and write the film."""
+    shows = compared(SHAPERS, "ur5e")
+    for theme in ("light", "dark"):
+        film = Film(shows.tracks, MAGNIFY, shows.result, theme)
+        with progress(len(film.times()), "pictures") as advance:
+            film.write(IMAGES / f"without-and-with-{theme}.webp", lambda: advance(1, None))
+
+
+if __name__ == "__main__":
+    main()

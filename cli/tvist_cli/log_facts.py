@@ -1,41 +1,18 @@
-"""`tvist log info`: what a recording holds."""
+"""What a recording or a log holds, in words."""
 
-from pathlib import Path
 from typing import Any
 
-from tvist_cli.failure import told
-from tvist_cli.log_options import AS_IT_IS, LogOptions
-from tvist_cli.output import out, print_json, table, words
+from tvist_cli.output import out, words
 
 
-def info(file: Path, *, logs: LogOptions = AS_IT_IS, json: bool = False) -> None:
-    """Print what a recording or a log holds: its robot, time, events, and its columns with their shapes and units.
+def show_facts(found: dict[str, Any]) -> None:
+    """Print a file's robot, time, events, and its columns with their shapes and units.
 
     Args:
-        file: A recording, an exported file, or any log that tvist log analyze reads.
-        logs: How to read logs.
-        json: Print one JSON object.
+        found: What `tvist_lab.summary.summary` returns.
     """
-    from tvist_lab.recordings import RecordingError
-    from tvist_lab.summary import summary
-
-    with told(RecordingError):
-        found = summary(file, logs.read(file, sensor=True)[0] if logs.given else None)
-    if json:
-        print_json(found)
-        return
-    out.print(str(file), markup=False)
+    out.print(found["file"], markup=False)
     words(_facts(found))
-    table(
-        "columns",
-        ("name", "shape", "unit"),
-        [
-            (column["name"], " × ".join(map(str, column["shape"])), column["unit"] or "–")
-            for column in found["columns"]
-        ],
-    )
-    for note in found["notes"]:
-        out.print(note, markup=False)
 
 
 def _facts(found: dict[str, Any]) -> dict[str, str]:
@@ -51,13 +28,18 @@ def _facts(found: dict[str, Any]) -> dict[str, str]:
         facts["closed"] = "yes" if found["complete"] else "no: cut off or damaged"
         facts["replay"] = "yes" if found["replayable"] else f"no: it {_lack(found['from_tick'])}"
         facts["messages"] = ", ".join(f"{count} {kind}" for kind, count in found["messages"].items())
-    if found["motions"] is not None:
-        facts["motions"] = str(found["motions"])
     facts["events"] = ", ".join(f"{count} {kind}" for kind, count in found["events"].items()) or "none"
     if found["bytes"] is not None:
         size = found["bytes"]
         facts["size"] = f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.1f} kB"
+    facts["columns"] = ", ".join(map(_column, found["columns"]))
     return facts
+
+
+def _column(column: dict[str, Any]) -> str:
+    _, *shape = column["shape"]
+    words = (column["name"], " × ".join(map(str, shape)), column["unit"] and f"[{column['unit']}]")
+    return " ".join(filter(None, words))
 
 
 def _lack(from_tick: int | None) -> str:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -12,14 +11,11 @@ from tvist_lab.workspace import identified, ranges, workspace
 from tvist_plant.description import RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.calibration import Calibration
-from tvist_shaping import Shaper
 
-QUANTITIES = {"f_d_hz": "f_d", "zeta": "zeta", "delay_ms": "delay"}
+QUANTITIES = {"f_d_hz": "f_d", "zeta": "zeta"}
 """Keys of the maps, with the words in the names of their files."""
-
-
-class MapError(ValueError):
-    """There is no map of this arm; the message says why."""
+POINTS = 41
+"""Number of angles of each joint."""
 
 
 @dataclass(frozen=True)
@@ -45,30 +41,11 @@ class WorkspaceMap:
         """Deviation of what is identified from what is true [%], shape (R, C)."""
         return np.asarray(100.0 * (self.identified[key] / self.true[key] - 1.0))
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the content of `tvist study map --json`; null stands for configurations that collide."""
-        rows, columns = self.names
-        return {
-            "rows": {"joint": rows, "angles_rad": self.angles[0].tolist()},
-            "columns": {"joint": columns, "angles_rad": self.angles[1].tolist()},
-            "other_joints_rad": list(self.rest),
-            "left_out": int(np.count_nonzero(np.isnan(self.true["f_d_hz"]))),
-            "maps": {
-                key: {
-                    "identified": _plain(self.identified[key]),
-                    "true": _plain(self.true[key]),
-                    "error_percent": _plain(self.error(key)),
-                }
-                for key in QUANTITIES
-            },
-            "errors": {key: _spread(self.error(key)) for key in QUANTITIES},
-        }
-
 
 def workspace_map(
-    description: RobotDescription, calibration: Calibration, shaper: Shaper, mass: float, points: int
-) -> WorkspaceMap:
-    """Compute f_d and ζ of the lowest mode and the delay of a shaper on a grid over two joints.
+    description: RobotDescription, calibration: Calibration, mass: float, points: int = POINTS
+) -> WorkspaceMap | None:
+    """Compute f_d and ζ of the lowest mode on a grid over two joints.
 
     The grid is over the first two joints that change the modes: for a six-joint arm, shoulder and elbow. The other
     joints are in the middle of the workspace. The payload is both carried and declared.
@@ -76,20 +53,17 @@ def workspace_map(
     Args:
         description: The robot.
         calibration: Its calibration; a modal model is used if there is one, else the polynomials.
-        shaper: Shaper whose last impulse is the delay.
         mass: Mass of the disc on the flange [kg].
         points: Number of angles of each joint.
 
+    Returns:
+        The maps; None if the arm has one joint, or would touch itself or the floor at each place of the grid.
+
     Raises:
-        MapError: The calibration belongs to another arm, or the arm has fewer than two joints.
         EstimatorError: The calibration does not fit the arm.
     """
-    if calibration.robot != description.robot.model:
-        raise MapError(
-            f"calibration {calibration.name} is for a {calibration.robot}, but this arm is a {description.robot.model}"
-        )
     if description.joints < 2:
-        raise MapError(f"robot {description.robot.name} has one joint: a map is over two")
+        return None
     limits = ranges(description)
     changing, whole = identified(limits), workspace(limits)
     count = min(len(whole.low), description.joints)
@@ -116,9 +90,10 @@ def workspace_map(
         f_d, zeta = estimator.settle(q)
         modes = arm.modes(q)
         for maps, mode in ((told, (f_d[0], zeta[0])), (true, (modes.f_d[0], modes.zeta[0]))):
-            values = (*mode, 1e3 * shaper.impulses(float(mode[0]), float(mode[1])).duration)
-            for key, value in zip(QUANTITIES, values, strict=True):
+            for key, value in zip(QUANTITIES, mode, strict=True):
                 maps[key][row, column] = value
+    if np.isnan(true["zeta"]).all():
+        return None
     joints = description.robot.joints
     poses = {name: (q[first], q[second]) for name, q in description.poses.items()}
     return WorkspaceMap(
@@ -134,19 +109,3 @@ def workspace_map(
             if all(grid[0] - 1e-6 <= angle <= grid[-1] + 1e-6 for grid, angle in zip(angles, at, strict=True))
         },
     )
-
-
-def _plain(grid: Floats) -> list[list[float | None]]:
-    return [[None if np.isnan(value) else float(value) for value in row] for row in grid]
-
-
-def _spread(error: Floats) -> dict[str, float | None]:
-    """Median, 95th percentile and largest of the error's size [%]."""
-    size = np.abs(error[~np.isnan(error)])
-    if not size.size:
-        return {"median_percent": None, "p95_percent": None, "max_percent": None}
-    return {
-        "median_percent": float(np.median(size)),
-        "p95_percent": float(np.percentile(size, 95)),
-        "max_percent": float(size.max()),
-    }

@@ -1,10 +1,10 @@
-"""`tvist log compare`: two recordings of the same motions side by side."""
+"""Two recordings of the same motions side by side."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
-from tvist_cli.log_options import AS_IT_IS, LogOptions
+from tvist_cli.log_options import LogOptions
 from tvist_cli.output import number, out, print_json, say, table
 
 if TYPE_CHECKING:
@@ -16,18 +16,8 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def compare(a: Path, b: Path, *, logs: LogOptions = AS_IT_IS, json: bool = False) -> None:
-    """Compare two recordings or logs of the same motions, as without and with shaping.
-
-    Motions correspond if they start and end at the same joint angles within 0.02 rad. Those that only one file
-    contains are listed, and not compared.
-
-    Args:
-        a: First file, in any format that `tvist log analyze` reads.
-        b: Second file; its format may be another one.
-        logs: How to read logs.
-        json: Print one JSON object with all figures of each motion.
-    """
+def compare(a: Path, b: Path, logs: LogOptions, *, json: bool) -> None:
+    """Print what changed between two recordings or logs, motion by motion; see `tvist log analyze`."""
     from tvist_lab.metrics import Measured
     from tvist_lab.metrics import compare as compared
     from tvist_lab.recordings import RecordingError
