@@ -28,6 +28,9 @@ from tvist_protocol.recorded import THIS_BEHAVIOUR
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording.recorder import Recorder
 
+MOST_MISSING = 30_000
+"""A recording may lack so many ticks, a minute, and as many more as it has; each of them takes time in a replay."""
+
 
 class ReplayError(TvistError):
     """A recording cannot be replayed; the message says why."""
@@ -105,6 +108,12 @@ def replay_file(
         )
     if (content.dropped or {}).get("journal"):
         raise ReplayError("the recorder dropped messages of the journal, so an equal run is not possible")
+    last, there = int(content.recording["tick"][-1]), len(content.recording)
+    if last > MOST_MISSING + 2 * there:
+        raise ReplayError(
+            f"the recording has {there} states up to tick {last}: at most {MOST_MISSING + there} may be missing. Next: "
+            "tvist log analyze measures what is there"
+        )
     used, notes = _used(content.start, own_shapers)
     plant, said = _same_plant(content.start, plant)
     notes += said

@@ -28,7 +28,7 @@ def summary(path: str | os.PathLike[str], read_as: Recording | None = None) -> d
     path = Path(path)
     content: mcap_file.RecordingFile | None = None
     try:
-        content = mcap_file.read(path)
+        content = mcap_file.read_checked(path)
         recording = read_as or content.recording
     except mcap_file.RecordingFileError:
         recording = read_as or read(path)

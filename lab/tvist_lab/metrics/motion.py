@@ -56,8 +56,8 @@ class MotionRows:
 
     def later(self, rows: int) -> "MotionRows":
         """Return the same motion in a recording with more rows before it."""
-        moved = (getattr(self, name) + rows for name in ("start", "reference_stop", "shaped_stop", "end"))
-        return MotionRows(*moved, self.id, self.stopped, self.lag)
+        names = ("start", "reference_stop", "shaped_stop", "end")
+        return replace(self, **{name: getattr(self, name) + rows for name in names})
 
     def arm_stop(self, recording: Recording) -> int:
         """First row from which the arm is not driven any more, so that it only vibrates."""

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.recordings import Floats, Recording
+from tvist_lab.recordings.checks import LONG_GAP
 from tvist_plant.plant import GRAVITY
 
 BAND = (3.0, 60.0)
@@ -18,8 +19,6 @@ TRUTH = "truth_tool_acceleration"
 TRUE_POSE = "truth_flange_pose"
 
 
-LONG_GAP = 1.0
-"""Time without rows on both sides of which a log is two [s]; shorter ones are filled with straight lines."""
 ALL = slice(None)
 """All rows of a recording."""
 

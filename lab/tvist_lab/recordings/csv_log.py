@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
+from tvist_lab.recordings.checks import MEASURED, TIME, LogError, check_names
 from tvist_lab.recordings.log_columns import (
     ROBOT,
     STRANGE,
-    LogError,
     Needs,
     Rows,
     check_known,
-    check_names,
+    found_columns,
     recording_of,
 )
 from tvist_lab.recordings.named_columns import in_si, named
@@ -78,11 +78,12 @@ def read_csv(path: Path, columns: str | None = None, needs: Needs = ROBOT) -> Re
         OSError: The file cannot be read.
     """
     lines = _lines(path, needs, known=columns is None)
-    values = _numbers(path, lines)
     names, units, whose = _named(path, lines.names, columns)
+    values, names, texts = _numbers(path, lines, names)
     values, notes = in_si(names, values, units)
+    notes = (*lines.notes, *whose, *texts, *notes)
     return recording_of(
-        Rows(path, names, values, lines.numbers, notes=(*lines.notes, *whose, *notes), needs=needs)
+        Rows(path, names, values, lines.numbers, notes=notes, needs=needs, header=lines.names)
     )
 
 
@@ -140,8 +141,6 @@ def _lines(path: Path, needs: Needs, *, known: bool) -> _Lines:
     if not whole.any():
         raise LogError(f"{path} holds no rows" if not body else f"{path} holds no complete row: {notes[0]}")
     kept = [body[at] for at in np.flatnonzero(whole)]
-    if (strange := next((at for at, line in kept if not line.isascii()), None)) is not None:
-        raise LogError(f"{path}, line {strange}: there is something else than numbers")
     text = b"\n".join(line for _, line in kept) + b"\n"
     return _Lines(
         names,
@@ -200,8 +199,9 @@ def _top(lines: list[bytes]) -> int | None:
     return None
 
 
-def _numbers(path: Path, lines: _Lines) -> Floats:
-    """Values of all cells, shape (T, columns); NaN where a cell is empty."""
+def _numbers(path: Path, lines: _Lines, rtde: list[str]) -> tuple[Floats, list[str], tuple[str, ...]]:
+    """Values of all cells, shape (T, columns), NaN where one is empty; RTDE's names of columns of numbers; a note."""
+    texts: tuple[str, ...] = ()
     names = [str(place) for place in range(len(lines.names))]
     try:
         frame = _frame(lines, dict.fromkeys(names, pl.Float64()))
@@ -209,8 +209,11 @@ def _numbers(path: Path, lines: _Lines) -> Floats:
         text = _frame(lines, dict.fromkeys(names, pl.String()))
         text = text.select(pl.col(names).str.strip_chars().str.strip_chars('"'))
         frame = text.select(pl.col(names).cast(pl.Float64, strict=False))
-        _check_cells(path, lines, text, frame)
-    return np.asarray(frame.to_numpy().astype(np.float64))
+        others = _texts(path, lines, rtde, text, frame)
+        rtde = ["" if place in others else name for place, name in enumerate(rtde)]
+        if left_out := [lines.names[place] for place in others if lines.names[place]]:
+            texts = (f"text was left out: {', '.join(left_out)}",)
+    return np.asarray(frame.to_numpy().astype(np.float64)), rtde, texts
 
 
 def _frame(lines: _Lines, schema: dict[str, pl.DataType]) -> pl.DataFrame:
@@ -222,15 +225,20 @@ def _frame(lines: _Lines, schema: dict[str, pl.DataType]) -> pl.DataFrame:
         schema=schema,
         null_values=list(EMPTY),
         truncate_ragged_lines=True,
+        encoding="utf8-lossy",
     )
 
 
-def _check_cells(path: Path, lines: _Lines, text: pl.DataFrame, frame: pl.DataFrame) -> None:
-    """Refuse a cell that has something but no number, with its line and column."""
+def _texts(path: Path, lines: _Lines, rtde: list[str], text: pl.DataFrame, frame: pl.DataFrame) -> list[int]:
+    """Places of the columns with text that nobody needs; of others, a cell without a number is refused by its line."""
+    others = []
     for place, name in enumerate(lines.names):
         cells, numbers = text.to_series(place), frame.to_series(place)
         bad = (numbers.is_null() & cells.is_not_null() & ~cells.is_in(EMPTY)).arg_true()
-        if len(bad):
+        if len(bad) and rtde[place] != TIME and not MEASURED.fullmatch(rtde[place]):
+            others.append(place)
+        elif len(bad):
             cell = cells[bad[0]]
             where = f"{path}, line {int(lines.numbers[bad[0]])}, column {name}"
-            raise LogError(f"{where}: {cell[:40]!r} is no number")
+            raise LogError(f"{where}: {cell[:40]!r} is no number; {found_columns(lines.names)}")
+    return others

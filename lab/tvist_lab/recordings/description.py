@@ -9,7 +9,7 @@ from typing import Annotated
 
 import msgspec
 
-from tvist_lab.recordings.log_columns import GYROSCOPE
+from tvist_lab.recordings.checks import GYROSCOPE
 from tvist_lab.recordings.recording import TRUTH_PREFIX, Floats, Recording, RecordingError
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from tvist_lab.recordings.apart import Arrays, in_words, read_apart, unpacked
+from tvist_lab.recordings.checks import check_names, check_recording
 from tvist_lab.recordings.description import KEY, Description, checked_description, described, sidecar
 from tvist_lab.recordings.log_columns import ROBOT, Needs, Rows, recording_of
+from tvist_lab.recordings.named_columns import in_si, named
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_plant.user_file import check_is_file
 from tvist_protocol.content import parse_json
@@ -20,8 +22,13 @@ class ExportedError(RecordingError):
     """A file is no recording that was exported; the message names it."""
 
 
-def read_exported(path: Path, needs: Needs = ROBOT) -> Recording:
+def read_exported(path: Path, needs: Needs = ROBOT, names: str | None = None) -> Recording:
     """Read a table in Parquet, arrays that NumPy saved, or a MAT-file of version 4 to 7, by the ending of its name.
+
+    Args:
+        path: The file.
+        needs: What it must have.
+        names: Names of its columns, as `named` reads them, unless `tvist log export` wrote it.
 
     Raises:
         RecordingError: The file cannot be read, or holds no recording.
@@ -31,7 +38,9 @@ def read_exported(path: Path, needs: Needs = ROBOT) -> Recording:
         arrays = unpacked(path) if kind == ".npz" else read_apart(path)
     except Exception as error:  # a damaged file can raise nearly anything
         raise ExportedError(f"{path} cannot be read: {in_words(error)}") from error
-    return _of_table(path, arrays, needs) if kind == ".parquet" else _of_arrays(path, arrays, needs)
+    if KEY not in arrays:
+        return _log(path, arrays, needs, names)
+    return _of_table(path, arrays) if kind == ".parquet" else _of_arrays(path, arrays)
 
 
 def with_sidecar(recording: Recording, path: Path) -> Recording:
@@ -51,12 +60,9 @@ def with_sidecar(recording: Recording, path: Path) -> Recording:
     return replace(added, notes=(*added.notes, *recording.notes))
 
 
-def _of_table(path: Path, flat: Arrays, needs: Needs) -> Recording:
+def _of_table(path: Path, flat: Arrays) -> Recording:
     """Columns for each entry of a vector."""
-    text = flat.pop(KEY, None)
-    if text is None:
-        return _log(path, flat, needs)
-    description = _described(path, str(text))
+    description = _described(path, str(flat.pop(KEY)))
     columns = {}
     rows = len(next(iter(flat.values()), ()))
     for name, about in description.columns.items():
@@ -68,20 +74,16 @@ def _of_table(path: Path, flat: Arrays, needs: Needs) -> Recording:
     return _recording(path, description, columns)
 
 
-def _of_arrays(path: Path, arrays: Mapping[str, Any], needs: Needs) -> Recording:
-    numbers = {
+def _numbers(arrays: Mapping[str, Any]) -> dict[str, Floats]:
+    return {
         name: array.astype(np.float64)
         for name, array in arrays.items()
         if array.dtype.kind in "biuf" and array.ndim in (1, 2) and len(array)
     }
-    if KEY not in arrays:
-        flat: dict[str, Floats] = {}
-        for name, array in numbers.items():
-            if array.ndim == 1 or array.shape[1] == 1:
-                flat[name] = array.reshape(-1)
-            else:
-                flat |= {f"{name}_{index}": array[:, index] for index in range(array.shape[1])}
-        return _log(path, flat, needs)
+
+
+def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> Recording:
+    numbers = _numbers(arrays)
     description = _described(path, "".join(map(str, arrays[KEY].reshape(-1)[:1])))
     columns = {}
     for name, about in description.columns.items():
@@ -100,15 +102,26 @@ def _joined(parts: list[Floats], rows: int) -> Floats:
     return np.column_stack(parts) if parts else np.empty((rows, 0))
 
 
-def _log(path: Path, flat: Mapping[str, Floats], needs: Needs) -> Recording:
-    """Columns without our description, as of a log."""
+def _log(path: Path, arrays: Arrays, needs: Needs, names: str | None) -> Recording:
+    """Columns that nothing describes, as of a log."""
+    flat: dict[str, Floats] = {}
+    for name, array in _numbers(arrays).items():
+        if array.ndim == 1 or array.shape[1] == 1:
+            flat[name] = array.reshape(-1)
+        else:
+            flat |= {f"{name}_{index}": array[:, index] for index in range(array.shape[1])}
     lengths = {len(values) for values in flat.values()}
     if len(lengths) != 1:
         raise ExportedError(f"{path} holds no columns of numbers of equal lengths")
-    rows = np.arange(1.0, lengths.pop() + 1.0)
-    return recording_of(
-        Rows(path, list(flat), np.column_stack(list(flat.values())), rows, "row", needs=needs)
+    rows, header, values = (
+        np.arange(1.0, lengths.pop() + 1.0),
+        list(flat),
+        np.column_stack(list(flat.values())),
     )
+    check_names(path, header)
+    rtde, units = (header, {}) if names is None else named(path, names, header)
+    values, notes = (values, ()) if names is None else in_si(rtde, values, units)
+    return recording_of(Rows(path, rtde, values, rows, "row", notes, needs, header))
 
 
 def _described(path: Path, text: str) -> Description:
@@ -120,6 +133,8 @@ def _described(path: Path, text: str) -> Description:
 
 def _recording(path: Path, description: Description, columns: dict[str, Floats]) -> Recording:
     try:
-        return description.recording(columns)
+        recording = description.recording(columns)
     except RecordingError as error:
         raise ExportedError(f"{path}: {error}") from error
+    check_recording(path, recording)
+    return recording

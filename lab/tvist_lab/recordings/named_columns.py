@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tvist_lab.recordings.log_columns import ACCELEROMETER, GYROSCOPE, PERIODS, TIME, LogError, found_columns
+from tvist_lab.recordings.checks import ACCELEROMETER, GYROSCOPE, PERIODS, TIME, LogError
+from tvist_lab.recordings.log_columns import found_columns
 from tvist_lab.recordings.recording import Floats
 from tvist_protocol.errors import quoted
 
@@ -22,8 +23,8 @@ SHORT = {
 AXES = {"x": 0, "y": 1, "z": 2}
 """Letters that may stand where a vector's column has its number."""
 SI = {
-    "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "rad": 1.0, "deg": np.pi / 180.0, "m/s2": 1.0, "g": 9.80665,
-    "mg": 9.80665e-3, "rad/s": 1.0, "deg/s": np.pi / 180.0,
+    "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "rad": 1.0, "deg": np.pi / 180.0, "m/s2": 1.0, "mm/s2": 1e-3,
+    "g": 9.80665, "mg": 9.80665e-3, "rad/s": 1.0, "deg/s": np.pi / 180.0,
 }  # fmt: skip
 """Units and their sizes in SI."""
 WIDEST = 7.0

@@ -21,13 +21,15 @@ VENDORS = {
     # Tags and axes of KUKA.Ethernet RSI XML 1.1, joined by points as RSIPI (pypi.org/project/RSIPI) logs them
     "KUKA's RSI": "time=IPOC,q=AIPos.A{}:deg,target_q=ASPos.A{}:deg",
     "KUKA's RSI (RSIPI)": "time=Receive.IPOC,q=Receive.AIPos.A{}:deg,target_q=Receive.ASPos.A{}:deg",
+    # AccelQueryHelper.write_to_file, github.com/Klipper3d/klipper, klippy/extras/adxl345.py
+    "Klipper's accelerometers": "time=time,accelerometer=accel_{}:mm/s2",
     # RobotStateRt.msg of dsr_msgs2, github.com/doosan-robotics/doosan-robot2; numbered like RTDE's, or in brackets
     "Doosan's RobotStateRt": "time=time_stamp,q=actual_joint_position_{}:deg,qd=actual_joint_velocity_{}:deg/s,"
     "target_q=target_joint_position_{}:deg,target_qd=target_joint_velocity_{}:deg/s",
     "Doosan's RobotStateRt (brackets)": "time=time_stamp,q=actual_joint_position[{}]:deg,"
     "qd=actual_joint_velocity[{}]:deg/s,target_q=target_joint_position[{}]:deg,target_qd=target_joint_velocity[{}]:deg/s",
 }
-"""Columns of each program, as `named` takes them; joint angles tell it."""
+"""Columns of each program, as `named` takes them; joint angles tell it, or an accelerometer."""
 
 
 def vendor_of(header: Sequence[str]) -> tuple[str, str] | None:
@@ -35,7 +37,7 @@ def vendor_of(header: Sequence[str]) -> tuple[str, str] | None:
     for vendor, columns in VENDORS.items():
         items = columns.split(",")
         there = [item for item in items if any(map(entry_of(_pattern(item)).fullmatch, header))]
-        if any(item.startswith("q=") for item in there):
+        if any(item.startswith(("q=", "accelerometer=")) for item in there):
             return vendor, ",".join(there)
     return None
 

@@ -1,0 +1,113 @@
+"""What every recording from a file must hold, checked once where it enters: names, numbers, shapes, times."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from tvist_lab.recordings.recording import Floats, Recording, RecordingError
+from tvist_plant.user_file import is_name
+from tvist_protocol.errors import quoted
+
+TIME = "timestamp"
+"""Name of the column of times, as in RTDE [s]."""
+ACCELEROMETER, GYROSCOPE = "actual_tool_accelerometer", "actual_tool_gyroscope"
+"""Names of what a sensor at the tool measures; RTDE has the first alone."""
+WIDTHS = {
+    "actual_TCP_pose": 6, "target_TCP_pose": 6, "actual_TCP_speed": 6, ACCELEROMETER: 3, GYROSCOPE: 3,
+}  # fmt: skip
+"""Number of entries that a vector needs to be of use; joint angles have as many as the arm has joints."""
+OF_JOINTS = ("reference_q", "unshaped_q", "target_q", "target_qd", "target_qdd", "actual_q", "actual_qd")
+"""Vectors that must have an entry for each joint."""
+LARGEST = {TIME: 1e10, "tick": 2.0**53}
+"""Largest times [s] and ticks; as many seconds after 1970 are three centuries, and a float holds no more ticks."""
+MEASURED = re.compile(
+    r"(actual|target|shaped|reference|unshaped|motor|truth)_(motor_)?(q|qd|qdd|moment|current|(TCP|tool|flange)_\w+)(_\d+)?"
+    r"|(estimated|flange|payload|shaper|speed_scaling|truth_\w*(deflection|poses))\w*"
+)
+"""Names of columns with radians, metres, seconds and such."""
+MOST = 1e6
+"""Largest number in such a column; more is damage."""
+LONG_GAP = 1.0
+"""Time without rows on both sides of which a log is two [s]; shorter ones are filled with straight lines."""
+SPARSE = 10.0
+"""Largest time of a log without its long gaps, over that of its rows [-]."""
+PERIODS = (1e-4, 0.1)
+"""Shortest and longest time between rows [s]; anything else is no time in seconds, or shows no vibration."""
+
+
+class LogError(RecordingError):
+    """A file is no log that can be measured; the message names the file and, where there is one, the line."""
+
+
+def check_names(where: object, names: Sequence[str]) -> None:
+    """Refuse a name that cannot be shown, as of a damaged file."""
+    for name in names:
+        if not is_name(name):
+            raise LogError(f"{where}: {quoted(name)} is no column's name: it must be short and printable")
+
+
+def check_numbers(path: Path, columns: Mapping[str, Floats], place: Callable[[int], str]) -> None:
+    """Refuse a number that no robot has, with its place in the file; what is missing is NaN.
+
+    Args:
+        path: The file.
+        columns: Name to values, shape (T,) or (T, k).
+        place: Returns where in the file the row of an index is, such as "line 7".
+    """
+    for name, values in columns.items():
+        most = LARGEST.get(name, MOST if MEASURED.fullmatch(name) else np.inf)
+        if len(strange := np.argwhere(np.abs(values) > most)):
+            row, *entry = strange[0].tolist()
+            column = "_".join([name, *map(str, entry)])
+            value = values[(row, *entry)]
+            raise LogError(f"{path}, {place(row)}, column {column}: {value:g} is no number of a robot")
+
+
+def check_period(path: Path, period: float) -> None:
+    """Refuse times that are not in seconds, or too far apart."""
+    if not PERIODS[0] <= period <= PERIODS[1]:
+        raise LogError(
+            f"{path}: {TIME} grows by {period:.3g} from row to row; it must be in seconds, and a row come every "
+            f"{PERIODS[0]:g} to {PERIODS[1]:g} s"
+        )
+
+
+def check_recording(path: Path, recording: Recording, place: Callable[[int], str] | None = None) -> None:
+    """Check a recording, whoever made it, as far as what is computed with it needs.
+
+    Args:
+        path: The file.
+        recording: The recording.
+        place: See `check_numbers`; None for its tick.
+
+    Raises:
+        RecordingError: It is damaged; the message names the file and, where there is one, the place or the column.
+    """
+    info, columns, tick, time = recording.info, recording.columns, recording["tick"], recording.time
+    check_names(path, [*columns, *([] if info is None else [info.name, info.model, info.version])])
+    joints = next((columns[name].shape[1:] for name in OF_JOINTS if name in columns), (1,))
+    shapes = dict.fromkeys(OF_JOINTS, joints) | {name: (width,) for name, width in WIDTHS.items()}
+    for name, shape in {TIME: (), "tick": (), **shapes}.items():
+        if name in columns and (
+            columns[name].shape[1:] != shape or 0 in shape or (name in OF_JOINTS and not shape)
+        ):
+            raise LogError(
+                f"{path}: column {name} has rows of the shape {columns[name].shape[1:]}, not {shape}"
+            )
+    if not len(tick) or not np.isfinite(time).all() or not np.array_equal(tick, np.round(np.abs(tick))):
+        raise LogError(f"{path}: its rows lack a {TIME}, or the number of their tick")
+    check_numbers(path, columns, place or (lambda row: f"tick {tick[row]:.0f}"))
+    if len(tick) < 2:
+        return
+    step = np.diff(time)
+    periods = step / np.diff(tick)
+    if (back := np.flatnonzero(step <= 0.0)).size:
+        raise LogError(f"{path}, tick {tick[back[0] + 1]:.0f}: {TIME} does not go on")
+    # The clock of another controller may go on beside its ticks.
+    for period in (np.median(periods), recording.period, *([] if recording.foreign else [np.max(periods)])):
+        check_period(path, float(period))
+    short = step[step <= LONG_GAP]
+    if np.sum(short) > SPARSE * len(short) * np.median(periods):
+        raise LogError(f"{path}: nine of ten rows are missing, so that no vibration shows")
