@@ -18,7 +18,7 @@ WIDTHS = {
     "actual_TCP_pose": 6, "target_TCP_pose": 6, "actual_TCP_speed": 6, ACCELEROMETER: 3, GYROSCOPE: 3,
 }  # fmt: skip
 """Number of entries that a vector needs to be of use; joint angles have as many as the arm has joints."""
-OF_JOINTS = ("reference_q", "unshaped_q", "target_q", "target_qd", "target_qdd", "actual_q", "actual_qd")
+ANGLES = ("reference_q", "unshaped_q", "target_q", "actual_q")
 """Vectors that must have an entry for each joint."""
 LARGEST = {TIME: 1e10, "tick": 2.0**53}
 """Largest times [s] and ticks; as many seconds after 1970 are three centuries, and a float holds no more ticks."""
@@ -87,11 +87,11 @@ def check_recording(path: Path, recording: Recording, place: Callable[[int], str
     """
     info, columns, tick, time = recording.info, recording.columns, recording["tick"], recording.time
     check_names(path, [*columns, *([] if info is None else [info.name, info.model, info.version])])
-    joints = next((columns[name].shape[1:] for name in OF_JOINTS if name in columns), (1,))
-    shapes = dict.fromkeys(OF_JOINTS, joints) | {name: (width,) for name, width in WIDTHS.items()}
+    joints = next((columns[name].shape[1:] for name in ANGLES if name in columns), (1,))
+    shapes = dict.fromkeys(ANGLES, joints) | {name: (width,) for name, width in WIDTHS.items()}
     for name, shape in {TIME: (), "tick": (), **shapes}.items():
         if name in columns and (
-            columns[name].shape[1:] != shape or 0 in shape or (name in OF_JOINTS and not shape)
+            columns[name].shape[1:] != shape or 0 in shape or (name in ANGLES and not shape)
         ):
             raise LogError(
                 f"{path}: column {name} has rows of the shape {columns[name].shape[1:]}, not {shape}"
