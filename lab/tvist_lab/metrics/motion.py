@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tvist_lab.metrics.measured_motion import SMALLEST, measured_spans
 from tvist_lab.metrics.servo_lag import servo_lag
 from tvist_lab.metrics.vibration import parts
-from tvist_lab.recordings import Floats, Recording
+from tvist_lab.recordings import Floats, MissingColumnError, Recording
 
 MOVING = 1e-7
 """A reference that changes by more than this from one tick to the next moves [rad]."""
@@ -96,6 +96,10 @@ def motions(recording: Recording) -> list[MotionRows]:
     Raises:
         RecordingError: There is neither `reference_q` nor `target_q` nor `actual_q`.
     """
+    if "target_q" not in recording and "actual_q" not in recording:
+        raise MissingColumnError(
+            "actual_q", "a log without joint angles shows no motions. Next: tvist log analyze"
+        )
     tick, (first, *others) = recording["tick"], parts(recording.time)
     if not others:
         return _motions(recording)

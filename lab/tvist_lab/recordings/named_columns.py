@@ -131,6 +131,6 @@ def _unit_of_angles(q: Floats) -> tuple[float, str]:
 
 
 def _unit_of_gravity(force: Floats) -> tuple[float, str]:
-    with np.errstate(over="ignore"):  # numbers of no robot are refused later, by their line
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers of no robot are refused later, by their line
         length = float(np.median(np.linalg.norm(np.nan_to_num(force), axis=1)))
     return length, "g" if GRAVITY_IN_G[0] < length < GRAVITY_IN_G[1] else "m/s2"

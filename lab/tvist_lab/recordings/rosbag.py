@@ -67,7 +67,7 @@ def read_rosbag(path: Path, needs: Needs = ROBOT) -> Recording:
             notes.append(
                 f"{topic.unstamped} messages of {name} have no time in their header: the time of recording counts"
             )
-    wanted, *others = (JOINTS, TARGET) if needs == ROBOT else (ACCELEROMETER,)
+    wanted, *others = (JOINTS, TARGET, ACCELEROMETER) if needs == ROBOT else (ACCELEROMETER,)
     if not any(kind in chosen for kind in (wanted, *others)):
         there = ", ".join(sorted(topics)) or "nothing that is read"
         raise LogError(f"{path} has no sensor_msgs/msg/{wanted}; it has {there}")

@@ -25,7 +25,8 @@ def analyze(
     """Measure each motion of a recording or a robot's log, and print the columns of the paper's Table 2.
 
     Frequency and damping have 95 % intervals. A dash has its reason in a line below the table. A line says from which
-    motion on payload, gears or what rings after stops are not what they were before.
+    motion on payload, gears or what rings after stops are not what they were before. Of an accelerometer alone, which
+    shows no motions, frequency and damping of a ring-down or a sweep are measured.
 
     Args:
         file: Recording of `tvist serve --record`, `tvist log record` or `tvist log export`; or a log of another robot:
@@ -41,6 +42,9 @@ def analyze(
     from tvist_lab.words import counted
 
     (recording,) = logs.read(file)
+    if "actual_q" not in recording and "target_q" not in recording:
+        _of_sensor(file, recording, json=json)
+        return
     with told(RecordingError):
         found = motions(recording)
     results = []
@@ -72,6 +76,32 @@ def analyze(
     table(f"{file}: {counted(len(results), 'motion')}{since}", tuple(COLUMNS), rows)
     for note in (*changed, *grouped_notes(results)):
         out.print(note, markup=False)
+
+
+def _of_sensor(file: Path, recording: "Recording", *, json: bool) -> None:
+    """Print what has rung in the log of an accelerometer alone."""
+    from tvist_lab.metrics.autocorrelation import fit_autocorrelation
+
+    fit = fit_autocorrelation(recording)
+    modes = [{"f_d_hz": mode.f_d, "zeta": mode.zeta} for mode in fit.found] if fit.ok else []
+    for note in recording.notes:
+        say(f"{file}: {note}")
+    if json:
+        found = {
+            "file": str(file),
+            "motions": [],
+            "modes": modes,
+            "changes": [],
+            "notes": list(recording.notes),
+        }
+        print_json(found)
+    elif modes:
+        rung = ", ".join(
+            f"{mode['f_d_hz']:.2f} Hz with a damping ratio of {mode['zeta']:.3f}" for mode in modes
+        )
+        out.print(f"{file} rings at {rung}.", markup=False)
+    else:
+        out.print(f"{file} shows neither a ring-down nor a sweep: {fit.reason}.", markup=False)
 
 
 def _draw(recording: "Recording", found: "list[MotionRows]", files: "FigureFiles") -> None:
