@@ -111,8 +111,7 @@ def replay_file(
     last, there = int(content.recording["tick"][-1]), len(content.recording)
     if last > MOST_MISSING + 2 * there:
         raise ReplayError(
-            f"the recording has {there} states up to tick {last}: at most {MOST_MISSING + there} may be missing. Next: "
-            "tvist log analyze measures what is there"
+            f"the recording has {there} states up to tick {last}: at most {MOST_MISSING + there} may be missing"
         )
     used, notes = _used(content.start, own_shapers)
     plant, said = _same_plant(content.start, plant)

@@ -76,7 +76,7 @@ def low_pass(signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
 def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
     """Low-pass filter samples of which some are missing: these are interpolated before, and left out after.
 
-    Parts of a log on both sides of a long gap are filtered each by itself: to fill a day would take the memory.
+    What stands before and after a long gap is filtered apart: to fill a day would take the memory.
 
     Args:
         time: Times of the samples, increasing, shape (T,) [s].

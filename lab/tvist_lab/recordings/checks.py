@@ -1,7 +1,7 @@
 """What every recording from a file must hold, checked once where it enters: names, numbers, shapes, times."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ WIDTHS = {
 """Number of entries that a vector needs to be of use; joint angles have as many as the arm has joints."""
 ANGLES = ("reference_q", "unshaped_q", "target_q", "actual_q")
 """Vectors that must have an entry for each joint."""
+SHAPES = {name: (width,) for name, width in WIDTHS.items()}
 LARGEST = {TIME: 1e10, "tick": 2.0**53}
 """Largest times [s] and ticks; as many seconds after 1970 are three centuries, and a float holds no more ticks."""
 MEASURED = re.compile(
@@ -33,6 +34,8 @@ LONG_GAP = 1.0
 """Time without rows on both sides of which a log is two [s]; shorter ones are filled with straight lines."""
 SPARSE = 10.0
 """Largest time of a log without its long gaps, over that of its rows [-]."""
+Places = tuple[str, Floats]
+"""Where rows stand in a file: what is counted, such as "line", and the number of each row, shape (T,)."""
 PERIODS = (1e-4, 0.1)
 """Shortest and longest time between rows [s]; anything else is no time in seconds, or shows no vibration."""
 
@@ -48,21 +51,14 @@ def check_names(where: object, names: Sequence[str]) -> None:
             raise LogError(f"{where}: {quoted(name)} is no column's name: it must be short and printable")
 
 
-def check_numbers(path: Path, columns: Mapping[str, Floats], place: Callable[[int], str]) -> None:
-    """Refuse a number that no robot has, with its place in the file; what is missing is NaN.
-
-    Args:
-        path: The file.
-        columns: Name to values, shape (T,) or (T, k).
-        place: Returns where in the file the row of an index is, such as "line 7".
-    """
+def check_numbers(path: Path, columns: Mapping[str, Floats], places: Places) -> None:
+    """Refuse a number that no robot has; NaN is missing."""
     for name, values in columns.items():
         most = LARGEST.get(name, MOST if MEASURED.fullmatch(name) else np.inf)
         if len(strange := np.argwhere(np.abs(values) > most)):
             row, *entry = strange[0].tolist()
-            column = "_".join([name, *map(str, entry)])
-            value = values[(row, *entry)]
-            raise LogError(f"{path}, {place(row)}, column {column}: {value:g} is no number of a robot")
+            where = f"{path}, {places[0]} {places[1][row]:.0f}, column {'_'.join([name, *map(str, entry)])}"
+            raise LogError(f"{where}: {values[(row, *entry)]:g} is no number of a robot")
 
 
 def check_period(path: Path, period: float) -> None:
@@ -74,31 +70,23 @@ def check_period(path: Path, period: float) -> None:
         )
 
 
-def check_recording(path: Path, recording: Recording, place: Callable[[int], str] | None = None) -> None:
-    """Check a recording, whoever made it, as far as what is computed with it needs.
+def check_recording(path: Path, recording: Recording, places: Places | None = None) -> None:
+    """Refuse a recording, whoever made it, with which the laboratory could not compute.
 
     Args:
         path: The file.
         recording: The recording.
-        place: See `check_numbers`; None for its tick.
-
-    Raises:
-        RecordingError: It is damaged; the message names the file and, where there is one, the place or the column.
+        places: Where its rows stand in the file; None for their ticks.
     """
     info, columns, tick, time = recording.info, recording.columns, recording["tick"], recording.time
     check_names(path, [*columns, *([] if info is None else [info.name, info.model, info.version])])
-    joints = next((columns[name].shape[1:] for name in ANGLES if name in columns), (1,))
-    shapes = dict.fromkeys(ANGLES, joints) | {name: (width,) for name, width in WIDTHS.items()}
-    for name, shape in {TIME: (), "tick": (), **shapes}.items():
-        if name in columns and (
-            columns[name].shape[1:] != shape or 0 in shape or (name in ANGLES and not shape)
-        ):
-            raise LogError(
-                f"{path}: column {name} has rows of the shape {columns[name].shape[1:]}, not {shape}"
-            )
+    joints = max((columns[name].shape[1:] for name in ANGLES if name in columns), default=())
+    for name, shape in {TIME: (), "tick": (), **dict.fromkeys(ANGLES, joints or (1,)), **SHAPES}.items():
+        if name in columns and ((found := columns[name].shape[1:]) != shape or 0 in shape):
+            raise LogError(f"{path}: column {name} has rows of the shape {found}, not {shape}")
     if not len(tick) or not np.isfinite(time).all() or not np.array_equal(tick, np.round(np.abs(tick))):
         raise LogError(f"{path}: its rows lack a {TIME}, or the number of their tick")
-    check_numbers(path, columns, place or (lambda row: f"tick {tick[row]:.0f}"))
+    check_numbers(path, columns, places or ("tick", tick))
     if len(tick) < 2:
         return
     step = np.diff(time)

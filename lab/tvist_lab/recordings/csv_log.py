@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from tvist_lab.recordings.checks import MEASURED, TIME, LogError, check_names
+from tvist_lab.recordings.checks import MEASURED, TIME, LogError
 from tvist_lab.recordings.log_columns import (
     ROBOT,
     STRANGE,
@@ -182,7 +182,6 @@ def _header(path: Path, lines: list[bytes], needs: Needs, *, known: bool) -> tup
         )
     if known:
         check_known(path, top + 1, _named(path, names, None)[0], needs)
-    check_names(f"{path}, line {top + 1}", names)
     if twice := sorted(name for name, count in Counter(names).items() if name and count > 1):
         raise LogError(f"{path}, line {top + 1}: the column {twice[0]} is there twice")
     return top, names, separator

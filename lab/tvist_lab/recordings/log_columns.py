@@ -9,17 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tvist_lab.recordings.checks import (
-    ACCELEROMETER,
-    MEASURED,
-    TIME,
-    WIDTHS,
-    LogError,
-    check_names,
-    check_numbers,
-    check_period,
-    check_recording,
-)
+from tvist_lab.recordings import checks
+from tvist_lab.recordings.checks import ACCELEROMETER, MEASURED, TIME, WIDTHS, LogError
 from tvist_lab.recordings.recording import Floats, Recording
 from tvist_lab.words import counted
 from tvist_plant.user_file import is_name
@@ -92,15 +83,11 @@ def recording_of(rows: Rows) -> Recording:
         LogError: A number is beyond 1e6; there is no time or nothing of what the log needs, fewer than two rows, or
             time goes back or is not in seconds.
     """
-    check_names(rows.path, rows.names)
+    checks.check_names(rows.path, rows.names)
     columns, notes = _vectors(rows)
     if TIME not in columns or columns[TIME].ndim != 1:
         raise LogError(f"{rows.path} has no column {TIME}: {_remedy(rows)}")
-    if (
-        rows.needs == ROBOT
-        and not any(name in columns for name in ROBOT.columns)
-        and ACCELEROMETER in columns
-    ):
+    if rows.needs == ROBOT and ACCELEROMETER in columns and not columns.keys() & {*ROBOT.columns}:
         notes.append(ALONE)
     elif not any(name in columns and columns[name].ndim == 2 for name in rows.needs.columns):
         lacking = [f"{name}_0 …" for name in rows.needs.columns]
@@ -109,19 +96,16 @@ def recording_of(rows: Rows) -> Recording:
     kept, more = _increasing(rows, columns[TIME])
     notes += more
     columns = {name: column[kept] for name, column in columns.items()}
-    check_period(rows.path, float(np.median(np.diff(columns[TIME]))))
-
-    def place(row: int) -> str:
-        return f"{rows.unit} {rows.lines[kept[row]]:.0f}"
-
-    check_numbers(rows.path, {TIME: columns[TIME]}, place)
+    place = rows.unit, rows.lines[kept]
+    checks.check_period(rows.path, float(np.median(np.diff(columns[TIME]))))
+    checks.check_numbers(rows.path, {TIME: columns[TIME]}, place)
     ours = all(name in columns for name in OURS)
     if not ours:
         columns["tick"], gaps = ticks_of(columns[TIME])
         notes += gaps
         columns = _shaped(columns)
     recording = Recording(columns, notes=(*rows.notes, *notes), foreign=not ours)
-    check_recording(rows.path, recording, place)
+    checks.check_recording(rows.path, recording, place)
     return recording
 
 

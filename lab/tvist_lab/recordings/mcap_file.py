@@ -150,11 +150,7 @@ def read(path: str | os.PathLike[str]) -> RecordingFile:
 
 
 def read_checked(path: str | os.PathLike[str]) -> RecordingFile:
-    """Read a recording that may come from anywhere, and check it as logs of other controllers are checked.
-
-    Raises:
-        RecordingError: See `read` and `check_recording`.
-    """
+    """Read a recording as `read` does, and check it as logs of other controllers are checked."""
     content = read(path)
     check_recording(content.path, content.recording)
     return content

@@ -82,26 +82,16 @@ def _of_sensor(file: Path, recording: "Recording", *, json: bool) -> None:
     """Print what has rung in the log of an accelerometer alone."""
     from tvist_lab.metrics.autocorrelation import fit_autocorrelation
 
-    fit = fit_autocorrelation(recording)
-    modes = [{"f_d_hz": mode.f_d, "zeta": mode.zeta} for mode in fit.found] if fit.ok else []
-    for note in recording.notes:
+    fit, notes = fit_autocorrelation(recording), list(recording.notes)
+    modes = [{"f_d_hz": mode.f_d, "zeta": mode.zeta} for mode in fit.found if fit.ok]
+    for note in notes:
         say(f"{file}: {note}")
     if json:
-        found = {
-            "file": str(file),
-            "motions": [],
-            "modes": modes,
-            "changes": [],
-            "notes": list(recording.notes),
-        }
-        print_json(found)
-    elif modes:
-        rung = ", ".join(
-            f"{mode['f_d_hz']:.2f} Hz with a damping ratio of {mode['zeta']:.3f}" for mode in modes
-        )
-        out.print(f"{file} rings at {rung}.", markup=False)
-    else:
-        out.print(f"{file} shows neither a ring-down nor a sweep: {fit.reason}.", markup=False)
+        print_json({"file": str(file), "motions": [], "modes": modes, "changes": [], "notes": notes})
+        return
+    rung = ", ".join(f"{one['f_d_hz']:.2f} Hz with a damping ratio of {one['zeta']:.3f}" for one in modes)
+    none = f"{file} shows neither a ring-down nor a sweep: {fit.reason}."
+    out.print(f"{file} rings at {rung}." if modes else none, markup=False)
 
 
 def _draw(recording: "Recording", found: "list[MotionRows]", files: "FigureFiles") -> None:
