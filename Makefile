@@ -15,7 +15,7 @@ DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 # The folders of what they install.
 SOURCES := cli clients controller lab protocol shaping sim_plant testing tvist_server urscript view
 
-.PHONY: checksums page docs docs-serve rehearse release setup demo notebooks test test-all lint elsewhere bench nightly soak dist format lock schemas clean
+.PHONY: acceptance checksums page docs docs-serve rehearse release setup demo notebooks test test-all lint elsewhere bench nightly soak dist format lock schemas clean
 
 setup: $(READY)
 
@@ -52,8 +52,8 @@ lint: setup
 
 # Calls that another system does not have: everything runs on macOS, and what a client needs on Windows, too.
 elsewhere: setup
-	$(BIN)/mypy --platform darwin
-	$(BIN)/mypy --platform win32 $(addprefix --package ,tvist_client tvist_protocol tvist_shaping tvist_urscript)
+	$(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin
+	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 $(addprefix --package ,tvist_client tvist_protocol tvist_shaping tvist_urscript)
 
 bench: setup
 	$(BIN)/python -m proof bench
@@ -65,6 +65,16 @@ nightly: setup elsewhere
 # Those, a release rehearsed, and a search for an hour of what `.ci/run` searches for a minute.
 soak: nightly rehearse
 	$(BIN)/python -m proof search --stops 2000 --streams 500 --changes 500 --sequences 3000 --flexible --robot ur3e ur5e ur16e ur30 tests/plant/urdf/seven.urdf
+
+# The clients of other projects, and what docs/reference/ur-clients.md says of them. SOURCES and BUILD of UR's C++ library: see
+# tests/acceptance/urcl.py, which needs root.
+URCL ?=
+acceptance: setup
+	$(BIN)/pytest tests/acceptance/clients.py
+ifneq ($(URCL),)
+	$(PYTHON) tests/acceptance/urcl.py $(URCL) --tvist $(BIN)/tvist
+	$(PYTHON) tests/acceptance/urcl.py $(URCL) --tvist $(BIN)/tvist --examples
+endif
 
 format: setup
 	$(BIN)/ruff check --fix

@@ -35,21 +35,27 @@ class LogOptions:
         """Whether anything was asked for."""
         return self != AS_IT_IS
 
-    def read(self, *files: Path) -> "list[Recording]":
+    def read(self, *files: Path, sensor: bool = False) -> "list[Recording]":
         """Read logs, each joined with its sensor's where there is one.
+
+        Args:
+            files: The logs.
+            sensor: Whether one without `--imu` may be that of an accelerometer alone.
 
         Raises:
             Failure: An option has nothing to act on, the numbers of files differ, or a file cannot be read or joined.
         """
         from tvist_lab.recordings import RecordingError, read
+        from tvist_lab.recordings.log_columns import ROBOT, ROBOT_OR_SENSOR
 
         for name in ("imu_columns", "robot"):
             if self.imu is None and getattr(self, name) is not None:
                 raise Failure(f"--{name.replace('_', '-')} is about --imu: give --imu FILE too", code=2)
         if self.imu is not None and len(self.imu) != len(files):
             raise Failure(f"{len(self.imu)} --imu for {len(files)} logs: give one for each", code=2)
+        needs = ROBOT_OR_SENSOR if sensor and self.imu is None else ROBOT
         with told(RecordingError):
-            logs = [read(file, self.columns) for file in files]
+            logs = [read(file, self.columns, needs) for file in files]
             if self.imu is None:
                 return logs
             from tvist_lab.recordings.joined import joined

@@ -25,7 +25,7 @@ _BOXES = {
     "Clock": "clock speed realtime_priority processor lock_memory",
     "Recording": "record keep dump",
     "Network": "listen connect namespace metrics security insecure",
-    "UR's interfaces": "ur ur_address ur_ports ur_allow",
+    "UR's interfaces": "ur ur_address ur_ports ur_allow reserve_inputs",
 }
 """The boxes of the help, each with its fields."""
 _BOX_OF = {
@@ -105,7 +105,7 @@ def _help(field: FieldInfo) -> str:
 
 def _plain(given: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
     """Return what is given as a configuration file would."""
-    if "ur_address" in given or "ur_ports" in given:
+    if not {"ur_address", "ur_ports", "reserve_inputs"}.isdisjoint(given):
         yield "ur", True
     for name, value in given.items():
         if name == "ur_ports":

@@ -28,6 +28,8 @@ ON_TIME = 0.9
 """Share of the states due from which on the rate is in order [-]."""
 TOO_SLOW = 0.5
 """Share of the ticks due that must be seen to begin [-]: fewer are an overload whatever the telemetry says."""
+LONG_US = 20_000.0
+"""Lateness of a tick from which on it is named, if its thread has waited for a processor as long [µs]."""
 RETRY_S = 0.5
 """Time between two tries while a robot is starting [s]."""
 STALE = "check"
@@ -218,6 +220,11 @@ class _Check:
         if last is not None and last.due_ticks:
             self.missed = (
                 f"; since its start it has missed {last.missed_ticks} of {last.due_ticks} control periods"
+            )
+        if last is not None and LONG_US < last.late_max_us < 2.0 * last.processor_wait_us:
+            self.missed += (
+                f"; a tick began {last.late_max_us / 1e3:.0f} ms late, as its thread waited for a processor: on Linux, "
+                "kernel.sched_autogroup_enabled=0 or --realtime-priority helps"
             )
         return f"{said}{self.missed}"
 

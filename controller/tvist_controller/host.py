@@ -44,6 +44,7 @@ class Host:
         sinks: Sinks that take its output, in this order.
         ports: Network for the sockets of programs; None if there is none, so that none can be opened.
         experience: What the robot makes of its motions; None if it learns nothing.
+        survives: Whether an exception stops the robot, in a protective stop, and goes to the sinks; else it is raised.
     """
 
     def __init__(
@@ -52,8 +53,9 @@ class Host:
         *sinks: Sink,
         ports: SocketPorts | None = None,
         experience: Experience | None = None,
+        survives: bool = False,
     ) -> None:
-        self.controller, self._experience = controller, experience
+        self.controller, self._experience, self._survives = controller, experience, survives
         if experience is not None:
             controller.lessons.know_motions()
         self._ports = ports or NoPorts()
@@ -88,9 +90,9 @@ class Host:
         entry = Entry(tick=self._next, kind="command", message=admitted.content, session=session)
         try:
             reply = self.controller.receive(command, plan, session, admitted.origin)
-        except Exception:
+        except Exception as error:  # noqa: BLE001  see `survives`
             self._note(entry)  # needed to reproduce the error
-            raise
+            return Refused(code="plant_failure", where="", why=self._stop_for(error))
         self._carry_out_orders()  # of programs that it has ended
         # A command of the client in control renews the lease even if it is refused; another client's does not.
         if not isinstance(reply, Refused) or is_holders(
@@ -130,6 +132,22 @@ class Host:
 
     def tick(self) -> None:
         """Compute one control period."""
+        try:
+            self._tick()
+        except Exception as error:  # noqa: BLE001  the second attempt begins with a protective stop
+            self._stop_for(error)
+            self._tick()
+
+    def _stop_for(self, error: Exception) -> str:
+        """Let the next tick stop the robot, since the controller has failed, if it survives that; say why."""
+        if not self._survives:
+            raise error
+        why = f"the controller has failed, see the server's log: {named(error)}"
+        self.controller.programs.raised.append(error)
+        self.controller.fail(why)
+        return why
+
+    def _tick(self) -> None:
         controller, experience = self.controller, self._experience
         if experience is not None and controller.cycle.mode.at_rest:
             self._learn(experience)
@@ -197,10 +215,12 @@ class Host:
                 sink.truth(truth)
 
     def tell_raised(self) -> None:
-        """Pass on what methods of the plant have raised."""
-        for error in told(self.controller.cycle.line.plant):
+        """Pass on what methods of the plant and functions of programs have raised."""
+        raised = self.controller.programs.raised
+        for error in (*told(self.controller.cycle.line.plant), *raised):
             for sink in self._sinks:
                 sink.raised(error)
+        raised.clear()
 
     def fail(self, why: str) -> None:
         """Let the next tick deal with a failure of the arm outside the controller, such as of what gives its ticks."""

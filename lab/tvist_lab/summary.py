@@ -8,6 +8,7 @@ from typing import Any
 from tvist_lab.metrics import motions
 from tvist_lab.recordings import Recording, RecordingError, mcap_file, read
 from tvist_lab.recordings.description import meaning_of, ordered
+from tvist_lab.recordings.log_columns import ROBOT_OR_SENSOR
 
 
 def summary(path: str | os.PathLike[str], read_as: Recording | None = None) -> dict[str, Any]:
@@ -31,7 +32,7 @@ def summary(path: str | os.PathLike[str], read_as: Recording | None = None) -> d
         content = mcap_file.read_checked(path)
         recording = read_as or content.recording
     except mcap_file.RecordingFileError:
-        recording = read_as or read(path)
+        recording = read_as or read(path, needs=ROBOT_OR_SENSOR)
     info = recording.info
     return {
         "file": str(path),

@@ -14,18 +14,18 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.modes import RuntimeState
 from tvist_server.moving.registers import ALONE, ENDED, LEFT_OUT, NUMBER, PLAYED, RUN, STATE, State
 from tvist_server.rtde.client import Row, RtdeClient
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import Field, Wire
 
 Floats = npt.NDArray[np.float64]
 _COUNTS = tuple(f"output_int_register_{place}" for place in (STATE, PLAYED, ENDED, ALONE, LEFT_OUT, RUN))
-_READ: dict[str, Wire] = {
-    "timestamp": Wire.DOUBLE,
-    "target_q": Wire.VECTOR6D,
-    "target_qd": Wire.VECTOR6D,
-    "safety_mode": Wire.INT32,
-    "runtime_state": Wire.UINT32,
-    f"input_int_register_{NUMBER}": Wire.INT32,
-    **dict.fromkeys(_COUNTS, Wire.INT32),
+_READ: dict[str, Field] = {
+    "timestamp": Field(Wire.DOUBLE),
+    "target_q": Field(Wire.VECTOR6D),
+    "target_qd": Field(Wire.VECTOR6D),
+    "safety_mode": Field(Wire.INT32),
+    "runtime_state": Field(Wire.UINT32),
+    f"input_int_register_{NUMBER}": Field(Wire.INT32),
+    **dict.fromkeys(_COUNTS, Field(Wire.INT32)),
 }
 STILL = 1e-6
 """Speed below which the target is at rest [rad/s]."""

@@ -8,7 +8,6 @@ import msgspec
 import numpy as np
 
 from tvist_controller.api.line import (
-    STILL,
     InverseDynamics,
     Setup,
     body,
@@ -157,11 +156,10 @@ class Subject:
     @property
     def resting(self) -> bool:
         """Whether the shaped reference stands still, at rest or paused, and no part of its motion will follow."""
-        q, cycle, motion = self.references, self.controller.cycle, self.controller.motion
+        cycle, motion = self.controller.cycle, self.controller.motion
         if motion.activity is Activity.MOVING and motion.motions.coming:
             return False
-        still = len(q) > 2 and max(np.abs(q[-1] - q[-2]).max(), np.abs(q[-2] - q[-3]).max()) <= STILL
-        return cycle.mode.at_rest or (still and cycle.trajectory.standing)
+        return cycle.mode.at_rest or (not cycle.trajectory.finished and cycle.stands_still)
 
 
 def torques(description: RobotDescription, payload: Declared, references: Floats) -> Floats:

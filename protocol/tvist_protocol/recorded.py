@@ -37,7 +37,7 @@ RING = "ring"
 """Entry of that metadata in a recording that forgets its beginning: how many ticks it keeps at least."""
 BEHAVIOUR = "behaviour"
 """Entry of that metadata: the number of the robot's behaviour, see `THIS_BEHAVIOUR`; 1 where it is missing."""
-THIS_BEHAVIOUR = 5
+THIS_BEHAVIOUR = 6
 """Number of the present behaviour. It rises with every deliberate change of the bits that a robot computes:
 
 1: recordings without this number.

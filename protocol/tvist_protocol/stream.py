@@ -239,3 +239,5 @@ class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="teleme
     """Control periods due per second of the wall clock [1/s]; null: a client steps time, or an older server."""
     overloaded: bool = False
     """Whether the robot is overloaded; a `warning` tells when this begins and ends."""
+    processor_wait_us: float = 0.0
+    """Time in the last second for which the thread of the ticks waited for a processor [µs]; 0 if it is not known."""

@@ -1,8 +1,10 @@
 """Checks of a plant, which may be a user's own."""
 
+import math
+
 import numpy as np
 
-from tvist_plant.plant import Measurement, Pacing, Plant, PlantError, Standing, Supervised
+from tvist_plant.plant import Measurement, Pacing, Plant, PlantError, Sight, Standing, Supervised
 
 
 def check_unpaced(plant: Plant) -> None:
@@ -65,3 +67,19 @@ def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
             raise ValueError(
                 f"plant {type(plant).__name__}: measured {name} {what}: its shape must be {shape}"
             )
+
+
+def check_sight(sight: Sight, joints: int) -> None:
+    """Check what a robot that its own controller moves has said; a `ValueError` names the field that is wrong."""
+    felt, load = sight.measured, sight.payload
+    measured = np.concatenate((felt.q, felt.qd, felt.moment)).tolist()
+    body = None if load is None else (load.mass, *load.com, *load.inertia)
+    for name, said, count in (  # whose sums are finite only if they are, and quicker to see than by numpy
+        ("target", np.ravel(sight.target).tolist(), 4 * joints), ("measured", measured, 3 * joints),
+        ("modes", sight.modes, 3), ("speed", (sight.speed,), 1), ("tick", (sight.tick,), 1),
+        ("tool", sight.tool, 6), ("force", sight.force, 6), ("payload", body, 10),
+    ):  # fmt: skip
+        if said is not None and (len(said) != count or not math.isfinite(sum(said))):
+            raise ValueError(f"{name} is {said}: must be {count} finite numbers")
+    if sight.slider is not None and not 0.0 <= sight.slider <= 1.0:
+        raise ValueError(f"slider is {sight.slider:g}: must be 0 to 1")

@@ -21,6 +21,8 @@ in an XML file. The parser's time grows with the square of the parts of a key.
 """
 LONGEST_NAME: Final = 100
 """Largest number of characters of a name in a file."""
+LONGEST_LINE: Final = 500
+"""Largest number of characters of what a file, or a library that reads it, says."""
 
 Content = TypeVar("Content")
 
@@ -32,8 +34,14 @@ def named(error: BaseException, said: str | None = None) -> str:
         error: The exception.
         said: What to say instead of its message.
     """
-    words = " ".join((str(error) if said is None else said).split())
+    words = one_line(str(error) if said is None else said)
     return f"{type(error).__name__}: {words}" if words else type(error).__name__
+
+
+def one_line(text: str) -> str:
+    """Return a text in one line that can be shown anywhere: printable, and not too long."""
+    shown = " ".join(text.split())[:LONGEST_LINE]
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in shown)
 
 
 class UserFileError(ValueError):

@@ -21,6 +21,7 @@ passed, apart from the tests with a known reason.
 
 import argparse
 import os
+import re
 import subprocess
 import sys
 import time
@@ -29,6 +30,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import NamedTuple
+
+from report import note
 
 ROBOT, CLIENT = "192.168.56.101", "192.168.56.1"
 READY_WITHIN = 300.0
@@ -128,19 +131,8 @@ def namespaces() -> Iterator[Namespaces]:
             made.callback(_ip, "netns", "del", name)
             _ip("-n", name, "link", "set", "lo", "up")
         ends = f"ur{pid}r", f"ur{pid}c"
-        _ip(
-            "link",
-            "add",
-            ends[0],
-            "netns",
-            names.robot,
-            "type",
-            "veth",
-            "peer",
-            ends[1],
-            "netns",
-            names.client,
-        )
+        peer = "type", "veth", "peer", ends[1], "netns", names.client
+        _ip("link", "add", ends[0], "netns", names.robot, *peer)
         for name, end, address in zip(names, ends, (ROBOT, CLIENT), strict=True):
             _ip("-n", name, "addr", "add", f"{address}/24", "dev", end)
             _ip("-n", name, "link", "set", end, "up")
@@ -170,15 +162,7 @@ def server(
 
 
 class Library:
-    """The built library.
-
-    Args:
-        sources: Folder of its sources.
-        build: Folder of its build.
-        logs: Folder for what its programs print.
-        names: The namespaces.
-        limit: Longest time that a test or an example may take [s].
-    """
+    """The built library; a test or an example may take `limit` seconds."""
 
     def __init__(self, sources: Path, build: Path, logs: Path, names: Namespaces, limit: float) -> None:
         self._sources, self._build, self._logs = sources, build, logs
@@ -264,6 +248,14 @@ def report(title: str, results: Sequence[Result], known: dict[str, str]) -> int:
     return unknown
 
 
+def _note(options: argparse.Namespace, what: str, results: list[Result], why: dict[str, str]) -> None:
+    """Keep the results of whole programs for the page of tested clients."""
+    if options.filter == "*" and not (options.examples and options.only):
+        version = re.search(r"<version>(.*)</version>", (options.sources / "package.xml").read_text())
+        assert version is not None
+        note(f"ur_client_library: {what}", version[1], {one.name: one.outcome for one in results}, why)
+
+
 def main() -> None:
     """Run what the arguments name."""
     parser = argparse.ArgumentParser(
@@ -304,14 +296,19 @@ def main() -> None:
         library = Library(
             options.sources.resolve(), options.build.resolve(), options.logs, names, options.limit
         )
+        results: list[Result] = []
         print("| program | tests | passed | others | seconds |\n|---|---:|---:|---|---:|", flush=True)
         if options.examples:
             for name in chosen:
-                unknown += report(name, [library.example(name)], KNOWN_EXAMPLES)
+                results.append(library.example(name))
+                unknown += report(name, results[-1:], KNOWN_EXAMPLES)
+            _note(options, "examples", results, KNOWN_EXAMPLES)
         else:
             for program in chosen:
                 tests = library.tests(program, options.filter)
-                unknown += report(program, [library.test(program, test) for test in tests], KNOWN)
+                results = [library.test(program, test) for test in tests]
+                unknown += report(program, results, KNOWN)
+                _note(options, program, results, KNOWN)
         if served.poll() is not None:
             raise SystemExit(f"the server ended by itself: see {log}")
     sys.exit(1 if unknown else 0)

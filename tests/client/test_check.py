@@ -212,6 +212,15 @@ def test_an_overloaded_robot_is_alive_and_not_well_and_the_sentence_has_the_rate
     capsys.readouterr()
 
 
+@pytest.mark.parametrize(("waited", "named"), [(45e3, True), (2e3, False)])
+def test_a_tick_that_waits_for_a_processor_for_long_is_named(realtime, endpoint, waited, named):
+    realtime.robot.promised = {"due_per_second": 10.0, "late_max_us": 40e3, "processor_wait_us": waited}
+    said = check(endpoint, alive=True).findings[-1].said
+    assert (
+        "a tick began 40 ms late, as its thread waited for a processor: on Linux, kernel.sc" in said
+    ) == named
+
+
 def test_the_rate_counts_states_received_and_not_their_numbers(realtime, endpoint, monkeypatch):
     """A robot whose numbers run eight times as fast as its states come, as on a network that loses most of them."""
     tick = realtime.robot.pass_tick

@@ -1,6 +1,7 @@
 """The client over real Zenoh sessions, to a robot that does what it is told."""
 
 import asyncio
+import threading
 
 import pytest
 import zenoh
@@ -16,6 +17,7 @@ from tvist_client import (
 )
 from tvist_client.fleet import Fleet, Place
 from tvist_client.robot import CHUNK
+from tvist_client.transports import zenoh as zenoh_transport
 from tvist_client.transports.zenoh import robots_at
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import KeepAlive
@@ -51,6 +53,18 @@ async def test_states_come_in_order_and_the_present_one_is_new(realtime, robot):
 async def test_nobody_listening_is_said_at_once(endpoint):
     with pytest.raises(NotConnectedError, match=f"no server answers at {endpoint}: check that it is running"):
         await Robot.connect(endpoint)
+
+
+async def test_a_connection_that_is_cancelled_while_it_opens_is_closed_again(monkeypatch):
+    go, closed = threading.Event(), []
+    monkeypatch.setattr(zenoh_transport, "open_session", lambda *_: go.wait())
+    monkeypatch.setattr(zenoh_transport, "close_session", closed.append)
+    opening = asyncio.create_task(ZenohTransport.open("tcp/nowhere", "ur5e"))
+    for step in (opening.cancel, go.set):
+        asyncio.get_running_loop().call_later(0.0, step)
+    with pytest.raises(asyncio.CancelledError):
+        await opening
+    assert closed == [True]
 
 
 async def test_another_robots_endpoint_is_said_to_be_that(realtime, endpoint):

@@ -191,6 +191,7 @@ class Robot:
     def tick(self, count: int = 1):
         for _ in range(count):
             state, events = self.controller.tick()
+            assert not self.controller.programs.raised
             self.states.append(state)
             self.events += events
         return self.states[-1] if self.states else None

@@ -93,8 +93,12 @@ class TestProtocol:
             (b"GET SID", b"[9]              "),
             (b"SET SID 9\n", b"ack"),
             (b"SET SID 2\n", b""),
-            (b"SET POS 999\n", b"ack"),
-            (b"SET POS -1\n", b"?"),
+            (b"SET POS 255 SPE 0\n", b"ack"),
+            *[
+                (b"SET POS %s\n" % value, b"?")
+                for value in (b"256", b"999", b"-1", b"12.5", b"1e2", b"9" * 900)
+            ],
+            (b"SET ACT 2\n", b"?"),
             (b"SET POS\n", b"?"),
             (b"SET XYZ 1\n", b"?"),
             (b"GET XYZ", b"?"),

@@ -1,9 +1,13 @@
 """A change of what each motion measures is told soon, and nothing else is."""
 
+import re
+from functools import partial
+
 import numpy as np
 import pytest
 
 from tvist_controller.safety.change_detector import KEPT, ChangeDetector
+from tvist_controller.safety.fit_monitor import GEAR, MASS, MODES, _of_gear, _of_mass, _of_modes
 
 SCATTER = 0.05
 
@@ -74,3 +78,22 @@ def test_it_remembers_so_many_and_no_more():
     for _ in range(3 * KEPT):
         one.take(0.0, 0.02)
     assert len(one._kept) == KEPT
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_no_warning_of_a_change_names_an_interval_that_holds_none(seed):
+    random, said = np.random.default_rng([seed, 54]), []
+    for arguments, tell in ((MASS, _of_mass), (GEAR, partial(_of_gear, joint="elbow")), (MODES, _of_modes)):
+        for _ in range(25):
+            one, count = ChangeDetector(*arguments), int(random.integers(5, 30))
+            errors = arguments[1] * 10 ** random.uniform(-1.5, 1.2, count)
+            shift = random.choice([-1, 1]) * 10 ** random.uniform(-1.5, 0.7)
+            values = errors * random.standard_t(3, size=count) + shift * (np.arange(count) >= count // 2)
+            found = map(one.take, values.tolist(), errors.tolist())
+            said += [tell(change) for change in found if change is not None]
+    assert said
+    for one in said:
+        size, within = map(
+            float, re.search(r"([\d.]+) (?:kg|%) .*\(within ([\d.]+) (?:kg|%)\)", one).groups()
+        )
+        assert size > within or size == within == 0.0, one

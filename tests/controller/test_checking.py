@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from tvist_controller.programs.checking import check_program
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import known_signatures
@@ -42,6 +44,43 @@ def test_functions_that_are_not_simulated_are_warnings_beside_the_errors():
     ]  # fmt: skip
     (finding, *_) = check_program(script("path_offset_enable()"))
     assert finding.text == "path_offset_enable: this controller does not simulate path offsets"
+
+
+THREAD = ("thread job():", "x = {}", "sync()", "end", "t = run job()")
+
+
+@pytest.mark.parametrize(
+    ("before", "value", "warned"),
+    [
+        ("hold = 0.5", "2 * hold + hold", True),
+        ("if True:\n hold = 0.5\nend", "[1, sin(hold)]", True),
+        ("hold = [1, 2]", "hold[0]", True),
+        ("global hold = 0.5", "hold", False),
+        ("hold = 1\nglobal hold = 2", "hold", False),
+        ("hold = 1", "1\nhold = 2\nx = hold", False),
+    ],
+)
+def test_a_variable_that_a_robot_does_not_find_in_a_thread_is_a_warning(before, value, warned):
+    text = script(*before.split("\n"), *(line.format(value) for line in THREAD))
+    warnings = [one for one in check_program(text) if "in the thread job" in one.text]
+    assert [one.level for one in warnings] == ["warning"] * warned
+    for one in warnings:
+        assert text.split("\n")[one.line - 1][one.column - 1 :].startswith("hold")
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("def p():\nwhile True:\nsync()\nend\nsleep(1)\nend\n", [4]),
+        ("# a\ndef p():\n  if True:\n    sync()\nend # if\n  sleep(1)\nend\n", [5]),
+        ("def f():\n  sync()\nend\ndef p():\ndef g():\nend\nf()\nend\np()\n", [6]),
+        ("def p():\n  while True:\n    sync()\n  end\nend_force_mode()\nend\n", []),
+        ("def p():\r\n  sync()\r\nend\r\n", []),
+    ],
+)
+def test_an_end_in_column_one_before_that_of_the_program_is_a_warning(text, lines):
+    warnings = [one for one in check_program(text) if "in column 1" in one.text]
+    assert [(one.line, one.column, one.level) for one in warnings] == [(line, 1, "warning") for line in lines]
 
 
 def test_every_function_that_is_not_simulated_is_warned_of():

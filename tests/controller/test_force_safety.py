@@ -315,6 +315,24 @@ def test_a_payload_that_is_swung_about_is_no_contact():
     assert said(robot) == ["0"]
 
 
+@pytest.mark.parametrize(("sensor", "mass"), [(False, 0.0), (False, 5.0), (True, 3.0)])
+@pytest.mark.parametrize(("late", "speed"), [(4, 1.0), (12, 0.5)])
+def test_set_points_that_come_late_in_free_air_are_no_contact(sensor, mass, late, speed):
+    """As over a network: four times a second so many ticks bring none, and the next one makes up for them."""
+    robot, _ = touching(0.0, sensor=sensor, mass=mass)
+    start(robot, "thread watch():", "s = 0", "while True:", "s = s + tool_contact(get_actual_tcp_speed())",
+          "write_output_integer_register(0, s)", "sync()", "end", "end", "t = run watch()",
+          "q = get_target_joint_positions()", "i = 0", "while i < 600:", "k = 1",
+          f"if i % 125 > {124 - late}:", "k = 0", "elif i % 125 == 0:",
+          f"k = {late + 1}", "end", f"d = k * {0.002 * speed}",
+          "q = [q[0]+d, q[1], q[2]+0.7*d, q[3]-0.2*d, q[4]-d, q[5]-0.5*d]",
+          "servoj(q, t=0.002, lookahead_time=0.03, gain=2000)", "i = i + 1", "end", "stopj(5)")  # fmt: skip
+    robot.tick(750)
+    assert failure(robot) is None
+    assert np.ptp([state.actual_q[0] for state in robot.states]) > 0.9 * speed
+    assert robot.controller.io().output_int_register[0] == 0
+
+
 def test_a_contact_is_judged_anew_when_the_force_is_taken_as_zero():
     robot, plant = feeling(payload=NOTHING)
     plant.pushed[2] = 30.0

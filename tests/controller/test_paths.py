@@ -26,17 +26,17 @@ from .paths import journey
 from .robots import Q1, UR5E, H
 from .spaces import BENT, NO_TOOL, TOOL, away, begun, errors, pose_of, tool_pose
 
-SOME, ALL = 22, 1000
+SOME, ALL = 22, 120
 
 
-@pytest.mark.parametrize("seed", range(SOME))
+@pytest.mark.parametrize("seed", [*range(SOME), 581])  # the last one creeps to its end
 def test_a_random_path_is_where_it_should_be_with_every_shaper(seed):
     is_where_it_should_be(seed)
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(SOME, ALL))
-def test_so_are_all_thousand(seed):
+def test_so_are_many_more(seed):
     is_where_it_should_be(seed)
 
 

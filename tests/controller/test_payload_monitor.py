@@ -7,6 +7,7 @@ import pytest
 from tests.controller.robots import Line
 
 from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.safety.payload_monitor import TOLERATED, PayloadMonitor
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
@@ -116,10 +117,10 @@ def test_within_three_random_moves_a_wrong_payload_is_told_and_a_right_one_never
 
 @pytest.mark.nightly
 @pytest.mark.timeout(1200)
-def test_of_a_thousand_moves_with_a_right_payload_not_one_in_a_hundred_is_told_of():
-    missed, false, _ = told_and_false(334, seed=2)
-    assert missed <= 3
-    assert false <= 10
+def test_of_three_hundred_moves_with_a_right_payload_not_one_in_a_hundred_is_told_of():
+    missed, false, _ = told_and_false(100, seed=2)
+    assert missed <= 1
+    assert false <= 3
 
 
 def test_too_much_declared_is_told_as_well():
@@ -178,3 +179,25 @@ async def test_a_robot_warns_of_it_within_three_moves(declared, told):
         for q in PAPER[1:]:
             await arm.move_j(q)
     assert [event.code for event in warnings] == ["payload_mismatch"] * told
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_warning_names_an_interval_that_holds_what_is_declared(seed):
+    """Whatever the drives feel: nothing, far more, less than no payload at all, or another mass from one moment on."""
+    random = np.random.default_rng([seed, 54])
+    mass = float(random.choice([0.0, random.uniform(0.0, 5.0)]))
+    monitor = PayloadMonitor(ROBOT, disc(mass), follows=bool(random.random() < 0.2))
+    with_a_kilogram, dynamics = (InverseDynamics(ROBOT, disc(mass + more)) for more in (1.0, 0.0))
+    q, still, felt = random.uniform(-np.pi, np.pi, 6), np.zeros(6), 0.0
+    for tick in range(3000):
+        if tick % 500 == 0:
+            q, felt = random.uniform(-np.pi, np.pi, 6), float(random.choice([0.0, 10.0 * random.normal()]))
+            per_kg = with_a_kilogram.gravity(q) - dynamics.gravity(q)
+        signals = np.array([q, q, *[still] * 7])
+        said = monitor.update(signals, still, felt * per_kg + 3.0 * random.normal(size=6), at_rest=True)
+        if said:
+            declared, holds, less, within = re.search(
+                r"^([\d.e-]+) kg are .* hold (?:about )?([\d.]+) kg( less)? \(within ([\d.]+) kg\)", said
+            ).groups()
+            off = float(holds) if less else abs(float(holds) - float(declared))
+            assert off > float(within), said

@@ -287,6 +287,20 @@ def test_the_end_of_a_line_of_numbers_is_no_answer_to_what_is_asked_next(parts):
     assert said(robot) == ["[2, 1, 2]", "3", "abc"]
 
 
+def test_a_number_names_the_same_socket_as_its_text_and_another_value_names_none():
+    robot = a_robot()
+    far = Far(robot)
+    start(robot, 'socket_open("h", 7, 3)', 'socket_set_var("ACT", 1, "3")', "socket_send_int(5, 3)", "socket_close(4)",
+          'textmsg(socket_get_var("POS", 3))', "socket_close(True)")  # fmt: skip
+    robot.tick()
+    far.tell("opened")
+    robot.tick(2)
+    far.tell("received", b"POS 8\n")
+    finish(robot)
+    assert (far.sent, said(robot)) == (b"SET ACT 1\n" + ints(5) + b"GET POS\n", ["8"])
+    assert "socket_name is True: it must be a text" in failure(robot).why
+
+
 def test_a_name_that_is_not_utf_8_can_be_told():
     robot, far = opened("x = socket_read_string()", "socket_open(x, 5, x)")
     far.tell("received", b"\xff\xfe")

@@ -12,6 +12,7 @@ from tvist_protocol.motions import MoveL
 from tvist_protocol.programs import ProgramClosePopup, ProgramPause, ProgramPlay, ProgramRun, ProgramStop
 from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationInject
+from tvist_protocol.values import Payload
 
 from .robots import UR5E, Robot
 from .scripts import URSIM, a_robot, failure, finish, playing, run, said, script, start
@@ -329,6 +330,24 @@ def test_a_watchdog_pauses_or_stops_the_program_when_its_register_is_not_written
     assert robot.controller.programs.state == state
     assert (robot.controller.io().watched == []) == (action == "stop")
     robot.until_rest()
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.1, 1.0])
+def test_what_is_published_goes_over_to_another_payload_in_the_time_that_a_program_says(seconds):
+    robot = a_robot(payload=Payload(mass=2.0, com=(0.0, 0.0, 0.01), inertia=(0.0,) * 6))
+    start(robot, f"set_target_payload(1, [0.02, 0, 0.05], [0, 0, 0, 0, 0, 0], {seconds})", "sleep(2)")
+    masses = []
+    for _ in range(600):
+        robot.tick()
+        io = robot.controller.changed_io()
+        masses.append(masses[-1] if io is None else io.payload.mass)
+        share = 2.0 - masses[-1]
+        if io is not None:
+            np.testing.assert_allclose(io.payload.com, (0.02 * share, 0.0, 0.01 + 0.04 * share), atol=1e-12)
+    changing = sum(1.0 < mass < 2.0 for mass in masses)
+    assert changing == pytest.approx(seconds / 0.002, abs=1)
+    assert max(np.diff(masses)) <= 0.0
+    assert (masses[0], masses[-1]) == (2.0, 1.0)
 
 
 def test_set_tcp_set_payload_and_their_getters():

@@ -30,6 +30,8 @@ set_base_acceleration([0, 0, 0])
 set_safety_mode_transition_hardness(1)
 position_deviation_warning(False)
 reset_revolution_counter(qNear=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+motion_version_set(1)
+jerk_gain_scaling_set(0.5)
 high_holding_torque_enable()
 high_holding_torque_disable()
 global Plane_1 = p[0.1, 0.2, 0.3, 0.0, 0.0, 1.57]
@@ -45,11 +47,11 @@ def test_a_preamble_is_accepted_and_what_it_sets_shows_in_rtde():
         a_robot(),
         *PREAMBLE,
         '$ 1 "Robot Program"',
-        "textmsg([get_gravity(), get_base_acceleration(), get_tool_current()])",
+        "textmsg([get_gravity(), get_base_acceleration(), get_tool_current(), motion_version_get()])",
     )
     assert failure(robot) is None
     assert warnings(robot) == []
-    assert said(robot) == ["[[0, 0, 9.82], [0, 0, 0], 0]"]
+    assert said(robot) == ["[[0, 0, 9.82], [0, 0, 0], 0, 1]"]
     snapshot = Instruments(UR5E).snapshot(robot.states[-1], robot.controller.io())
     assert (snapshot.tool_analog_input_types, snapshot.tool_output_mode) == (2, 1)
     assert (snapshot.tool_digital_output0_mode, snapshot.tool_digital_output1_mode) == (2, 3)
@@ -78,6 +80,8 @@ def test_the_older_call_for_ranges_of_inputs_knows_those_of_the_tool():
         ('set_gp_boolean_input_action(128, "default")', "port is 128: it must be from 0 to 127"),
         ('set_standard_digital_input_action(0, "stop")', 'action is stop: it must be "default" or "freedrive"'),
         ("set_safety_mode_transition_hardness(2)", "type is 2"),
+        ("motion_version_set(3)", "version is 3: it must be from 1 to 2"),
+        ("jerk_gain_scaling_set(0)", "gain is 0: it must be from 0.01 to 1"),
         ("set_base_acceleration([0.1, 0, 0])", "the simulated arm's base stands"),
         ("set_runstate_tool_digital_output_to_value(2, 1)", "outputId is 2: it must be from 0 to 1"),
         ("set_runstate_standard_digital_output_to_value(0, 6)", "whether the arm has power are not simulated"),

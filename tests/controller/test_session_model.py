@@ -399,7 +399,7 @@ TOLD = {"lease_lost", "stream_stopped", "protective_stop"}
 
 
 @pytest.mark.parametrize(
-    "runs", [100, pytest.param(2000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
+    "runs", [100, pytest.param(500, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
 )
 def test_every_reply_and_every_change_is_as_the_table_says(runs):
     run_state_machine_as_test(

@@ -285,7 +285,7 @@ class Steps(RuleBasedStateMachine):
 
 
 @pytest.mark.parametrize(
-    "runs", [60, pytest.param(1500, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
+    "runs", [60, pytest.param(400, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
 )
 def test_time_passes_by_the_steps_of_who_may_and_by_nothing_else(runs):
     run_state_machine_as_test(

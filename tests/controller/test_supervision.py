@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tests.controller.robots import Q2, UR5E, Robot
 
+from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, PlantError, Sight
 from tvist_protocol import commands as c
@@ -148,6 +149,17 @@ def test_its_slider_scales_our_speed_and_leaves_what_was_set(robot, arm):
     arm.says(slider=1.0)
     robot.tick(2)
     assert robot.states[-1].speed_scaling == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("said", [{"slider": np.nan}, {"slider": -1.0}, {"speed": np.inf}, {"tool": (1.0,)}])
+def test_what_no_robot_can_say_stops_it_and_names_the_field(arm, said):
+    robot = Robot(plant=called(arm, 6))
+    robot.tick(5)
+    moving(robot, arm)
+    arm.says(**said)
+    robot.tick(2)
+    assert f"{next(iter(said))} is" in robot.events[-1].why
+    assert not arm.holds
 
 
 def test_what_it_would_not_get_is_refused(robot):

@@ -16,6 +16,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
+from tests.acceptance import report
 from tests.conformance.served import Served, finished
 from tests.places import own_address
 from tools.release.first_commands import FENCE
@@ -294,3 +295,9 @@ class TestSnippets:
             run("-m", "pytest", "-q", "-p", "no:cacheprovider", script, cwd=tmp_path)
         else:
             run("-W", "error", script, cwd=folder)
+
+
+def test_the_page_of_tested_clients_says_what_came_of_the_acceptance_tests_and_nothing_else():
+    page = report.PAGE.read_text()
+    assert report.with_results(page, json.loads(report.RESULTS.read_text())) == page
+    assert page.count(report.BEGIN) == page.count(report.END) == 1

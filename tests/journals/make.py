@@ -4,97 +4,20 @@ Each is a served robot with the clients that its name tells of. What runs in rea
 every time; only its replay is always the same.
 """
 
-import math
 import random
 import socket
 import sys
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
-from tests.conformance.served import PATIENCE, Served
-from tests.conformance.wire import Q1, Wire
+from tests.conformance.served import PATIENCE
+from tests.conformance.wire import Q1
+from tests.journals import at_work
+from tests.journals.hand import robot
 
 Q2 = [0.0, -2.9, 0.4, -1.4, 0.3, 0.2]
 Q3 = [0.6, -2.7, 0.5, -1.9, -0.3, 0.6]
 SHAPERS = ("none", "zv", "zvd", "ei3", "auto", "short", "zv_3_modes", "auto-target")
-TICK = 0.002
-MOST = 1000
-"""Ticks in one step."""
-
-
-@contextmanager
-def robot(path, *options, clock="lockstep"):
-    """A served robot that records, and somebody with control of it."""
-    with (
-        Served("--clock", clock, "--record", str(path), *options) as served,
-        Wire(served.endpoint) as wire,
-    ):
-        wire.listen("event", "state")
-        answer = wire.command("take_control", client="somebody", lease_s=30.0)
-        yield Hand(wire, answer["token"], lockstep=clock == "lockstep")
-        assert served.end() == 0
-
-
-class Hand:
-    """What somebody with control does."""
-
-    def __init__(self, wire, token, *, lockstep):
-        self.wire, self.token, self.lockstep = wire, token, lockstep
-
-    def do(self, command, **fields):
-        return self.wire.command(command, token=self.token, **fields)
-
-    def wait(self, ticks):
-        """Let ticks pass."""
-        if self.lockstep:
-            for first in range(0, ticks, MOST):
-                answer = self.do("simulation.step", ticks=min(ticks - first, MOST))
-                assert answer["type"] == "done", answer
-        else:
-            time.sleep(ticks * TICK)
-
-    def move(self, q, **limits):
-        """Move, and wait for the end where it begins."""
-        answer = self.do("move_j", q=q, **limits)
-        if answer["type"] == "accepted" and not self.lockstep:
-            self.wire.wait("event", lambda e: e.get("id") == answer["id"] and e["kind"] != "motion_started")
-        elif answer["type"] == "accepted":
-            self.wait(1500)
-        return answer
-
-    def stream(self, seconds, period=TICK, *, amplitude=0.1, hertz=0.7, joint=1, sequence=0):
-        """Stream a sine from where the arm stands."""
-        start = self.wire.next("state")["reference_q"] if not self.lockstep else None
-        if start is None:
-            self.wait(1)
-            start = self.wire.received["state"][-1]["reference_q"]
-        assert self.do("servo_start", period=period)["type"] == "done"
-        for number in range(round(seconds / period)):
-            t = (number + 1) * period
-            q = list(start)
-            q[joint] += amplitude * math.sin(2 * math.pi * hertz * t) * min(t, 1.0)
-            self.wire.setpoint(token=self.token, sequence=sequence + number + 1, q=q)
-            if self.lockstep and number % 25 == 24:
-                self.wait(25 * round(period / TICK))
-            elif not self.lockstep:
-                time.sleep(period)
-
-    def stream_in_steps(self, seconds, *, joint=0, amplitude=0.1, hertz=1.0):
-        """Stream with the set-points inside steps."""
-        self.wait(1)
-        start = self.wire.received["state"][-1]["reference_q"]
-        assert self.do("servo_start", period=TICK)["type"] == "done"
-        count, number = round(seconds / TICK), 0
-        while number < count:
-            setpoints = []
-            for _ in range(50):
-                number += 1
-                q = list(start)
-                q[joint] += amplitude * math.sin(2 * math.pi * hertz * number * TICK)
-                setpoints.append({"sequence": number, "q": q})
-            answer = self.do("simulation.step", ticks=50, setpoints=setpoints)
-            assert answer["type"] == "done", answer
 
 
 def moves_with_every_shaper(path):
@@ -294,7 +217,7 @@ def live_rtde_inputs(path):
 RUNS = (
     moves_with_every_shaper, moves_with_another_payload, stops_pauses_and_the_slider, streams, faults,
     collisions_and_refusals, live_moves, live_stream, live_faults, live_lost_lease, live_programs_of_the_dashboard,
-    live_rtde_inputs,
+    live_rtde_inputs, *at_work.RUNS,
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Keep what a replay needs of recordings, and every fiftieth state: `python -m tests.journals.thin FOLDER`."""
+"""Keep what a replay needs, and every fiftieth state and truth: `python -m tests.journals.thin FOLDER`."""
 
 import hashlib
 import os
@@ -39,6 +39,9 @@ def thin(path, kept):
         for state in content.states:
             if state.tick % EVERY == 0 or state.tick == last:
                 recorder.state(state)
+        for truth in content.truths:
+            if truth.tick % EVERY == 0:
+                recorder.truth(truth)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ def test_one_motion_tells_a_payload_and_an_unchanged_one_is_left_alone():
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", CASES)
 def test_one_motion_brings_nine_in_ten_within_two_points_of_the_known_payload(name):
-    behind = judged(60, CASES[name], first=SEED)
+    behind = judged(30, CASES[name], first=SEED)
     assert np.mean(behind[:, 1] <= 2.0) >= 0.85
     assert np.mean(behind[:, 2] <= 2.0) >= 0.9
 
@@ -36,7 +36,7 @@ def test_one_motion_brings_nine_in_ten_within_two_points_of_the_known_payload(na
 @pytest.mark.nightly
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", CASES)
-def test_of_thousands_of_unchanged_motions_none_in_a_thousand_teaches(name):
-    told, found = zip(*(unchanged(SEED + seed, 5, **CASES[name]) for seed in range(60)), strict=True)
-    assert sum(told) <= 1
+def test_of_hundreds_of_unchanged_motions_none_teaches(name):
+    told, found = zip(*(unchanged(SEED + seed, 5, **CASES[name]) for seed in range(10)), strict=True)
+    assert sum(told) == 0
     assert np.abs(np.concatenate(found)).max() < LARGEST_OFF

@@ -1,5 +1,6 @@
 """The arm in a world: what it touches pushes back as the scene says, and a gripper holds by friction."""
 
+import os
 from hashlib import sha256
 
 import mujoco
@@ -11,6 +12,7 @@ from msgspec.structs import replace
 from tvist_plant.description import Payload, load
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import GRAVITY, Hand, InWorld, PlantError, played
+from tvist_plant.world import apart
 from tvist_plant.world.mujoco_arm import MujocoArm
 from tvist_plant.world.scene_file import SceneError, find_scene, scenes
 from tvist_plant.world.world_arm import WorldArm
@@ -210,6 +212,24 @@ def test_what_a_reset_would_stand_in_is_known_before_and_asking_changes_nothing(
             np.testing.assert_array_equal(one, two)
 
 
+@pytest.mark.parametrize("off", [0.0, 1e-6, 1e-3])
+def test_what_only_turns_about_its_centre_of_mass_is_touched_as_stiffly_as_anything_else(tmp_path, off):
+    """A beam is turned against a post with a constant force."""
+    force, lever, k = 20.0, 0.12, 5e4
+    text = (
+        f'<mujoco><worldbody><body name="beam" pos="2 2 2"><joint name="hinge" pos="{off} 0 0" damping="1"/>'
+        '<geom type="box" size="0.2 0.01 0.01" mass="2"/></body>'
+        f'<geom size="0.02" pos="{2 + off + lever} 2.03 2" solref="-{k} -100"/></worldbody></mujoco>'
+    )
+    arm = world(tmp_path, text)
+    arm.reset(still(DOWN))
+    model, data = arm._world.model, arm._arm.data
+    data.qfrc_applied[model.joint("world/hinge").dofadr[0]] = force * lever
+    held(arm, DOWN, 400)
+    (touch,) = data.contact
+    assert -touch.dist == pytest.approx(force / k, rel=0.01)
+
+
 @pytest.mark.parametrize("phase", [0.0, 0.3, 0.7])
 def test_an_elastic_impact_has_the_peak_of_v_sqrt_k_m_and_gains_no_energy(tmp_path, phase, measured):
     """The one-joint arm without damping, friction and drives that yield, stretched out, against a wall."""
@@ -340,7 +360,9 @@ def test_the_scenes_stand_still_and_leave_room_for_the_arm(name, ur5e):
 
 
 BOX = '<body name="{0}" pos="-0.5 0 0.2"><freejoint/><geom type="box" size="{1} {1} {1}" mass="{2}"/></body>'
-PEA = BOX.format("pea", 0.005, 1e-4)
+HEIGHTS = '<mujoco><asset><hfield name="h" nrow="{0}" ncol="{0}" size="1 1 1 1"/></asset></mujoco>'
+FILES = "<asset>" + "".join(f'<mesh file="{number}.stl"/>' for number in range(20_001)) + "</asset>"
+PEA, EVIL = BOX.format("pea", 0.005, 1e-4), BOX.format("&#x9b;2J" + 9999 * "a", 1, 1)
 
 
 @pytest.mark.parametrize(
@@ -365,12 +387,34 @@ PEA = BOX.format("pea", 0.005, 1e-4)
             + "</worldbody></mujoco>",
             "too many for real time",
         ),
+        (HEIGHTS.format(65536), "MuJoCo ends with exit code -11: a scene may take 30 s and 768 MiB"),
+        (HEIGHTS.format(20000), "MuJoCo fails: "),
+        (
+            '<mujoco><worldbody><geom size="0.1" solref="-inf nan"/></worldbody></mujoco>',
+            "has a solref that is",
+        ),
+        pytest.param(f"<mujoco><worldbody>{EVIL}{EVIL}</worldbody></mujoco>", "\ufffd2Ja", id="long name"),
+        ('<mujoco><include file="pipe"/></mujoco>', "file .*pipe is a pipe, not a file"),
+        ('<mujoco><compiler meshdir="/dev"/><asset><mesh file="null"/></asset></mujoco>', "null is a device"),
+        ('<mujoco><asset><mesh file="large.stl"/></asset></mujoco>', "more than 256 MiB"),
+        pytest.param(f"<mujoco>{FILES}</mujoco>", "it names too many files", id="many files"),
     ],
 )
 def test_a_bad_scene_is_one_sentence(tmp_path, text, said):
+    os.mkfifo(tmp_path / "pipe")
+    with (tmp_path / "large.stl").open("wb") as large:
+        large.truncate(1 << 29)
     with pytest.raises((SceneError, PlantError), match=said) as raised:
         world(tmp_path, text).reset(still(DOWN))
-    assert "\n" not in str(raised.value)
+    assert str(raised.value).isprintable()
+    assert len(str(raised.value)) < 1000
+
+
+def test_a_scene_for_which_mujoco_takes_too_long_is_one_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr(apart, "LONGEST", 1)
+    shapes = 60_000 * '<geom size="0.1" pos="3 3 3"/>'
+    with pytest.raises(SceneError, match="exit code -14: a scene may take 1 s"):
+        world(tmp_path, f"<mujoco><worldbody>{shapes}</worldbody></mujoco>")
 
 
 def test_a_scene_that_is_missing_names_those_that_come_with_the_package():

@@ -174,9 +174,10 @@ class Alone(Followed):
         return self._ints[r.NUMBER]
 
 
-def packages(path, count, order=RUN):
-    """The input packages of set-points: rows of a path, from the first on."""
+def packages(path, count, order=RUN, before=0):
+    """The input packages of set-points: rows of a path, from the first on, with the numbers after `before`."""
     window, made = Window(), []
+    window.number = before
     for row in path[:count]:
         window.add(tuple(row))
         made.append(window.values(order))

@@ -118,13 +118,33 @@ def test_an_arm_that_fails_while_it_begins_its_tick_has_it_from_the_clock_and_st
     assert host.failure is None
 
 
-@pytest.mark.parametrize("error", [ArithmeticError, KeyboardInterrupt, GeneratorExit])
-def test_a_tick_that_fails_ends_all_robots_of_the_thread_and_says_so(caplog, error):
-    class Failing(FakeHost):
-        def tick(self):
-            raise error("on purpose")
+class Failing(FakeHost):
+    def tick(self):
+        raise self.error("on purpose")
 
+
+@pytest.mark.parametrize("failing", ["tick", "job"])
+def test_a_tick_or_job_that_fails_ends_its_robot_alone_whose_clients_are_still_answered(caplog, failing):
+    other, robot, answered = Mailbox(FakeHost()), Mailbox(Failing()), threading.Event()
+    robot.host.error = ArithmeticError if failing == "tick" else None
+    clock = Realtime([other, robot], lambda: None, PERIOD)
+    if failing == "job":
+        robot.post(lambda: 1 / 0)
+    clock.start()
+    assert other.host.reached.wait(WAIT)
+    robot.post(answered.set)
+    assert answered.wait(WAIT)
+    clock.close()
+    assert other.host.failure is None
+    assert "see the log" in robot.host.failure
+    assert robot.host.left
+    assert caplog.text.count("Traceback") == 1
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, GeneratorExit])
+def test_what_ends_the_thread_ends_all_robots_and_says_so(caplog, error):
     robots = [Mailbox(FakeHost()), Mailbox(Failing())]
+    robots[1].host.error = error
     clock = Realtime(robots, lambda: None, PERIOD)
     clock.start()
     clock._thread.join(WAIT)

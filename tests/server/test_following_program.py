@@ -67,6 +67,17 @@ def test_a_package_has_the_newest_set_point_first_and_every_register_once():
     assert len(r.INPUTS) == len(window.values(RUN))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_numbers_that_begin_anew_change_nothing(seed):
+    arrivals = late(np.random.default_rng(seed), 200, jitter=1.4, stalls=0.02, longest=6)
+    runs = Alone(), Alone()
+    for robot, before in zip(runs, (0, r.MOST - 100 + seed), strict=True):
+        robot.play(packages(swings(200, 0.4), 200, before=before), arrivals[:200])
+    first, second = (str((run.told, run.at, run.alone, run.output(r.LEFT_OUT), run.state)) for run in runs)
+    assert first == second
+    assert runs[1].numbers[-1] < 200 < runs[1].numbers[0]
+
+
 @examples(20)
 @given(seed=st.integers(0, 2**31), speed=st.floats(0.05, 3.0), jitter=st.floats(0.0, 0.99))
 def test_on_a_good_link_it_plays_every_set_point_as_it_is(seed, speed, jitter):

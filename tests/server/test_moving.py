@@ -1,6 +1,8 @@
 """What a robot is moved by, without a socket or a clock: inputs that are claimed, start checks, reasons and periods."""
 
 import contextlib
+import math
+import re
 import struct
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,14 +17,21 @@ from tests.controller.robots import UR5E, Robot
 
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.line.kinematics import ForwardKinematics
+from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload, load
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import Measurement, Sight
+from tvist_plant.plant import PERIOD, Measurement, Sight
+from tvist_protocol import commands as c
+from tvist_protocol.codec import decode_state, encode
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.moving import registers as r
+from tvist_server.moving.commanded_robot import CommandedRobot
 from tvist_server.moving.configuration import Configuration, found, narrowed
+from tvist_server.moving.connection import CommandingConnection
+from tvist_server.moving.dialogue import NoAnswerError, ask
 from tvist_server.moving.halts import halt_by_modes, halt_by_program
+from tvist_server.moving.moved_robot import MovedRobot
 from tvist_server.moving.pace import MOST, SILENT, Pace
 from tvist_server.moving.registers import Ended
 from tvist_server.moving.run import HEEDS, Run
@@ -38,8 +47,9 @@ from tvist_server.moving.upload import Upload
 from tvist_server.rtde.client import RtdeError
 from tvist_server.rtde.codec import PackageKind, package
 from tvist_server.rtde.commanding import CommandingClient
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import Field, Wire
 from tvist_server.watching.place import place_of
+from tvist_server.watching.variables import NEEDED, OPTIONAL
 
 Q = np.array([0.3, -1.2, 1.5, -1.8, -1.5, 0.2])
 GOOD = Sight(
@@ -51,14 +61,14 @@ WANTED = Wanted(UR5E, Payload(mass=5.0))
 
 
 def client():
-    return CommandingClient({"timestamp": Wire.DOUBLE}, {}, {"n": Wire.INT32, "q": Wire.DOUBLE})
+    return CommandingClient({"timestamp": Field(Wire.DOUBLE)}, {}, {"n": Wire.INT32, "q": Wire.DOUBLE})
 
 
-def set_up(commanding, types):
+def set_up(commanding, types, outputs=b"DOUBLE"):
     answers = [
         (PackageKind.REQUEST_PROTOCOL_VERSION, b"\x01"),
         (PackageKind.GET_URCONTROL_VERSION, struct.pack(">4I", 5, 22, 0, 1)),
-        (PackageKind.SETUP_OUTPUTS, b"\x01DOUBLE"),
+        (PackageKind.SETUP_OUTPUTS, b"\x01" + outputs),
         (PackageKind.SETUP_INPUTS, b"\x07" + types),
     ]
     return [commanding.receive(package(*answer)).send for answer in answers]
@@ -166,6 +176,8 @@ def test_interfaces_that_lack_a_question_leave_it_open(sent):
     assert answers_trouble(WANTED, {"get robot model": "UR5", "is in remote control": "true"}, own) is None
     assert "it is a UR10" in answers_trouble(WANTED, {"get robot model": "UR10"}, own)
     assert "local control" in answers_trouble(WANTED, {"is in remote control": "false"}, own)
+    for wrong in (math.nan, 0.0, 1e-9):
+        assert "largest velocities" in answers_trouble(WANTED, {}, own._replace(velocity=np.full(6, wrong)))
     other = WANTED._replace(description=load("ur10e"))
     assert "dimensions are not those of a UR10e" in answers_trouble(other, {}, own)
 
@@ -389,3 +401,109 @@ def test_a_program_is_sent_only_if_the_robot_is_free_at_the_last_moment(monkeypa
     upload.thread.join(10.0)
     assert upload.trouble == "a program runs on it"
     assert sent == []
+
+
+FAR, TEXT = place_of("ur://127.0.0.1:9"), package(PackageKind.TEXT_MESSAGE, b"\x06\x1b[2J\nX\x00\x03")
+FIELDS = {**NEEDED, **r.OUTPUTS, **OPTIONAL}
+DOUBLES = [name for name, field in FIELDS.items() if field.wire.value.endswith("d")]
+STANDS = {name: (0,) * field.wire.length for name, field in FIELDS.items()} | {
+    "actual_TCP_pose": ForwardKinematics(UR5E).tool(Q, np.zeros(6))[0], "robot_mode": (7,), "safety_mode": (1,),
+    "payload": (5.0,), "speed_scaling": (1.0,), "target_speed_fraction": (1.0,),
+}  # fmt: skip
+
+
+def packed(row, recipe=1):
+    values = [struct.pack(f">{field.wire.value}", *row[name]) for name, field in FIELDS.items()]
+    return package(PackageKind.DATA, bytes([recipe]) + b"".join(values))
+
+
+class Far:
+    """A robot in the test's own time, its own socket and selector; `spoil` makes of its rows the bytes that come."""
+
+    def __init__(self, patch):
+        self.now, self.written, self.spoil, self.close = 50.0, [], packed, lambda: None
+        times = SimpleNamespace(monotonic=self.passed, sleep=self.passed, monotonic_ns=lambda: 1)
+        for module in ("watching.connection", "watching.watched_robot", "moving.moved_robot", "moving.run"):
+            patch.setattr(f"tvist_server.{module}.time", times)
+        patch.setattr("tvist_server.moving.run.Upload", self.upload)
+        patch.setattr(CommandedRobot, "_new_connection", lambda _: self.connected())
+
+    def passed(self, duration=1e-7):
+        self.now += duration
+        return self.now
+
+    def connected(self):
+        self.run, self.number, self.q = 0, 0, tuple(Q)
+        client, link = CommandingClient(FIELDS, {}, r.INPUTS), object.__new__(CommandingConnection)
+        wires = r.INPUTS.values(), [field.wire for field in FIELDS.values()]
+        set_up(client, *(",".join(wire.name for wire in one).encode() for one in wires))
+        client.receive(package(PackageKind.START, b"\x01"))
+        vars(link).update(
+            client=client, _commanding=client, _socket=self, _selector=self, _place=FAR, texts=[]
+        )
+        vars(link).update(_heard=self.now, _newest=-1, _connected=True, _rest=b"")
+        return link
+
+    def send(self, data):
+        number, order, *angles = struct.unpack(">ii24d", data[4:]) if data else (0, 0)
+        self.run = self.run if order in {0, self.run} else 0
+        if self.run and number:
+            self.written.append(angles)
+            self.number, self.q = number, tuple(angles[:6])
+        return len(data)
+
+    def select(self, timeout):
+        return timeout > 0.0 and self.passed(PERIOD) > 0.0
+
+    def recv(self, _):
+        said = {r.RUN: self.run, r.STATE: 2 if self.number else 1, r.PLAYED: self.number}
+        row = STANDS | {f"output_int_register_{place}": (value,) for place, value in said.items()}
+        row |= {"timestamp": (self.now,), "runtime_state": (2 if self.run else 1,)}
+        return self.spoil(row | {"target_q": self.q, "actual_q": self.q})
+
+    def upload(self, _, text, __):
+        self.run = int(re.search(rf"register\({r.RUN}, (\d+)\)", text)[1])
+        return SimpleNamespace(trouble=None, close=lambda: None)
+
+
+SPOILT = [
+    ("to 1e+06 s", {"timestamp": (1e6,)}),
+    ("to 3 s", {"timestamp": (3.0,)}),
+    ("no new row for 1 s", {"timestamp": (51.0,)}),
+    ("no new row for 1 s", TEXT),
+    ("no new row for 1 s", packed(STANDS, recipe=2)),
+    ("more texts of the robot are left out", {}),
+    ("target_speed_fraction is -1: must be 0 to 1", {"target_speed_fraction": (-1.0,)}),
+    *[(f"{name} is nan: must be", {name: (math.nan,) * len(STANDS[name])}) for name in DOUBLES],
+]
+
+
+@pytest.mark.parametrize(("said", "wrong"), SPOILT, ids=[said for said, _ in SPOILT])
+def test_what_is_wrong_in_rows_is_said_and_no_set_point_leaves_the_limits(monkeypatch, said, wrong):
+    far = Far(monkeypatch)
+    plant = called(MovedRobot(FAR, UR5E, Payload(mass=5.0), speed_cap=0.5), 6)
+    robot = Robot(plant=plant)
+    for tick in range(800):
+        if tick == 100:
+            robot.send(c.MoveJ, q=tuple(Q + 0.2), velocity=0.4)
+        elif tick == 160:
+            far.spoil = lambda row: wrong if isinstance(wrong, bytes) else packed(row | wrong) + 50 * TEXT
+        if plant.wait(0.1):
+            robot.tick()
+    told = [event.why for event in robot.events if event.why]
+    assert any(said in why for why in told)
+    assert len(told) < 60
+    assert all(why.isprintable() for why in told)
+    assert all(decode_state(encode(state)) for state in robot.states)  # which bounds each number
+    sent = np.reshape(far.written, (-1, 4, 6))
+    assert (np.abs(sent) <= UR5E.limits.position).all()
+    assert 1e-4 < np.abs(np.diff(sent, axis=1)).max() <= 0.5 * PERIOD * (1 + 1e-9)
+
+
+def test_a_conversation_has_one_deadline_however_slowly_it_is_answered(monkeypatch):
+    times = iter(np.arange(0.0, 9.0, 0.1))
+    monkeypatch.setattr("tvist_server.moving.dialogue.time", SimpleNamespace(monotonic=lambda: next(times)))
+    slow = SimpleNamespace(sendall=len, settimeout=float, recv=lambda _: b"x")
+    monkeypatch.setattr("socket.create_connection", lambda *_: contextlib.nullcontext(slow))
+    with pytest.raises(NoAnswerError, match="no answer within 2 s"):
+        ask(FAR, b"", lambda _: None)

@@ -2,6 +2,7 @@
 
 import os
 import resource
+import subprocess
 import sys
 import threading
 
@@ -30,6 +31,17 @@ def test_a_processor_that_is_not_there_is_named_and_the_thread_runs_anywhere(cap
     assert in_a_thread(punctual.bind, 4095) == [False, os.sched_getaffinity(0)]
     (record,) = caplog.records
     assert "cannot be bound to processor 4095" in record.getMessage()
+
+
+def test_a_thread_knows_how_long_it_has_waited_for_a_processor():
+    def wait():
+        punctual.bind(min(os.sched_getaffinity(0)))
+        with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy:  # on the same processor
+            while punctual.waited_us() < 1e4:
+                pass
+            busy.kill()
+
+    in_a_thread(wait)
 
 
 def test_other_threads_leave_a_processor_only_if_there_is_another(monkeypatch, caplog):

@@ -8,11 +8,12 @@ from hypothesis import strategies as st
 
 from tvist_server.rtde.client import RtdeClient, RtdeError
 from tvist_server.rtde.codec import PackageKind, package
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import Field, Wire
 from tvist_server.watching.place import place_of
 from tvist_server.watching.row_count import RowCount
 
-NEEDED, OPTIONAL = {"timestamp": Wire.DOUBLE, "q": Wire.VECTOR3D}, {"payload": Wire.DOUBLE}
+NEEDED = {"timestamp": Field(Wire.DOUBLE), "q": Field(Wire.VECTOR3D)}
+OPTIONAL = {"payload": Field(Wire.DOUBLE)}
 
 
 def answers(types):

@@ -43,6 +43,14 @@ LIFT = """def lift():
   sleep(0.2)
 end
 """
+PRESS = """def press():
+  movel(p[-0.45, -0.3, 0.4, 2.2214, 2.2214, 0], a=2, v=1)
+  while tool_contact([0, 0, -1, 0, 0, 0]) == 0:
+    speedl([0, 0, -0.05, 0, 0, 0], 0.5, get_steptime())
+  end
+  stopl(3)
+end
+"""
 FORCE = 80
 HEAVY = Payload(mass=5.0, com=(0.0, 0.0, 0.05), inertia=(0.01, 0.0, 0.0, 0.01, 0.0, 0.01))
 
@@ -80,6 +88,12 @@ def test_a_program_lifts_a_box_and_its_recording_does_the_same_again(tmp_path):
     np.testing.assert_array_equal(content.truths[-1].body_poses[12:], places["box"])
     done = replay_file(content)
     assert (done.first_difference, done.notes) == (None, [])
+
+
+def test_without_a_given_payload_the_arm_has_a_tool_so_that_its_sensor_feels_what_it_touches():
+    watch = ran(ServeConfig(world="table", profile="ursim", clock="free").setup(), PRESS)
+    assert watch.reason == "finished"
+    assert ServeConfig(world="table", profile="ursim", payload=0.0).setup().payload.mass == 0.0
 
 
 def test_a_force_that_is_too_small_does_not_lift_it(tmp_path):

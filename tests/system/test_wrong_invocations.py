@@ -194,6 +194,7 @@ MISUSE = [
     (("identify", "--model", "modal", "--figures", "x"), ["figures is for the polynomial model"]),
     (("serve", "--dump", "nowhere"), ["dump is 'nowhere'", "a folder"]),
     (("serve", "--ur", "--ur-allow", "300.1.1.1"), ["'300.1.1.1'", "an IP address"]),
+    (("serve", "--reserve-inputs", "speed"), ["reserve_inputs has 'speed'", "speed_slider_mask"]),
     (("serve", "--listen", "7447"), ["listen is '7447'", "tcp/127.0.0.1:7447"]),
     (("serve", "--insecure", "--listen", "http://localhost:80"), ["'http://localhost:80'", "tcp/ADDRESS:PORT"]),
     (("identify", "--model", "best"), ["--model is 'best'", "polynomial, modal"]),

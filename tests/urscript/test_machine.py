@@ -310,7 +310,7 @@ def test_a_thread_without_budget_goes_on_where_it_was():
     robot = Robot(LOOP)
     ticks = 0
     while robot.machine.running:
-        robot.ticks(1)
+        robot.ticks(1, budget=500)
         ticks += 1
     assert robot.said == ["300"]
     assert 2 < ticks < 10

@@ -55,6 +55,7 @@ async def test_what_is_asked_for_by_name(path, host, code):
 def _code(request):
     try:
         with urllib.request.urlopen(request) as answer:  # noqa: S310
+            assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
             return answer.status
     except urllib.error.HTTPError as error:
         with error:

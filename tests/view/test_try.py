@@ -137,8 +137,8 @@ def test_a_slider_changes_the_address_and_the_address_the_page(opened):
 
 
 def test_what_of_a_link_is_not_understood_is_said(opened):
-    page = opened("#scene=mass&f=900&s=nothing")
-    assert "f=900, s=nothing" in page.get_by_role("alert").first.inner_text()
+    page = opened("#scene=mass&f=900&s=nothing&toString=1&__proto__=1")
+    assert "f=900, s=nothing, toString=1, __proto__=1" in page.get_by_role("alert").first.inner_text()
 
 
 @pytest.mark.parametrize(

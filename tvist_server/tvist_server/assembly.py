@@ -73,11 +73,13 @@ def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrIn
         ConfigError: Other machines could reach them unprotected, or they cannot be there.
     """
     from tvist_server.gateways.ur.interfaces import UrInterfaces
+    from tvist_server.gateways.ur.rtde.inputs import matching
 
     address, ports = config.interfaces(number)
     try:
         guarded_interfaces(address, insecure=config.insecure)
-    except ExposureError as error:
+        reserved = matching(config.reserve_inputs)
+    except (ExposureError, ValueError) as error:
         raise ConfigError(str(error)) from error
     setup, lockstep = robot.setup, config.clock != "realtime"
     return UrInterfaces(
@@ -89,6 +91,7 @@ def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrIn
         lockstep=lockstep,
         gripper=robot.ask_gripper if setup.cell is not None and setup.cell.gripper is not None else None,
         programs=config.program_folder(setup.name),
+        reserved=reserved,
     )
 
 

@@ -10,6 +10,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from tvist_controller.host import Host
 from tvist_plant.plant import PlantError
@@ -72,6 +73,26 @@ class Mailbox:
         """
         self.jobs.post(do, client)
 
+    def guarded(self, do: Do) -> None:
+        """Do something of the robot; an exception that its host does not survive ends this robot alone."""
+        try:
+            do()
+        except Exception:
+            log.exception("a robot ticks no more")
+            self.end("the robot ticks no more, because of an error: see the log")
+
+    def turn(self) -> None:
+        """Do the jobs that wait, and tick."""
+        self.guarded(self.jobs.do_waiting)
+        if self.host.failure is None:
+            self.guarded(self.host.tick)
+
+    def end(self, why: str) -> None:
+        """Let the robot tick no more; its arm is left without it."""
+        self.host.failure = why
+        with contextlib.suppress(Exception):  # each arm is left, whatever the others do
+            self.host.leave_arm()
+
     def attend(self, stepper: str | None) -> bool:
         """Between the ticks of a client's step, do the jobs of others; return whether the step may continue.
 
@@ -120,12 +141,10 @@ class Clock(ABC):
     def _guarded(self) -> None:
         try:
             self._run()
-        except BaseException:  # such as an exception of a user's shaper: the thread must not end silently
+        except BaseException:  # the thread must not end silently
             log.exception("the controller's thread ended")
             for robot in self._robots:
-                robot.host.failure = "the controller's thread ended by an error: see the log"
-                with contextlib.suppress(Exception):  # each arm is left, whatever the others do
-                    robot.host.leave_arm()
+                robot.end("the controller's thread ended by an error: see the log")
 
     @abstractmethod
     def _run(self) -> None: ...
@@ -153,7 +172,7 @@ class Lockstep(Clock):
         # By a deadline of its own: other jobs, such as telemetry, may come in every second, too.
         due = time.monotonic() + REPEAT_EVERY
         while self._running:
-            self._jobs.do_next(timeout=max(0.0, due - time.monotonic()))
+            self._robots[0].guarded(partial(self._jobs.do_next, max(0.0, due - time.monotonic())))
             if self._running and time.monotonic() >= due:
                 self._repeat()
                 due = time.monotonic() + REPEAT_EVERY
@@ -232,8 +251,7 @@ class Realtime(Clock):
             told = overloads[number].note(missed)
             if told is not None:
                 robot.host.warn(told)
-            robot.jobs.do_waiting()
-            robot.host.tick()
+            robot.turn()
             ended = now()
             robot.lateness.worked(ended - begun)
             # All have had their turn, or messages have waited since the last time or since the thread woke up.
@@ -241,7 +259,7 @@ class Realtime(Clock):
                 handed_on = ended
                 self._hand_on()
         for robot in robots:
-            robot.jobs.do_waiting()
+            robot.guarded(robot.jobs.do_waiting)
         self._hand_on()
 
     def _begins(self, robot: Mailbox, pace: Callable[[float], bool]) -> bool:
@@ -255,7 +273,7 @@ class Realtime(Clock):
 
     def _do_without_tick(self, robot: Mailbox, silent: bool) -> bool:
         """Answer the clients of an arm that has fallen silent, and tell them once; return True."""
-        robot.jobs.do_waiting()
+        robot.guarded(robot.jobs.do_waiting)
         if not silent and robot.interval is None:  # a robot that is watched says by itself when it is lost
             robot.host.warn(
                 "the arm does not begin its next tick: time stands still, and it obeys no command"

@@ -35,6 +35,8 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_NAME = "ur5e"
 SPEED_CAP = 0.5
 """Largest speed of a robot that is moved, unless another is given [rad/s]."""
+TOOL_IN_WORLD = 1.0
+"""Mass on the flange in a scene if the profile has none: its sensor does not feel what the wrist touches [kg]."""
 _REAL = ("enable_motion", "speed_cap", "tcp", "servo_lag")
 MOST_LAG, LEAST_GAIN = 0.15, 50.0
 """Largest time and smallest gain of a `servoj` that can be compensated [s, 1/s²]."""
@@ -86,7 +88,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     precedence [ursim with --ur and for tvist run; without it, the defaults named at each option]."""
     payload: Annotated[float, Meta(ge=0, le=100)] | None = None
     """Mass of the disc on the flange in kg, both carried and declared to the controller [that of the robot file, 5 for
-    the ur5e; 0 with the profile ursim]."""
+    the ur5e; with the profile ursim 0, or 1 with --world]."""
     overload: bool = False
     """Start even if the payload exceeds the robot's rating. The drives may not hold it; the robot then makes a
     protective stop."""
@@ -182,6 +184,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ur_allow: tuple[str, ...] = ()
     """Let programs open sockets to this machine too, repeatable: an IP address, a network such as 192.168.1.0/24, or a
     name as programs write it [only the machine that sent the program]."""
+    reserve_inputs: tuple[str, ...] = ()
+    """Answer IN_USE to clients of RTDE that ask for this input, repeatable, as a robot does while a fieldbus holds it:
+    speed_slider_mask, for example, or a pattern such as 'input_int_register_*'."""
 
     def setups(self) -> list[Setup]:
         """Return the initial setup of every robot's controller.
@@ -463,7 +468,10 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         """Return the declared payload: the tool of the cell, unless another mass is given."""
         if self.payload is None and cell is not None and cell.tools:
             return as_declared(cell.tools[0])
-        return paper_payload(description, _either(self.payload, profile.payload))
+        mass = _either(self.payload, profile.payload)
+        if self.payload is None and mass == 0.0 and self._scene(cell) is not None:
+            mass = min(TOOL_IN_WORLD, description.limits.payload)
+        return paper_payload(description, mass)
 
 
 def _either(given: T | None, default: T) -> T:

@@ -6,7 +6,7 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import NamedTuple
 
-Do = Callable[[], None]
+Do = Callable[[], object]
 
 
 class _Job(NamedTuple):

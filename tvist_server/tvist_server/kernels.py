@@ -19,6 +19,7 @@ from tvist_protocol.replies import Accepted, Refused, Reply, ToolPose
 from tvist_protocol.simulation import SimulationStep, StepSetpoint
 from tvist_server.config_file import from_mapping
 from tvist_server.gateways.starting import Tell
+from tvist_server.punctual import processors
 from tvist_server.rehearsal import rehearse
 
 MOVE_TICKS = 1000
@@ -68,11 +69,6 @@ def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> Non
             process.communicate()
     if said:
         raise KernelsError(said)
-
-
-def processors() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 _Process = subprocess.Popen[bytes]

@@ -5,6 +5,7 @@ has it is refused.
 """
 
 from tvist_plant.user_file import UserFileError, xml
+from tvist_protocol.errors import short
 from tvist_server.polyscope_nodes import EXTERNAL_CONTROL, Nodes
 
 _HEADER_ENDS = "# HEADER_END"
@@ -45,7 +46,7 @@ def script_of(name: str, data: bytes) -> str:
     lines += [f"run {_name(thread.get('name') or 'thread')}()" for thread in root.findall("./Thread")]
     body = "\n".join(nodes.lines(main.findall("./children/*")))
     if nodes.missing:
-        found = ", ".join(dict.fromkeys(nodes.missing))
+        found = short(", ".join(dict.fromkeys(nodes.missing)))
         raise PolyscopeError(
             f"it is PolyScope's and has {found}, which cannot be played; save it as a script"
         )

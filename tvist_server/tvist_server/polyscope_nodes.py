@@ -5,8 +5,11 @@ with a condition, Move with Waypoints, Popup, Halt, Folder, Comment, External Co
 """
 
 import re
+from collections import defaultdict
 from collections.abc import Iterator
 from xml.etree import ElementTree as ET
+
+from tvist_plant.user_file import is_name
 
 EXTERNAL_CONTROL = (
     'popup("Play this program from the machine that controls it.", title="External Control", blocking=True)'
@@ -17,9 +20,11 @@ _SIGNS = {"≟": "==", "≠": "!="}
 """PolyScope's signs in expressions that URScript writes otherwise."""
 _MOVES = {"MoveJ": "movej", "MoveL": "movel"}
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
-_STEP = re.compile(r"(\w+)(?:\[(\d+)\])?")
+_STEP = re.compile(r"(\w+)(?:\[(\d{1,6})\])?")
 _MOST_REFERENCES = 100
 """Longest chain of references, of which a file may have endless ones."""
+_LONGEST_REFERENCE = 1000
+"""Most characters of one: as many as the deepest element needs that a file may have."""
 
 
 class Nodes:
@@ -35,6 +40,9 @@ class Nodes:
     def __init__(self, root: ET.Element) -> None:
         self.missing: list[str] = []
         self._parents = {child: parent for parent in root.iter() for child in parent}
+        self._children: dict[ET.Element, dict[str, list[ET.Element]]] = {}
+        self._known: dict[ET.Element, str] = {}
+        """Names of the variables that were looked for: each reference is followed once, however many lead to it."""
         self._number = 0
 
     def lines(self, nodes: list[ET.Element]) -> Iterator[str]:
@@ -142,18 +150,19 @@ class Nodes:
 
     def _variable(self, node: ET.Element | None) -> str:
         """Name of a variable, which may stand elsewhere in the program: `../../Assignment[2]/variable`."""
-        for _ in range(_MOST_REFERENCES):
-            if node is None:
-                break
-            name, reference = node.get("name"), node.get("reference")
-            if name is not None and _NAME.fullmatch(name):
-                return name
+        passed, found = list[ET.Element](), ""
+        while node is not None and not found and len(passed) < _MOST_REFERENCES:
+            passed.append(node)
+            name, reference = node.get("name") or "", node.get("reference")
+            found = self._known.get(node) or (name if is_name(name) and _NAME.fullmatch(name) else "")
             node = None if reference is None else self._referred(node, reference)
-        self.missing.append("a variable without a name")
-        return "variable"
+        if not found:
+            self.missing.append("a variable without a name")
+        self._known.update(dict.fromkeys(passed, found or "variable"))
+        return found or "variable"
 
     def _referred(self, node: ET.Element, reference: str) -> ET.Element | None:
-        found: ET.Element | None = node
+        found: ET.Element | None = node if len(reference) <= _LONGEST_REFERENCE else None
         for step in reference.split("/"):
             if found is None:
                 return None
@@ -161,10 +170,18 @@ class Nodes:
                 found = self._parents.get(found)
                 continue
             words = _STEP.fullmatch(step)
-            same = [] if words is None else [child for child in found if child.tag == words[1]]
+            same = [] if words is None else self._named(found).get(words[1], [])
             place = 0 if words is None else int(words[2] or 1) - 1
             found = same[place] if 0 <= place < len(same) else None
         return found
+
+    def _named(self, node: ET.Element) -> dict[str, list[ET.Element]]:
+        """Children of an element by their tags."""
+        if node not in self._children:
+            self._children[node] = defaultdict(list)
+            for child in node:
+                self._children[node][child.tag].append(child)
+        return self._children[node]
 
     def _number_in(self, text: str | None, node: ET.Element) -> str:
         try:

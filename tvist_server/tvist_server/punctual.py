@@ -19,6 +19,20 @@ CURRENT, FUTURE, ON_FAULT = 1, 2, 4
 CAP_IPC_LOCK = 14
 
 
+def processors() -> int:
+    """Return the number of processors that this process may use."""
+    if sys.platform == "linux":
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def waited_us() -> float:
+    """Return how long the calling thread, ready to run, has waited for a processor [µs]; 0 if that is not counted."""
+    with contextlib.suppress(OSError):
+        return int(Path("/proc/thread-self/schedstat").read_text().split()[1]) / 1e3
+    return 0.0
+
+
 def take_priority() -> bool:
     """Give the calling thread real-time priority (SCHED_FIFO); return whether it has it now.
 

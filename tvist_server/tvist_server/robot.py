@@ -29,6 +29,7 @@ from tvist_server.plan_ahead import PlanAhead
 from tvist_server.plans_of_programs import PlansOfPrograms
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.publisher import Publisher
+from tvist_server.punctual import waited_us
 from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
 from tvist_server.rehearsal import rehearse
@@ -75,6 +76,7 @@ class ServedRobot:
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
         self._realtime = not lockstep
+        self._waited_us = 0.0
         plant = setup.made_plant()
         setup = setup.standing(plant)  # with the limits of a robot that has its own
         # When a client advances time, nothing is late, and plans are made when they are needed.
@@ -116,8 +118,9 @@ class ServedRobot:
                 setup, students, self._studies.later, lambda lesson, on: planner.for_lesson(lesson, on.basis)
             )
         self._host = Host(
-            self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience
-        )
+            self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience,
+            survives=True,
+        )  # fmt: skip
         if learnt is not None:
             learnt.recall(self._host)
         plant = self.controller.cycle.line.plant  # also where the setup has none
@@ -269,6 +272,7 @@ class ServedRobot:
         on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0, 0.0)
         overload = self.driven.overload
         left_out = 0 if controller.watching is None else counters.missed_ticks
+        before, self._waited_us = self._waited_us, waited_us() if self._realtime else 0.0
         return Telemetry(
             tick=controller.tick_number,
             ticks_per_second=on_time.ticks / on_time.seconds,
@@ -289,6 +293,7 @@ class ServedRobot:
             due_ticks=None if overload is None else overload.due + left_out,
             due_per_second=None if overload is None else overload.due_per_second,
             overloaded=overload is not None and overload.overloaded,
+            processor_wait_us=self._waited_us - before,
         )
 
     def close_recording(self) -> None:

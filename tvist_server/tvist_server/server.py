@@ -236,7 +236,7 @@ class Server:
                 self._network.close()
 
     async def run(self, ready: Callable[[], None], ending: Ending) -> None:
-        """Serve until a signal comes or a controller fails; `failure` then says why.
+        """Serve until a signal comes or all robots have failed; `failure` then says why.
 
         Args:
             ready: Function to call once the robots tick and answer.
@@ -249,7 +249,7 @@ class Server:
             for robot in self.robots:
                 await robot.let_in()
             ready()
-            while not ended.is_set() and self.failure is None:
+            while not (ended.is_set() or all(robot.failure for robot in self.robots)):
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(ended.wait(), 1.0)
                 self._tell_telemetry()

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections.abc import Iterator
 from types import CodeType, MappingProxyType
 
 from tvist_urscript import tree
@@ -45,7 +46,7 @@ def translate(
         errors.setdefault((line, column, why), ScriptError(line, column, why))
 
     try:
-        program = _program(text) if after is None else _statements(text)
+        program = program_of(text) if after is None else _statements(text)
     except ScriptError as error:
         return None, [error]
     found = scopes(program) if after is None else scopes(program, after.scope, after.scopes)
@@ -69,12 +70,18 @@ def translate(
             outline(found[0]),
             found[0].number + len(found),
             bool(program.body) and all(isinstance(one, tree.Function) for one in program.body),
+            frozenset(line for scope in found for line in _last_lines(scope.function.body)),
         ),
         [],
     )
 
 
-def _program(text: str) -> tree.Function:
+def program_of(text: str) -> tree.Function:
+    """Return a script's tree: its `def` or `sec`, or its statements as one.
+
+    Raises:
+        ScriptError: The text is no program.
+    """
     statements = _parsed(text)
     head = statements[0]
     if not isinstance(head, tree.Function) or not (
@@ -123,6 +130,21 @@ def _together(text: str, statements: list[tree.Statement]) -> tree.Function:
     word = re.search(r"^[ \t]*([A-Za-z_]\w*)", text, re.MULTILINE)
     name = names[-1] if names else word[1] if word else "program"
     return tree.Function(head.line, head.column, "def", name, [], statements)
+
+
+def _last_lines(body: list[tree.Statement]) -> Iterator[int]:
+    """Lines after which a function does nothing but end."""
+    for statement in reversed(body):
+        match statement:
+            case tree.Function() | tree.Label() | tree.Return(value=None) | tree.Word(word="halt" | "pass"):
+                continue
+            case tree.If():
+                for _, branch in statement.branches:
+                    yield from _last_lines(branch)
+                yield from _last_lines(statement.otherwise)
+            case _:
+                yield statement.line
+        return
 
 
 def _code(made: ast.FunctionDef) -> CodeType:

@@ -1,4 +1,9 @@
-"""What a call of a function takes from the budget of its program."""
+"""What a call of a function takes from the budget of its program.
+
+The unit is the time of an operator on two numbers, 0.15 µs where the weights were measured: there a budget of 2000
+takes 0.3 ms, or 0.5 ms if all of it works on lists. The weights are times of calls in this unit, rounded up. They never
+change with the machine: equal programs get equally far in a tick everywhere.
+"""
 
 from collections.abc import Callable
 from typing import Any, TypeVar

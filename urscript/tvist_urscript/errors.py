@@ -8,10 +8,12 @@ class ScriptError(Exception):
         line: Line of the script as it was given, from 1.
         column: Column of the first character of the token at fault, from 1; a tab counts as one.
         text: The error in the controller's words, such as `compile_error_name_not_found:x:`.
+        internal: What a built-in function has raised if it does not blame the script, for a log; else None.
     """
 
-    def __init__(self, line: int, column: int, text: str) -> None:
+    def __init__(self, line: int, column: int, text: str, internal: Exception | None = None) -> None:
         super().__init__(line, column, text)
+        self.internal = internal
         self.line = line
         self.column = column
         self.text = text

@@ -34,7 +34,7 @@ def failure(error: Exception) -> ScriptError:
         return error
     places = _places(error.__traceback__)
     line, column = places[-2 if isinstance(error, TooDeep) and len(places) > 1 else -1] if places else (1, 1)
-    return ScriptError(line, column, _words(error))
+    return ScriptError(line, column, _words(error), error if _is_internal(error) else None)
 
 
 def position_of(steps: Any) -> tuple[int, int] | None:
@@ -57,6 +57,15 @@ def line_of(steps: Any) -> int | None:
     return None if found is None else found.f_lineno or 1
 
 
+def name_of(steps: Any) -> str | None:
+    """Return the name of the outermost function in which a generator waits, such as that of a thread."""
+    while (frame := getattr(steps, "gi_frame", None)) is not None:
+        if frame.f_code.co_filename == FILE:
+            return str(frame.f_code.co_name.partition("_")[2])
+        steps = steps.gi_yieldfrom
+    return None
+
+
 def _places(traceback: TracebackType | None) -> list[tuple[int, int]]:
     places = []
     while traceback is not None:
@@ -70,6 +79,15 @@ def _places(traceback: TracebackType | None) -> list[tuple[int, int]]:
 def _position(code: CodeType, instruction: int) -> tuple[int, int]:
     line, _, column, _ = next(islice(code.co_positions(), instruction // 2, None))
     return line or 1, column or 1
+
+
+def _is_internal(error: Exception) -> bool:
+    """Whether an exception comes out of what a built-in function has called, and is no answer to its arguments."""
+    traceback, own = error.__traceback__, __name__.partition(".")[0]
+    module = own
+    while traceback is not None:  # compiled code belongs to no module
+        module, traceback = traceback.tb_frame.f_globals.get("__name__", own), traceback.tb_next
+    return not (isinstance(error, Fault | RecursionError) or module.partition(".")[0] == own)
 
 
 def _words(error: Exception) -> str:  # noqa: PLR0911  one for each kind of exception

@@ -1,11 +1,12 @@
 """Runs a compiled script, a tick at a time."""
 
+import sys
 from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
 from typing import Any
 
 from tvist_urscript.errors import Fault, ScriptError
-from tvist_urscript.failures import TooDeep, failure, line_of, position_of
+from tvist_urscript.failures import FILE, TooDeep, failure, line_of, name_of, position_of
 from tvist_urscript.functions import DEEPEST_CALLS
 from tvist_urscript.namespace import Namespace
 from tvist_urscript.pieces import HERE, MISSING
@@ -13,7 +14,7 @@ from tvist_urscript.script import Script
 from tvist_urscript.threads import MOST_THREADS, Thread
 from tvist_urscript.values import Value
 
-EVALUATIONS = 500
+EVALUATIONS = 2000
 """Budget of a tick: evaluations of all threads together."""
 PATIENCE = 1_000_000
 """Evaluations of a thread without waiting for time to pass, or reading what has come, after which it is endless."""
@@ -63,6 +64,7 @@ class Machine:
         self.thread = 0
         self.halted = False
         self.label: tuple[int, str] | None = None
+        self._held = False
         self._finish = finish or _nothing
         self._started = 0
         self._holder: Thread | None = None
@@ -85,10 +87,31 @@ class Machine:
         return [thread.number for thread in self._threads if not thread.ended]
 
     @property
+    def at_end(self) -> bool:
+        """Whether the main thread runs, and nothing follows the built-in function that it is in."""
+        frame = sys._getframe() if self._running is self._main and not self._main.added else None  # noqa: SLF001
+        ends = frame is not None
+        while ends and frame is not None:
+            ends = frame.f_code.co_filename != FILE or frame.f_lineno in self.script.last_lines
+            frame = frame.f_back
+        return ends
+
+    @property
     def line(self) -> int:
         """The present line of the main thread."""
         self._line = line_of(self._main.steps) or self._line
         return self._line
+
+    def missed(self, number: int) -> bool:
+        """Return whether a thread could not go on in the last tick, since the budget was spent."""
+        thread = self._find(number) if number else self._main
+        return thread is not None and (thread.owes > 0 or thread in self._missed)
+
+    def place(self, number: int) -> tuple[str, int]:
+        """Return the name and the present line of a thread that has begun."""
+        thread = self._find(number) if number else self._main
+        steps = None if thread is None else thread.steps
+        return name_of(steps) or self.script.name, line_of(steps) or 1
 
     def resume(self, budget: int = EVALUATIONS) -> int:
         """Run all threads for one tick.
@@ -104,18 +127,22 @@ class Machine:
         Raises:
             ScriptError: A thread has failed, in the script or in a built-in function. All threads have ended.
         """
-        self.left = budget
+        self.left, self._held = budget, False
         missed, self._missed = self._missed, []
         self._turns = missed + [thread for thread in self._threads if thread not in missed]
         for thread in self._turns:  # it grows where a thread starts another
             if thread.ended:
                 continue
-            short = self.left <= 0 or self.left < min(thread.owes, budget)
+            short = self._held or self.left <= 0 or self.left < min(thread.owes, budget)
             if short or not self._may_enter(thread):
                 self._missed.append(thread)
             else:
                 self._turn(thread)
         return self.left
+
+    def hold(self) -> None:
+        """Give no further thread a turn in this tick; the one that runs goes on to its next statement that waits."""
+        self._held = True
 
     def end(self) -> None:
         """End all threads: GeneratorExit reaches the blocking functions in which they wait.
@@ -247,7 +274,8 @@ class Machine:
             raise
         except Exception as error:
             wrong = failure(error)
-            raise ScriptError(wrong.line, wrong.column, f"{wrong.text} (in {title})") from error
+            text = f"{wrong.text} (in {title})"
+            raise ScriptError(wrong.line, wrong.column, text, wrong.internal) from error
         finally:
             self._main.added = False
         self._main.spent = 0  # many short statements are no endless loop

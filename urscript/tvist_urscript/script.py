@@ -24,6 +24,7 @@ class Script:
         scope: What names mean on its outermost level.
         scopes: Number of its scopes, with those of the program that it is added to.
         idle: It only defines functions, so it ends at once.
+        last_lines: Lines of its functions after which nothing follows in them.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Script:
     scope: "Scope" = field(repr=False)
     scopes: int
     idle: bool = False
+    last_lines: frozenset[int] = frozenset()
 
     def forgetting(self, last: "Script") -> "Script":
         """Return the program for later statements, which know nothing of what was added up to the last one."""

@@ -11,7 +11,7 @@ _HEXADECIMAL = re.compile(r"\s*[+-]?0[xX][0-9a-fA-F]+\s*", re.ASCII)
 DECIMAL = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 
 
-@costs(10)
+@costs(20)
 def str_cat(op1: Value, op2: Value) -> str:
     """Return two values as one text."""
     whole_text = to_str(op1) + to_str(op2)

@@ -261,7 +261,7 @@ def to_text(value: bytes) -> str:
     return value.decode(errors="surrogateescape")
 
 
-@costs(10)
+@costs(20)
 def to_str(val: Value) -> str:
     """Write a value as the controller does: floats with six decimals, without zeros at their end.
 

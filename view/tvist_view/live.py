@@ -11,6 +11,9 @@ from tvist_view.shown_robot import Place, ShownRobot
 from tvist_view.stage import Tab, page
 from tvist_view.watcher import Watcher
 
+MOST_SHOWN = 8
+"""Largest number of robots that tabs show at once: each has a session of those that servers have for all clients."""
+
 
 class LivePage:
     """The page: each tab shows one robot, and all tabs that show a robot share its connection.
@@ -56,12 +59,24 @@ class LivePage:
                     continue
                 if isinstance(message, asked.Seen):
                     watcher.free = True
-                elif isinstance(message, asked.Show):
-                    await shown.go(watcher)
+                elif not isinstance(message, asked.Show):
+                    await shown.do(watcher, message)
+                elif message.name not in {self._first, *shown.robots}:
+                    watcher.say(f"there is no robot {message.name}: choose one of {', '.join(shown.robots)}")
+                elif message.name not in self._shown and len(self._shown) >= MOST_SHOWN:
+                    watcher.say(f"tabs show {MOST_SHOWN} robots already, the most at once: close one")
+                else:
+                    await self._leave(shown, watcher)
                     shown = self._robot(message.name)
                     shown.come(watcher)
-                else:
-                    shown.do(watcher, message)
         finally:
             telling.cancel()
-            await shown.go(watcher)
+            await self._leave(shown, watcher)
+
+    async def _leave(self, shown: ShownRobot, watcher: Watcher) -> None:
+        """Let a tab go; the connection of a robot that no tab shows any more ends, unless it is the first one."""
+        await shown.go(watcher)
+        if not shown.watchers and shown.name != self._first and self._shown.get(shown.name) is shown:
+            del self._shown[shown.name]
+            shown.task.cancel()
+            await asyncio.wait([shown.task])

@@ -34,6 +34,8 @@ INFO_S = 1.0
 """Time between two looks at who has control [s]."""
 RETRY_S = 2.0
 """Time between two attempts to find the robot [s]."""
+MOST_ASKED = 16
+"""Largest number of things that are done for a tab at once; what it asks for then waits."""
 TOLD = {"protective_stop", "safety_stop", "warning", "lease_lost"}
 """Kinds of events whose reason the page says."""
 
@@ -61,10 +63,10 @@ class ShownRobot:
     """
 
     def __init__(self, place: Place, name: str, judge: Judge, meshes: Meshes) -> None:
-        self._place, self._name, self._judge, self._meshes = place, name, judge, meshes
+        self._place, self.name, self._judge, self._meshes = place, name, judge, meshes
         self.running: Running | None = None
         self._way = RealArm()
-        self._watchers: set[Watcher] = set()
+        self.watchers: set[Watcher] = set()
         self._ends: list[Callable[[], None]] = []
         self._robot: Robot | None = None
         self._doer: Doer | None = None
@@ -72,22 +74,27 @@ class ShownRobot:
         self._io: Io | None = None
         self._described: dict[str, Any] = {}
         self._absent = f"Looking for robot {name} at {place.endpoint} …"
-        self._tasks: set[asyncio.Task[Any]] = set()
+        self.robots: list[str] = []
+        """Names of all robots at the endpoint, as of the last time that this one was found."""
         self.task = asyncio.create_task(self._run())
 
     def come(self, watcher: Watcher) -> None:
         """A tab shows this robot now."""
-        self._watchers.add(watcher)
+        self.watchers.add(watcher)
         watcher.robot = self
         self._introduce(watcher)
         self._listen()
 
     async def go(self, watcher: Watcher) -> None:
         """A tab does not show it any more: its motion is stopped, its control given back."""
-        self._watchers.discard(watcher)
+        self.watchers.discard(watcher)
         watcher.robot = None
         if self._doer is not None:
             await self._doer.pilot.gone(watcher.tab.number)
+        if watcher.tasks:
+            await asyncio.wait(watcher.tasks)
+            if self._doer is not None:  # one may have taken control meanwhile
+                await self._doer.pilot.gone(watcher.tab.number)
         self._listen()
 
     def _introduce(self, watcher: Watcher) -> None:
@@ -103,7 +110,7 @@ class ShownRobot:
             self._described = {}
             try:
                 async with await Robot.connect(
-                    place.endpoint, self._name, security=place.security, namespace=place.namespace
+                    place.endpoint, self.name, security=place.security, namespace=place.namespace
                 ) as robot:
                     await self._shows(robot, await robot.info())
             except (ClientError, RefusedError, GeometryError) as error:
@@ -119,7 +126,7 @@ class ShownRobot:
         if sentence != self._absent:
             self._absent = sentence
             log.warning("%s; waiting for the robot", why)
-            for watcher in self._watchers:
+            for watcher in self.watchers:
                 self._introduce(watcher)
 
     async def _shows(self, robot: Robot, info: Info) -> None:
@@ -135,13 +142,13 @@ class ShownRobot:
             )
         look = Look(info.geometry, info.payload)
         place = self._place
-        robots = await robots_at(place.endpoint, place.security, place.namespace)
+        self.robots = await robots_at(place.endpoint, place.security, place.namespace)
         self._robot, self._info, self._absent = robot, info, ""
         self.running, self._way = Running(look), RealArm()
         pilot = Pilot(robot, f"view-{os.getpid()}", self._say)
         self._doer = Doer(robot, look, pilot, self._judge, self._say, self._result)
-        self._described = described(info, look, robots, self._meshes)
-        for watcher in self._watchers:
+        self._described = described(info, look, self.robots, self._meshes)
+        for watcher in self.watchers:
             self._introduce(watcher)
         self._listen()
         try:
@@ -154,7 +161,7 @@ class ShownRobot:
 
     def _listen(self) -> None:
         """Hear the robot while a tab shows it: its truth is computed for those who want it only."""
-        if not self._watchers:
+        if not self.watchers:
             self._deaf()
         elif self._robot is not None and self.running is not None and not self._ends:
             robot, running = self._robot, self.running
@@ -210,14 +217,14 @@ class ShownRobot:
 
     def _result(self, result: dict[str, Any]) -> None:
         self._way.compared()
-        for watcher in self._watchers:
+        for watcher in self.watchers:
             watcher.put("result", result)
 
     def _say(self, sentence: str) -> None:
-        for watcher in self._watchers:
+        for watcher in self.watchers:
             watcher.say(sentence)
 
-    def do(self, watcher: Watcher, message: asked.Message) -> None:
+    async def do(self, watcher: Watcher, message: asked.Message) -> None:
         """Do what a tab asks for."""
         doer, info = self._doer, self._info
         if doer is None or info is None:
@@ -225,12 +232,14 @@ class ShownRobot:
         elif isinstance(message, asked.Jog) and message.joint < len(info.joints):
             doer.pilot.jog(watcher.tab.number, message.joint, message.direction)
         else:
+            if len(watcher.tasks) >= MOST_ASKED:
+                await asyncio.wait(watcher.tasks, return_when=asyncio.FIRST_COMPLETED)
             task = asyncio.create_task(doer.do(info, watcher.tab.number, message))
-            self._tasks.add(task)
+            watcher.tasks.add(task)
+            task.add_done_callback(watcher.tasks.discard)
             task.add_done_callback(self._finished)
 
     def _finished(self, task: asyncio.Task[Any]) -> None:
-        self._tasks.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
             log.error("the page: %s", error, exc_info=error)
             self._say(f"the page has failed: {error}")

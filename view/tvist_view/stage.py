@@ -149,6 +149,7 @@ def _found(kind: str, content: bytes) -> Response:
     headers = Headers(
         {"Content-Type": kind, "Content-Length": str(len(content)), "Cache-Control": "no-store"}
     )
+    headers["Content-Security-Policy"] = "frame-ancestors 'none'"  # another site could lead clicks to buttons
     return Response(200, "OK", headers, content)
 
 

@@ -1,5 +1,6 @@
 """A tab of the live page, and what it has been told."""
 
+import asyncio
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -26,6 +27,8 @@ class Watcher:
     tab: Tab
     robot: Watched | None = None
     waiting: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
+    tasks: set[asyncio.Task[Any]] = field(default_factory=set)
+    """What is being done for it."""
     status: dict[str, Any] = field(default_factory=dict)
     count: int = 0
     free: bool = True

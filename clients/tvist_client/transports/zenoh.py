@@ -90,7 +90,7 @@ class ZenohTransport(Transport):
             ProtocolError: `robot` is not a valid robot name, or `namespace` no namespace.
         """
         keys.check_robot_name(robot)
-        session = await asyncio.to_thread(open_session, endpoint, security, namespace)
+        session = await _opened(endpoint, security, namespace)
         transport = cls(session, endpoint, robot, namespace)
         try:
             await transport._find()
@@ -285,7 +285,7 @@ async def robots_at(endpoint: str, security: Folder | None = None, namespace: st
     Raises:
         NotConnectedError: No server listens there.
     """
-    session = await asyncio.to_thread(open_session, endpoint, security, namespace)
+    session = await _opened(endpoint, security, namespace)
     try:
         return await _robots(session)
     finally:
@@ -311,6 +311,17 @@ async def only_robot(endpoint: str, wanted: str, security: Folder | None = None,
         why = f"there are several robots at {endpoint}, {', '.join(robots)}: choose one with --name"
         raise NotConnectedError(why)
     return robots[0]
+
+
+async def _opened(endpoint: str, security: Folder | None, namespace: str) -> zenoh.Session:
+    """Open a session; if this is cancelled meanwhile, close it again, as a server has room for few."""
+    opening = asyncio.create_task(asyncio.to_thread(open_session, endpoint, security, namespace))
+    try:
+        return await asyncio.shield(opening)
+    except asyncio.CancelledError:
+        with suppress(NotConnectedError):
+            await asyncio.to_thread(close_session, await opening)
+        raise
 
 
 async def _robots(session: zenoh.Session) -> list[str]:

@@ -79,8 +79,8 @@ def answer(gripper: Gripper, request: bytes) -> bytes:
 def _set(gripper: Gripper, pairs: list[str]) -> bytes:
     values: dict[str, int] = {}
     for name, text in zip(pairs[::2], pairs[1::2], strict=True):
-        if name not in WRITABLE or not (text.isascii() and text.isdigit() and len(text) < 9):
+        if not (text.isascii() and text.isdigit() and int(text) <= WRITABLE.get(name, -1)):
             return UNKNOWN
-        values[name] = min(int(text), WRITABLE[name])
+        values[name] = int(text)
     gripper.write(values)
     return b"ack"

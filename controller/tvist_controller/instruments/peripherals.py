@@ -91,6 +91,8 @@ class Peripherals:
         """True if `io` has to be published, since something in it has changed; whoever publishes it resets this."""
         self.wrench_zero: list[float] | None = None
         """Force and torque that count as zero [N, N m]: at the tool in the base frame, or by a sensor at the flange."""
+        self.payload_change: tuple[Payload, int, int] | None = None
+        """Payload from which a program goes over to the declared one, the ticks that takes, and the tick at its end."""
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
 
@@ -293,7 +295,7 @@ class Peripherals:
             output_int_register=list(self._ints["output_int"]),
             output_double_register=list(self._doubles["output_double"]),
             tcp_offset=list(self.tcp_offset),
-            payload=payload,
+            payload=self._payload_at(tick, payload),
             target_speed_fraction=speed,
             program=program.name,
             program_state=program.state,
@@ -310,6 +312,21 @@ class Peripherals:
             assumed_payload=assumed,
             actual_TCP_force=wrench,
         )
+
+    def _payload_at(self, tick: int, after: Payload) -> Payload:
+        """Return the payload of a tick, each of whose properties changes evenly, as on a robot of UR's."""
+        if self.payload_change is None:
+            return after
+        before, ticks, last = self.payload_change
+        left, self.changed = max((last - tick) / ticks, 0.0), True
+        if left == 0.0:
+            self.payload_change = None
+            return after
+        old, new = ((one.mass, *one.com, *one.inertia) for one in (before, after))
+        mass, x, y, z, xx, xy, xz, yy, yz, zz = (
+            left * a + (1.0 - left) * b for a, b in zip(old, new, strict=True)
+        )
+        return Payload(mass=mass, com=(x, y, z), inertia=(xx, xy, xz, yy, yz, zz))
 
     def _analog_output(self, number: int) -> float:
         return analog_value(self._analog_ratios[number], voltage=self.output_is_voltage(number))

@@ -110,8 +110,11 @@ class StatusValues(Reading):
 
     @property
     def speed_scaling(self) -> Double:
-        """State: share of the programmed speed [-]."""
-        return self.state.speed_scaling
+        """Computed: what limits the speed besides the slider, as reduced mode does [-]; 0 while a program is paused."""
+        if self.io.program_state == "PAUSED":
+            return 0.0
+        slider = self.io.target_speed_fraction
+        return min(self.state.speed_scaling / slider, 1.0) if slider > 0.0 else 0.0
 
     @property
     def target_speed_fraction(self) -> Double:

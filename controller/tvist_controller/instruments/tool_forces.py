@@ -13,7 +13,7 @@ from tvist_controller.line.line_tick import QDD, TORQUE, Q
 from tvist_controller.line.sample import Sample
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
-from tvist_plant.plant import GRAVITY
+from tvist_plant.plant import GRAVITY, PERIOD
 from tvist_protocol.stream import State
 from tvist_protocol.values import Payload
 
@@ -66,11 +66,25 @@ class ToolForces:
         measured, zero = sample.measured, self._peripherals.wrench_zero
         if measured.wrench is not None:
             return self._sensed(measured.wrench, measured.q)
-        motion = np.zeros((ROWS, len(measured.q)))
-        motion[SHAPED], motion[SHAPED.stop] = sample.signals[Q : QDD + 1], sample.signals[TORQUE]
-        motion[ACTUAL_Q:] = measured.q, measured.qd, measured.moment
-        found = self._wrench.estimate(motion, self._peripherals.tcp_offset)[:6]
+        found = self._estimated(sample, sample.signals[TORQUE])
         return found if zero is None else found - zero
+
+    def estimated(self, sample: Sample, qd_before: Floats) -> Floats:
+        """Return the force that the drives' torques and the measured motion tell, shape (3,) [N].
+
+        Unlike `felt`, it does not contain what accelerates links that lag behind their reference, as they do when they
+        ring or a set-point comes late; the rotors are taken to follow it.
+        """
+        measured = sample.measured
+        motion = np.array([measured.q, measured.qd, (measured.qd - qd_before) / PERIOD])
+        return self._estimated(sample, self._rigid.moment(motion, self._declared()))[:3]
+
+    def _estimated(self, sample: Sample, torque: Floats | list[float]) -> Floats:
+        measured = sample.measured
+        motion = np.zeros((ROWS, len(measured.q)))
+        motion[SHAPED], motion[SHAPED.stop] = sample.signals[Q : QDD + 1], torque
+        motion[ACTUAL_Q:] = measured.q, measured.qd, measured.moment
+        return self._wrench.estimate(motion, self._peripherals.tcp_offset)[:6]
 
     @property
     def basis(self) -> tuple[object, ...]:

@@ -204,7 +204,7 @@ def heights(bumps: Bumps) -> Floats:
 
 def identity(motion: PlannedMotion, beliefs: bytes) -> str:
     """Return what tells a motion from all others: a digest of its way, its duration, and the beliefs."""
-    postures = np.array([q for q, _, _ in motion.states(LOOKS)])
+    postures = motion.states(motion.evenly(LOOKS))[0]
     seen = blake2b(beliefs, digest_size=8)
     seen.update(np.rint(postures / ALIKE).astype(np.int64).tobytes())
     seen.update(np.float64(motion.duration).tobytes())

@@ -187,16 +187,22 @@ class ControlCycle:
             line_filter.use(tvist)
             self.trajectory.adapt(line_filter.spared)
 
+    @property
+    def stands_still(self) -> bool:
+        """Whether the shaped reference rests on a reference that stands: the motion is over, or it is paused."""
+        line, sample = self.line, self.sample
+        return (
+            self.trajectory.standing
+            and (not self.mode.shaped or line.filter.settled)
+            and sample.target.rests_at(sample.reference, PERIOD)
+        )
+
     def _settle(self) -> None:
         """Rest if the motion is over: its trajectory has finished, and the shaped reference rests on its end."""
         trajectory, mode = self.trajectory, self.mode
-        if mode.at_rest or not (
-            trajectory.finished or (mode is LineMode.RUNNING_OUT and trajectory.standing)
-        ):
+        if mode.at_rest or not ((trajectory.finished or mode is LineMode.RUNNING_OUT) and self.stands_still):
             return
         line, reference = self.line, self.sample.reference
-        if (mode.shaped and not line.filter.settled) or not self.sample.target.rests_at(reference, PERIOD):
-            return
         on_path = line.shaped.posture_of is not None
         if on_path or not mode.shaped:  # the delay line restarts from where the motion ended
             line.enter(reference)

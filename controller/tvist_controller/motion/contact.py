@@ -11,8 +11,6 @@ REMEMBERED = 500
 """Ticks that are remembered, and after which a watch that nobody asks about ends."""
 FIRST = 20
 """Ticks at the beginning of a watch whose mean is what the tool feels without a contact."""
-SURE = 4
-"""Ticks whose mean must exceed the threshold."""
 ONSET = 0.2
 """Share of the threshold that counts as the beginning of a contact [-]."""
 
@@ -41,19 +39,20 @@ class ContactWatch:
         if self._usual is None and len(self._forces) == FIRST:
             self._usual = np.mean(self._forces, axis=0)
 
-    def steps(self, direction: Sequence[float], threshold: float) -> int:
+    def steps(self, direction: Sequence[float], threshold: float, sure: int) -> int:
         """Return the number of ticks since just before a contact began; 0 if there is none.
 
         Args:
             direction: Direction in which the tool meets what it touches, base frame; zeros for any.
             threshold: Force from which on something touches the tool [N].
+            sure: Ticks whose mean must exceed it.
         """
         self._asked = REMEMBERED
         if self._usual is None:
             return 0
         forces, length = np.array(self._forces) - self._usual, float(np.linalg.norm(direction))
         pushes = np.linalg.norm(forces, axis=1) if length == 0.0 else forces @ direction / -length
-        if pushes[-SURE:].mean() < threshold:
+        if pushes[-sure:].mean() < threshold:
             return 0
         free = np.flatnonzero(pushes < ONSET * threshold)
         return len(pushes) - int(free[-1]) if len(free) else len(pushes)

@@ -32,10 +32,10 @@ MOST = 250.0
 """Force at the tool above which a protective stop begins, as the widest limit of UR's robots [N]."""
 TICKS = 5
 """Ticks for which a force or a deviation must last before it does."""
-TOUCH = 10.0
-"""Force of a contact, if the flange has a sensor [N]."""
-ESTIMATED_TOUCH = 20.0
-"""Force of a contact that is estimated from the drives' torques [N]."""
+TOUCH = 10.0, 4
+"""Force of a contact [N] and ticks whose mean must exceed it, if the flange has a sensor."""
+ESTIMATED_TOUCH = 20.0, 16
+"""The same if the force is estimated from the drives' torques, which a late set-point shakes for a few ticks."""
 GENTLE = 1.0
 """Deceleration of the fastest joint where force mode ends, the lowest of any stop [rad/s^2]."""
 
@@ -49,6 +49,9 @@ class Forces(Protocol):
 
     def felt(self, sample: Sample) -> Floats:
         """Return force and torque at the tool centre point in a tick, base frame, shape (6,) [N, N m]."""
+
+    def estimated(self, sample: Sample, qd_before: Floats) -> Floats:
+        """Return the force that the drives' torques and, with the velocities before, the accelerations tell [N]."""
 
     def unexplained(self, sample: Sample, wrench: Floats, *, zeroed: bool) -> Floats:
         """Return the force in a sensor's wrench that is neither weight nor inertia of the payload, shape (3,) [N]."""
@@ -77,6 +80,7 @@ class ForceControl:
         self._smooth = np.zeros(6)
         self._by_hand, self._beyond, self._contact = False, 0, ContactWatch()
         self._source = self._source_of(self._cycle.sample, None)
+        self._qd = self._cycle.sample.measured.qd
         self._basis: object = None
 
     @property
@@ -154,7 +158,7 @@ class ForceControl:
             direction: Direction in which it meets that, base frame, shape (3,); zeros for any.
         """
         estimated = self._cycle.sample.measured.wrench is None
-        return self._contact.steps(direction, ESTIMATED_TOUCH if estimated else TOUCH)
+        return self._contact.steps(direction, *(ESTIMATED_TOUCH if estimated else TOUCH))
 
     def _new(self) -> Compliant:
         guidance = self._guidance
@@ -202,7 +206,8 @@ class ForceControl:
             if wrench is not None
         ]
         if self._contact.awake:
-            self._contact.note(pressed[0] if pressed else self._forces.felt(sample)[:3])
+            self._contact.note(pressed[0] if pressed else self._forces.estimated(sample, self._qd))
+        self._qd = sample.measured.qd
         # NumPy's maximum, unlike Python's, is NaN if one of them is; most arms have no sensor, and are spared it.
         force = float(np.max([np.linalg.norm(one) for one in pressed])) if pressed else 0.0
         why = self._excess(sample, force)

@@ -10,7 +10,7 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import GENTLEST_STOP, GuidedTorqueRoom, arm_limits
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.trajectory import Compliant, Guided, JointSpeed, MotionLimits, Servo, ToolSpeed
+from tvist_controller.trajectory import Compliant, Guided, JointSpeed, MotionLimits, Servo, Speed, ToolSpeed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.transitions import Activity
 
@@ -197,6 +197,11 @@ class Guidance:
         stop = JointSpeed(self._start(shaped=False), self.limits, self.torque, PERIOD)
         stop.aim(np.zeros(len(self.reach)), deceleration)
         lead.take(stop)
+
+    def slow_down(self) -> None:
+        """Let a commanded velocity end until the next command; a commanded posture is one where the arm may stay."""
+        if isinstance(present := self.guided, Speed):
+            present.come_to_rest()
 
     def _start(self, shaped: bool) -> tuple[Floats, Floats, Floats]:
         """Position, velocity and acceleration from which a trajectory begins."""

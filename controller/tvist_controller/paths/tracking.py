@@ -92,10 +92,10 @@ class Tracker:
             WayError: A singular posture is on the way, or its poses cannot be reached.
         """
         pieces = 1 if curve.length < SHORT else max(int(np.ceil(curve.length / SPACING)), 2)
-        places = np.linspace(0.0, curve.length, pieces + 1)
-        knots = [self._knot(curve, 0.0, q)]
-        for place in places[1:].tolist():
-            knots += self._between(curve, knots[-1], place)
+        knots, step = [self._knot(curve, 0.0, q)], curve.length / pieces
+        # One after the other: of a way that leads out of the arm's reach, whatever its length, few knots are made.
+        for piece in range(1, pieces + 1):
+            knots += self._between(curve, knots[-1], curve.length if piece == pieces else piece * step)
         s, *rest = zip(*knots, strict=True)
         return Knots(np.array(s), *(np.array(values) for values in rest))
 

@@ -1,5 +1,6 @@
 """Motions as quick as asked, or as much slower as the limits of the joints and of their torques require."""
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,11 +20,13 @@ from tvist_protocol.replies import Code
 from tvist_shaping.base import Filter
 
 TRIES = 10
-"""Number of motions that are tried."""
+"""Number of motions that are tried before each further one is slower by a share that doubles."""
+HASTE = 0.001
+"""The first such share [-]."""
 SPLIT = 6
 """Number of tries in which either the velocity or the acceleration is reduced, before both are."""
 LOOKS = 64
-"""Number of moments at which a motion is looked at that is not shaped ahead."""
+"""Number of evenly spaced moments at which a motion is looked at that is not shaped ahead, beside those of its law."""
 BLUNTED = 1.05
 """Largest ratio of the shaped motion's torque to that of the unshaped motion, behind which it lags [-]."""
 ROUNDING = 1e-6
@@ -106,7 +109,7 @@ class Fitter:
         self._dynamics.believe(basis.bodies)
         asked, need, slower = make(AS_ASKED), None, AS_ASKED
         motion = asked
-        for number in range(TRIES):
+        for number in itertools.count():
             found = self._need(motion, basis, tvist)
             if isinstance(found, str):
                 return Fitted(asked, exceeds=found)
@@ -115,7 +118,10 @@ class Fitter:
             by = found.slower
             need = found if need is None else min(need, found, key=lambda each: each.slower.rate)
             if number >= SPLIT:
-                by = Slower(by.rate, by.rate**2)
+                # The spread of the impulses stays, so a slower motion may use more of a limit than the last one.
+                most = 1.0 - min(HASTE * 2.0 ** (number - TRIES), 0.5) if number >= TRIES else 1.0
+                rate = min(by.rate, most)
+                by = Slower(rate, rate**2)
             slower = Slower(slower.velocity * by.velocity, slower.acceleration * by.acceleration)
             motion = make(slower)
         return Fitted(motion, slower, need, asked.duration)
@@ -163,9 +169,13 @@ class Fitter:
             limits.velocity * (1.0 + velocity),
             limits.acceleration * (1.0 + acceleration),
         )
-        if (bound <= self._torque).all():
+        if (BLUNTED * bound <= self._torque).all():
             return False
-        effort = np.max([dynamics.effort(*state) for state in zip(*_states(motion), strict=True)], axis=0)
+        effort, states = np.zeros_like(self._torque), _states(motion)
+        for believed in basis.bodies:
+            dynamics.believe((believed,))
+            effort = np.maximum(effort, np.abs(dynamics.torques(*states)).max(axis=0))
+        dynamics.believe(basis.bodies)
         return bool((max(BLUNTED, 1.0 + acceleration) * effort > self._torque).any())
 
     def _kinematic(self, q: Floats, qd: Floats, qdd: Floats) -> Need | None:
@@ -235,6 +245,11 @@ def _place(values: Floats, q: Floats) -> Floats:
     return at
 
 
-def _states(motion: PlannedMotion) -> tuple[Floats, ...]:
-    """Positions, velocities and accelerations at `LOOKS` moments of a motion before it is shaped, each of (k, n)."""
-    return tuple(np.array(values) for values in zip(*motion.states(LOOKS), strict=True))
+def _states(motion: PlannedMotion) -> tuple[Floats, Floats, Floats]:
+    """Positions, velocities and accelerations of a motion before it is shaped, each of shape (k, n).
+
+    A short acceleration may lie between evenly spaced moments, so those at which the law changes are added.
+    """
+    moments = motion.law.moments
+    known = (moments > motion.law.begins) & (moments < motion.duration)
+    return motion.states(np.union1d(motion.evenly(LOOKS), moments[known]))

@@ -214,7 +214,7 @@ def limited(fitted: Fitted, asked: MotionLimits | None = None) -> tuple[Code, st
 def _jerked(motion: PlannedMotion, asked: MotionLimits) -> tuple[Code, str] | None:
     """Say that the jerk keeps a joint motion from the speed that was asked for, unless its way is too short for it."""
     way = float(np.abs(motion.path.end - motion.path.start).max())
-    _, (_, qd, _), _ = motion.states(3)  # it is symmetric in time, so fastest in the middle
+    _, qd, _ = motion.states(motion.evenly(3))  # it is symmetric in time, so fastest in the middle
     fastest = float(np.abs(qd).max())
     if fastest >= REACHED * asked.velocity or asked.velocity**2 > asked.acceleration * way:
         return None

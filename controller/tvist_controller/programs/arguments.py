@@ -1,11 +1,25 @@
-"""Checks of what a program passes to a function, and conversion to the controller's types."""
+"""Checks of what a program passes to a function, and conversion to the controller's types.
+
+What a message of the protocol may hold as well has the bounds that it has there: a plan or a tick that gets numbers
+beyond them may take all memory, or fail.
+"""
 
 import math
 from collections.abc import Sequence
+from functools import cache
+from typing import get_args
 
+from tvist_protocol.values import Coordinate
 from tvist_urscript import Array, Fault, Pose
 
 Value = object
+
+
+@cache
+def bounds(kind: object) -> tuple[float, float]:
+    """Return the least and the largest number of one of the protocol's types, such as `Mass`."""
+    meta = get_args(kind)[1]
+    return meta.ge if meta.gt is None else meta.gt, meta.le
 
 
 def number(name: str, value: Value, least: float = -math.inf, most: float = math.inf) -> float:
@@ -46,8 +60,14 @@ def integer(name: str, value: Value, least: int, most: int) -> int:
     return int(value)
 
 
-def numbers(name: str, value: Value, count: int) -> tuple[float, ...]:
+def numbers(name: str, value: Value, count: int, kind: object = Coordinate) -> tuple[float, ...]:
     """Return the numbers of a list or a pose.
+
+    Args:
+        name: Name of the argument.
+        value: The list.
+        count: Number of its elements.
+        kind: The protocol's type of one of them, which bounds it: angles and speeds are bounded like coordinates.
 
     Raises:
         Fault: It is no list of so many numbers.
@@ -57,16 +77,19 @@ def numbers(name: str, value: Value, count: int) -> tuple[float, ...]:
     items = value.items
     if len(items) != count:
         raise Fault(f"{name} has {len(items)} elements: it must have {count}")
-    return tuple([number(f"{name}[{k}]", item) for k, item in enumerate(items)])
+    least, most = bounds(kind)
+    return tuple([number(f"{name}[{k}]", item, least, most) for k, item in enumerate(items)])
 
 
-def pose(name: str, value: Value) -> tuple[float, float, float, float, float, float]:
+def pose(
+    name: str, value: Value, kind: object = Coordinate
+) -> tuple[float, float, float, float, float, float]:
     """Return the six numbers of a pose; a list of six numbers counts as one.
 
     Raises:
         Fault: It is none.
     """
-    x, y, z, rx, ry, rz = numbers(name, value, 6)
+    x, y, z, rx, ry, rz = numbers(name, value, 6, kind)
     return x, y, z, rx, ry, rz
 
 

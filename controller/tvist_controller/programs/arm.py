@@ -11,7 +11,7 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import Segment
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity, after
-from tvist_urscript import Fault
+from tvist_urscript import Fault, Machine
 
 BRAKING = 2.0
 """Deceleration of the fastest joint where a move follows a motion that has not ended [rad/s^2]."""
@@ -38,7 +38,7 @@ class ProgramArm:
     def __init__(
         self,
         access: Access,
-        thread: Callable[[], tuple[object, int]],
+        thread: Callable[[], tuple[Machine, int]],
         lives: Callable[[object], bool],
         spend: Callable[[int], None],
     ) -> None:
@@ -47,8 +47,8 @@ class ProgramArm:
         self._allowance = Allowance(access.motion, access.latest)
         self._inside: object | None = None
         """Thread whose move has not returned."""
-        self._driver: object | None = None
-        """Thread that began the guided motion."""
+        self.driver: tuple[Machine, int] | None = None
+        """Program and number of the thread that began the guided motion."""
         self._journeys: dict[object, Journey] = {}
         """Moves of each thread that are blended, until the last of them is done."""
         self._journey: Journey | None = None
@@ -263,7 +263,7 @@ class ProgramArm:
         self._journey, self._own = None, True
         try:
             self._guided = start(shaped)
-            self._driver = None if self._guided is None else self._thread()
+            self.driver = None if self._guided is None else self._thread()
         except RefusalError as refusal:
             raise Fault(refusal.reply.why) from refusal
         finally:
@@ -322,13 +322,18 @@ class ProgramArm:
                 guidance.stand(BRAKING)
         finally:
             self._own = self._abandoned = False
-            self._driver = None
+            self.driver = None
             if guidance.compliant is None:
                 self._guided = None
             if self._journey is not None:
                 self._journey.number = None
 
     # ------------------------------------------------------------------ threads and events
+
+    @property
+    def ends(self) -> bool:
+        """Whether nothing follows in the program that runs now."""
+        return self._thread()[0].at_end
 
     @property
     def moves(self) -> bool:
@@ -340,6 +345,10 @@ class ProgramArm:
         """Whether a guided motion of the program is running."""
         return self._guided is not None
 
+    def slow_down(self) -> None:
+        """Let the guided motion come to rest until the next command."""
+        self._access.guidance.slow_down()
+
     def settle(self) -> None:
         """Stop a motion whose thread has ended without another that took it over; called at the end of each turn."""
         self._allowance.planning = max(self._allowance.planning - 1, 0)
@@ -347,7 +356,7 @@ class ProgramArm:
         if journey is not None and not (journey.over or self._lives(journey.owner)):
             self._abandoned |= journey.number is not None
             self._journey = None
-        if self._driver is not None and not self._lives(self._driver):
+        if self.driver is not None and not self._lives(self.driver):
             self._abandoned = True
         if self._abandoned:
             self.brake(lambda: self._motion.stop(None, "the thread that moved the arm has ended"))
@@ -356,7 +365,7 @@ class ProgramArm:
 
     def forget(self) -> None:
         """Forget all motions, since the program has ended."""
-        self._inside = self._driver = self._journey = self._guided = self._gives = None
+        self._inside = self.driver = self._journey = self._guided = self._gives = None
         self._journeys.clear()
         self._abandoned, self._allowance.planning = False, 0
 
@@ -365,7 +374,7 @@ class ProgramArm:
         journey = self._journey
         moving = None if journey is None else journey.number
         if event.kind == "protective_stop":
-            self._guided = self._driver = None
+            self._guided = self.driver = None
             if journey is not None and moving is not None:
                 journey.stop()
         if event.id is None or self._own or event.id not in {moving, self._guided}:

@@ -8,6 +8,7 @@ from typing import Literal
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import known_signatures
 from tvist_urscript import METHOD, PURE, ScriptError, check, compile_script
+from tvist_urscript.checker import unportable
 
 _SIMULATED = {name: one for name, one in known_signatures().items() if name not in SUBJECTS}
 _NAMES = {name.lower(): name for name in (*known_signatures(), *PURE)}
@@ -32,7 +33,8 @@ def check_program(text: str) -> list[Finding]:
     """Return what is wrong with a program, in the order of its text; empty if nothing is.
 
     Errors are those of the compiler: syntax, unknown names, calls that do not fit their functions. Warnings are the
-    calls of functions that this controller does not simulate, and that a text of functions alone does nothing.
+    calls of functions that this controller does not simulate, what a robot of UR's refuses or reads otherwise, and
+    that a text of functions alone does nothing.
 
     Args:
         text: The program: a `def` or `sec` with its `end`, or statements.
@@ -49,9 +51,11 @@ def check_program(text: str) -> list[Finding]:
         if subject is not None:
             text_of_it = f"{name}: this controller does not simulate {subject[1]}"
             findings.append(Finding(error.line, error.column, "warning", text_of_it))
-    if not known and compile_script(text, known_signatures()).idle:
-        why = "the text only defines functions: as a program, it ends at once"
-        findings.append(Finding(1, 1, "warning", why))
+    if not known:
+        findings += [Finding(one.line, one.column, "warning", one.text) for one in unportable(text)]
+        if compile_script(text, known_signatures()).idle:
+            why = "the text only defines functions: as a program, it ends at once"
+            findings.append(Finding(1, 1, "warning", why))
     return sorted(findings, key=lambda finding: (finding.line, finding.column))
 
 

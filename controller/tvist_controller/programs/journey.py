@@ -73,7 +73,7 @@ class Journey:
         """True after a call of `abort`; a motion that was being planned then is not started."""
         self.over = False
         """Whether there is nothing more to do."""
-        self._fault: Fault | None = None
+        self._fault: Exception | None = None
         self._steps: Turns | None = None
         self._marks: list[tuple[int, float]] = []
         """Where the blend at the end of each move under way begins, see `PlannedMove.marks`."""
@@ -132,7 +132,7 @@ class Journey:
             next(self._steps)
         except StopIteration:
             self.over = True
-        except Fault as fault:
+        except Exception as fault:  # noqa: BLE001  the thread that it concerns raises it again
             self.over, self._fault = True, fault
 
     def _travel(self) -> Turns:

@@ -10,6 +10,7 @@ from tvist_controller.programs.built_in import built_in
 from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.kept import Kept, KeptPrograms
 from tvist_controller.programs.library import MOVING, functions
+from tvist_controller.programs.missed_turns import MissedTurns
 from tvist_controller.programs.popups import Popups
 from tvist_controller.programs.runstate import RunstateOutputs
 from tvist_controller.programs.sockets import Sockets
@@ -54,6 +55,7 @@ class ProgramPlayer:
     def __init__(self, access: Access, safety: SafetyControl) -> None:
         self._access, self._motion, self._safety, self._emit = access, access.motion, safety, access.emit
         self.arm = ProgramArm(access, self._thread, self._lives, lambda work: self._machine().charge(work))
+        self._missed_turns = MissedTurns(self.arm, access.emit)
         self.popups = Popups(access.emit, self._machine)
         self._watchdogs = Watchdogs(access.peripherals)
         self.sockets = Sockets(
@@ -81,6 +83,8 @@ class ProgramPlayer:
         """The one whose turn it is."""
         self._failed = False
         """Whether the program ends by an error or a stop."""
+        self.raised: list[Exception] = []
+        """Exceptions with which functions have failed that blame no argument, until a log has them."""
         self.line = 0
         """Present line, or the one with which playing would resume, counted from 1; 0 if there is none."""
         self.label: ProgramLabel | None = None
@@ -147,6 +151,8 @@ class ProgramPlayer:
             else:
                 self._starved.add(running)
         self._left = left
+        if not self._held:
+            self._missed_turns.look({one.machine for one in self._starved})
         self.arm.settle()
         if self._main is not None and (self.line == 0 or tick % TOLD_EVERY == 0):
             self._find_line(self._main.machine)
@@ -217,6 +223,8 @@ class ProgramPlayer:
 
     def _fail(self, running: _Running, error: ScriptError) -> None:
         self._failed |= running is self._main
+        if error.internal is not None:
+            self.raised.append(error.internal)
         self._emit(
             "warning", why=readable(error.text), line=error.line, column=error.column, program=running.name
         )
@@ -258,7 +266,7 @@ class ProgramPlayer:
         assert self._now is not None, "only programs call their functions"
         return self._now.machine
 
-    def _thread(self) -> tuple[object, int]:
+    def _thread(self) -> tuple[Machine, int]:
         """What identifies the thread that runs now: its program and its number."""
         machine = self._machine()
         return machine, machine.thread
@@ -289,6 +297,7 @@ class ProgramPlayer:
         self._main = self._begin(self.loaded.script, self.name or self.loaded.script.name, origin)
         self.state, self.line, self._failed = "PLAYING", 1, False
         self._runstate.tell(runs=True)
+        self._missed_turns.clear()
         self.statements.open(self._main.machine)
 
     def play_beside(self, script: Script, origin: str | None) -> None:
@@ -330,4 +339,4 @@ class ProgramPlayer:
         self._runstate.tell(runs=False, failed=failed)
         if self._main is not None:
             self._find_line(self._main.machine)
-            self._main.machine.left = 0
+            self._main.machine.hold()

@@ -42,6 +42,8 @@ class QuietLaw:
         slows = np.flatnonzero(self._acceleration < -1e-6 * np.abs(self._acceleration).max())
         self.brakes_at = step * max(int(slows[0]) - 1, 0)
         """Time at which it begins to slow down [s]."""
+        self.moments: Floats = np.linspace(0.0, self.duration, self._count + 1)
+        """Times at which the jerk changes [s]."""
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], with m numbers each."""

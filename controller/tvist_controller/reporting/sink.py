@@ -37,7 +37,7 @@ class Sink:
         """Take changed inputs, outputs and registers; they precede the state of their tick."""
 
     def raised(self, error: Exception) -> None:
-        """Take what a method of somebody's own plant has raised, for a log; the robot has dealt with it."""
+        """Take what a plant, a function of a program or a tick has raised, for a log; the robot has dealt with it."""
 
     def journal(self, entry: Entry) -> None:
         """Take an input of the controller, which precedes the tick of its number."""

@@ -19,6 +19,8 @@ SURE = 3.7
 """Number of standard deviations beyond which a change is told, if the scatter is known well. Of normal measurements 1
 in 5,000 would be so far off; those of real motions have heavier tails.
 """
+SHOWN, CLEAR = 2.0, 2.5
+"""Numbers of standard errors: that messages name as the interval of a change, and that a change has at least."""
 FARTHEST = 3.5
 """Number of its own deviations by which a measurement counts as far from those before, at most."""
 BELIEVED = 4.0
@@ -90,6 +92,8 @@ class ChangeDetector:
                 after = float(np.average(latest[new], weights=1.0 / own[new]))
                 error_since = float(np.sqrt(1.0 / np.sum(1.0 / own[new]) + variance))
                 surest, found = abs(moved) / error_of_it, Change(mean, after, error_since, int(new.sum()))
+                if abs(after - mean) < CLEAR * error_since:  # the farthest ones alone say too little
+                    found = Change(mean, mean + moved, error_of_it, number)
         if found is not None:
             self._kept = self._kept[-found.lasting :]
         return found

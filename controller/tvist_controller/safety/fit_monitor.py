@@ -1,12 +1,13 @@
 """Whether the arm is still the one of the motions before: payload, gears, and what rings after stops."""
 
+import math
 from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
 
 from tvist_controller.line.sample import Sample
-from tvist_controller.safety.change_detector import Change, ChangeDetector
+from tvist_controller.safety.change_detector import SHOWN, Change, ChangeDetector
 from tvist_controller.safety.ring_listener import RingListener
 from tvist_plant.description import Payload, RobotDescription
 from tvist_protocol.calibration import Calibration
@@ -148,24 +149,30 @@ def _of_mass(change: Change) -> str:
     more = change.after - change.before
     return (
         f"the arm carries about {abs(more):.1f} kg {'more' if more > 0.0 else 'less'} than in the motions before "
-        f"(within {2.0 * change.error:.1f} kg), and nobody has declared it: declare the payload with set_payload, or "
+        f"(within {SHOWN * change.error:.1f} kg), and nobody has declared it: declare the payload with set_payload, or "
         "find out what pushes the arm"
     )
 
 
 def _of_gear(change: Change, joint: str) -> str:
-    stiffness = 100.0 * (np.exp(change.before - change.after) - 1.0)
+    size, within = _percent(change.before - change.after, change.error)
     return (
-        f"the gear of the {joint} is {abs(stiffness):.0f} % {'softer' if stiffness < 0.0 else 'stiffer'} than in "
-        f"the motions before (within {200.0 * change.error:.0f} %), by the angle that it gives way at rest: look for a "
+        f"the gear of the {joint} is {size:.0f} % {'softer' if change.after > change.before else 'stiffer'} than in "
+        f"the motions before (within {within:.0f} %), by the angle that it gives way at rest: look for a "
         "loose or worn joint, then measure the arm anew with tvist identify"
     )
 
 
 def _of_modes(change: Change) -> str:
-    higher = 100.0 * (np.exp(change.after - change.before) - 1.0)
+    size, within = _percent(change.after - change.before, change.error)
     return (
-        f"what rings after stops is {abs(higher):.0f} % {'higher' if higher > 0.0 else 'lower'} in frequency than "
-        f"after the stops before (within {200.0 * change.error:.0f} %): look whether mount, base, a joint or the tool "
+        f"what rings after stops is {size:.0f} % {'higher' if change.after > change.before else 'lower'} in frequency "
+        f"than after the stops before (within {within:.0f} %): look whether mount, base, a joint or the tool "
         "is loose or another tool is on, then measure the arm anew with tvist identify"
     )
+
+
+def _percent(logarithm: float, error: float) -> tuple[float, float]:
+    """Size of a change whose logarithm has this standard error, and its distance from its interval's nearer end [%]."""
+    nearer = math.copysign(abs(logarithm) - SHOWN * error, logarithm)
+    return 100.0 * abs(math.expm1(logarithm)), 100.0 * abs(math.exp(logarithm) - math.exp(nearer))

@@ -223,17 +223,27 @@ class PayloadMonitor:
     def _judge(self, at_rest: bool) -> str | None:
         if not self._judges or self._warned or self._time < ENOUGH:
             return None
-        mass, bound = self.excess
-        doubtful = abs(mass) > TOLERATED + bound
+        doubtful = _contradicts(*self.excess)
         if self._patience is not None and self._patience.lasts(doubtful, at_rest):
             return None
-        if not doubtful:
+        mass, bound = self._estimate(1)
+        if not (
+            doubtful and _contradicts(mass, bound)
+        ):  # what is named has to contradict the declaration, too
             return None
         self._warned = True
-        mass, bound = self._estimate(1)
-        felt = max(self.payload.mass + mass, 0.0)
+        felt = self.payload.mass + mass
+        hold = f"about {felt:.1f} kg" if felt >= 0.0 else f"{-mass:.1f} kg less"
+        told = f"{self.payload.mass:g} kg are {self._called}, but the drives hold {hold} (within {bound:.1f} kg): "
+        if felt + bound < 0.0:
+            return f"{told}no payload is that light, so find out what pushes the arm"
+        felt = max(felt, 0.0)
         return (
-            f"{self.payload.mass:g} kg are {self._called}, but the drives hold about {felt:.1f} kg (within "
-            f"{bound:.1f} kg): declare them, in a program with set_payload({felt:.1f}, …) or "
-            f"set_target_payload({felt:.1f}, …) and their centre of mass, or find out what pushes the arm"
+            f"{told}declare them, in a program with set_payload({felt:.1f}, …) or set_target_payload({felt:.1f}, …) "
+            "and their centre of mass, or find out what pushes the arm"
         )
+
+
+def _contradicts(mass: float, bound: float) -> bool:
+    """Return whether an estimated error of the declared mass is beyond its bound and what is tolerated [kg]."""
+    return abs(mass) > TOLERATED + bound

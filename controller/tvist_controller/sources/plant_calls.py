@@ -11,7 +11,7 @@ import numpy as np
 
 from tvist_plant.description import Payload
 from tvist_plant.plant import Condition, Plant, PlantError
-from tvist_plant.plant_checks import check_measurement
+from tvist_plant.plant_checks import check_measurement, check_sight
 from tvist_plant.user_file import named
 
 _MEASURING = ("step", "reset", "measure")
@@ -55,6 +55,8 @@ class _Called:
     def _check(self, name: str, answer: Any) -> None:
         if name == "condition" and not isinstance(answer, Condition):
             raise TypeError(f"it is a {type(answer).__name__}, and must be a Condition")
+        if name in {"sight", "seen"}:
+            check_sight(answer, self._joints)
         if name in _MEASURING:
             check_measurement(answer, self._joints, self._plant)
             felt = () if answer.wrench is None else answer.wrench

@@ -14,6 +14,7 @@ from tvist_controller.trajectory.path import JointLine, Path, Way
 from tvist_controller.trajectory.path_stop import PathStop
 from tvist_controller.trajectory.servo import Servo
 from tvist_controller.trajectory.slowed_stop import SlowedStop
+from tvist_controller.trajectory.speed import Speed
 from tvist_controller.trajectory.stop import JointStop
 from tvist_controller.trajectory.stream import SetpointStream
 from tvist_controller.trajectory.tool_speed import ToolKinematics, ToolSpeed
@@ -42,6 +43,7 @@ __all__ = [
     "Servo",
     "SetpointStream",
     "SlowedStop",
+    "Speed",
     "StuckError",
     "ToolKinematics",
     "ToolSpeed",

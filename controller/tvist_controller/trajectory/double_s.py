@@ -47,6 +47,8 @@ class DoubleS:
         leading = self._trajectory.profiles[0][int(np.argmax(np.abs(end - start)))]
         self.brakes_at = self.duration - sum(leading.t[:3])
         """Time at which it begins to slow down [s]."""
+        self.moments: Floats = np.cumsum(leading.t)
+        """Times at which the jerk changes, so that velocity or acceleration may be largest [s]."""
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], with m numbers each."""

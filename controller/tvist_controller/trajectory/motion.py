@@ -1,7 +1,6 @@
 """Planned motions: a time law along a path, whose time passes at an adjustable rate."""
 
 import copy
-from collections.abc import Iterator
 from typing import Protocol, Self
 
 import numpy as np
@@ -36,6 +35,10 @@ class TimeLaw(Protocol):
     """Time at which it begins to slow down [s]."""
     begins: float
     """Time from which on it is known: above 0 for one whose beginning has been forgotten [s]."""
+
+    @property
+    def moments(self) -> Floats:
+        """Times at which velocity or acceleration may be largest [s]; some may be before it is known."""
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], with m numbers each."""
@@ -105,15 +108,15 @@ class PlannedMotion(Trajectory):
         way = end[leading] - start[leading]
         return (now[leading] - start[leading]) / way if way != 0.0 else 1.0
 
-    def states(self, count: int) -> Iterator[tuple[Floats, Floats, Floats]]:
-        """Iterate over the joints' states at evenly spaced times of the whole motion at full speed.
+    def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
+        """Positions, velocities and accelerations of the joints at k times at full speed [s], each of shape (k, n)."""
+        return self.path.states(
+            *(np.array(values) for values in zip(*map(self.law.at, times.tolist()), strict=True))
+        )
 
-        Args:
-            count: Number of states; each has position, velocity and acceleration, arrays of shape (n,).
-        """
-        for time in np.linspace(self.law.begins, self.duration, count).tolist():
-            x, xd, xdd = (np.array(values) for values in self.law.at(time))
-            yield self.path.states(x, xd, xdd)
+    def evenly(self, count: int) -> Floats:
+        """Evenly spaced times from the first one that is known to the end, shape (count,) [s]."""
+        return np.linspace(self.law.begins, self.duration, count)
 
     def next(self) -> Floats:
         """Advance by one tick and return the parameter, which is exactly the path's end from the end time on."""

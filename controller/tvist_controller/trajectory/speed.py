@@ -58,6 +58,11 @@ class Speed(Guided):
         self._speed, self._slowest = rate, limits.velocity
         self._share = 1.0
         """Share of the acceleration that was tried last [-]."""
+        self._goal = np.zeros_like(self._q)
+
+    def come_to_rest(self) -> None:
+        """Approach zero, with the acceleration of the last command, until another one comes."""
+        self._goal = np.zeros_like(self._goal)
 
     def adopt(self, limits: MotionLimits) -> None:
         """See `Guided.adopt`. The jerk is that of the acceleration changing its sign within a tick."""

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from msgspec import Struct
 
+from tvist_server.punctual import processors
+
 LIBRARIES = ("tvist", "eclipse-zenoh", "mcap", "msgspec", "mujoco", "numba", "numpy", "pin", "ruckig")
 """Distributions whose versions matter for speed."""
 
@@ -33,7 +35,7 @@ def this_machine() -> Machine:
     """Describe this machine as it is now."""
     return Machine(
         cpu=_processor(),
-        cores=len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1,
+        cores=processors(),
         system=f"{platform.system()} {platform.release()} {platform.machine()}",
         python=platform.python_version(),
         libraries={name: found for name in LIBRARIES if (found := _version(name)) is not None},

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tvist_lab.metrics.measured_motion import SMALLEST, measured_spans
 from tvist_lab.metrics.servo_lag import servo_lag
 from tvist_lab.metrics.vibration import parts
-from tvist_lab.recordings import Floats, MissingColumnError, Recording
+from tvist_lab.recordings import Floats, Recording
 
 MOVING = 1e-7
 """A reference that changes by more than this from one tick to the next moves [rad]."""
@@ -29,7 +29,6 @@ TINY = 5e-4
 """Largest way of a joint that only trembles [rad]."""
 EARLY = 0.05
 """Time before a motion found in the measured angles that does not count as rest any more [s]."""
-OF_ROWS = ("start", "reference_stop", "shaped_stop", "end")
 DIFFERENTIATOR_TICKS = 1
 """The published target of tick i is the shaped reference of tick i-1, since a central difference costs a tick."""
 
@@ -54,6 +53,16 @@ class MotionRows:
     """Whether it was stopped before its target."""
     lag: float | None = None
     """Time by which the arm follows its target, in a log of another controller [s]; None if that is not known."""
+
+    def later(self, rows: int) -> "MotionRows":
+        """Return the same motion in a recording with more rows before it."""
+        return replace(
+            self,
+            start=self.start + rows,
+            reference_stop=self.reference_stop + rows,
+            shaped_stop=self.shaped_stop + rows,
+            end=self.end + rows,
+        )
 
     def arm_stop(self, recording: Recording) -> int:
         """First row from which the arm is not driven any more, so that it only vibrates."""
@@ -92,22 +101,13 @@ def motions(recording: Recording) -> list[MotionRows]:
     Raises:
         RecordingError: There is neither `reference_q` nor `target_q` nor `actual_q`.
     """
-    if "target_q" not in recording and "actual_q" not in recording:
-        raise MissingColumnError(
-            "actual_q", "a log without joint angles shows no motions. Next: tvist log analyze"
-        )
+    tick, (first, *others) = recording["tick"], parts(recording.time)
+    if not others:
+        return _motions(recording)
     found = []
-    for rows in parts(recording.time):
-        whole = rows == slice(0, len(recording))
-        part = (
-            recording
-            if whole
-            else recording.between(*recording["tick"][[rows.start, rows.stop - 1]].tolist())
-        )
-        found += [
-            replace(one, **{name: getattr(one, name) + rows.start for name in OF_ROWS})
-            for one in _motions(part)
-        ]
+    for rows in (first, *others):
+        part = recording.between(int(tick[rows.start]), int(tick[rows.stop - 1]))
+        found += [motion.later(rows.start) for motion in _motions(part)]
     return found
 
 

@@ -44,6 +44,11 @@ class LogError(RecordingError):
     """A file is no log that can be measured; the message names the file and, where there is one, the line."""
 
 
+def is_measured(name: str) -> bool:
+    """Return whether a column of a table is an entry of a vector that a robot measures or wants."""
+    return name[-1:].isdigit() and MEASURED.fullmatch(name) is not None
+
+
 def check_names(where: object, names: Sequence[str]) -> None:
     """Refuse a name that cannot be shown, as of a damaged file."""
     for name in names:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from tvist_lab.recordings.checks import MEASURED, TIME, LogError
+from tvist_lab.recordings.checks import TIME, LogError, check_names, is_measured
 from tvist_lab.recordings.log_columns import (
     ROBOT,
     STRANGE,
@@ -79,9 +79,14 @@ def read_csv(path: Path, columns: str | None = None, needs: Needs = ROBOT) -> Re
     """
     lines = _lines(path, needs, known=columns is None)
     names, units, whose = _named(path, lines.names, columns)
-    values, names, texts = _numbers(path, lines, names)
+    needed = [name == TIME or is_measured(name) if columns is None else bool(name) for name in names]
+    values, texts = _numbers(path, lines, needed)
+    if texts:
+        names = ["" if place in texts else name for place, name in enumerate(names)]
+        there = ", ".join(lines.names[place] for place in texts)
+        whose = (*whose, f"columns that hold text are left out: {there}")
     values, notes = in_si(names, values, units)
-    notes = (*lines.notes, *whose, *texts, *notes)
+    notes = (*lines.notes, *whose, *notes)
     return recording_of(
         Rows(path, names, values, lines.numbers, notes=notes, needs=needs, header=lines.names)
     )
@@ -171,7 +176,7 @@ def _header(path: Path, lines: list[bytes], needs: Needs, *, known: bool) -> tup
     ]
     if len(names) == 1:
         raise LogError(
-            f"{path} {STRANGE}: its line {top + 1} does not name columns, as in timestamp,actual_q_0"
+            f"{path} {STRANGE}: its line {top + 1} has one cell; a header names several, as in timestamp,actual_q_0"
         )
     if not known and all(name in EMPTY or _NUMBER.fullmatch(name) for name in names):
         return top - 1, [str(place) for place in range(1, len(names) + 1)], separator
@@ -182,6 +187,7 @@ def _header(path: Path, lines: list[bytes], needs: Needs, *, known: bool) -> tup
         )
     if known:
         check_known(path, top + 1, _named(path, names, None)[0], needs)
+    check_names(f"{path}, line {top + 1}", names)
     if twice := sorted(name for name, count in Counter(names).items() if name and count > 1):
         raise LogError(f"{path}, line {top + 1}: the column {twice[0]} is there twice")
     return top, names, separator
@@ -198,9 +204,9 @@ def _top(lines: list[bytes]) -> int | None:
     return None
 
 
-def _numbers(path: Path, lines: _Lines, rtde: list[str]) -> tuple[Floats, list[str], tuple[str, ...]]:
-    """Values of all cells, shape (T, columns), NaN where one is empty; RTDE's names of columns of numbers; a note."""
-    texts: tuple[str, ...] = ()
+def _numbers(path: Path, lines: _Lines, needed: list[bool]) -> tuple[Floats, list[int]]:
+    """Values of all cells, shape (T, columns), NaN where one is empty; and columns with text that are not needed."""
+    texts: list[int] = []
     names = [str(place) for place in range(len(lines.names))]
     try:
         frame = _frame(lines, dict.fromkeys(names, pl.Float64()))
@@ -208,11 +214,8 @@ def _numbers(path: Path, lines: _Lines, rtde: list[str]) -> tuple[Floats, list[s
         text = _frame(lines, dict.fromkeys(names, pl.String()))
         text = text.select(pl.col(names).str.strip_chars().str.strip_chars('"'))
         frame = text.select(pl.col(names).cast(pl.Float64, strict=False))
-        others = _texts(path, lines, rtde, text, frame)
-        rtde = ["" if place in others else name for place, name in enumerate(rtde)]
-        if left_out := [lines.names[place] for place in others if lines.names[place]]:
-            texts = (f"text was left out: {', '.join(left_out)}",)
-    return np.asarray(frame.to_numpy().astype(np.float64)), rtde, texts
+        texts = _check_cells(path, lines, text, frame, needed)
+    return np.asarray(frame.to_numpy().astype(np.float64)), texts
 
 
 def _frame(lines: _Lines, schema: dict[str, pl.DataType]) -> pl.DataFrame:
@@ -228,16 +231,23 @@ def _frame(lines: _Lines, schema: dict[str, pl.DataType]) -> pl.DataFrame:
     )
 
 
-def _texts(path: Path, lines: _Lines, rtde: list[str], text: pl.DataFrame, frame: pl.DataFrame) -> list[int]:
-    """Places of the columns with text that nobody needs; of others, a cell without a number is refused by its line."""
-    others = []
+def _check_cells(
+    path: Path, lines: _Lines, text: pl.DataFrame, frame: pl.DataFrame, needed: list[bool]
+) -> list[int]:
+    """Refuse a cell that has something but no number, with its line and column; return columns not needed with such."""
+    texts = []
     for place, name in enumerate(lines.names):
         cells, numbers = text.to_series(place), frame.to_series(place)
         bad = (numbers.is_null() & cells.is_not_null() & ~cells.is_in(EMPTY)).arg_true()
-        if len(bad) and rtde[place] != TIME and not MEASURED.fullmatch(rtde[place]):
-            others.append(place)
-        elif len(bad):
+        if len(bad) and needed[place]:
             cell = cells[bad[0]]
             where = f"{path}, line {int(lines.numbers[bad[0]])}, column {name}"
-            raise LogError(f"{where}: {cell[:40]!r} is no number; {found_columns(lines.names)}")
-    return others
+            raise LogError(f"{where}: {cell[:40]!r} is no number{_instead(lines, name)}")
+        texts += [place] * bool(len(bad))
+    return texts
+
+
+def _instead(lines: _Lines, name: str) -> str:
+    """What to do about a column of times that is text."""
+    others = found_columns([other for other in lines.names if other != name])
+    return f"; name another column of times with --columns time=…: {others}" if name.lower() in TIMES else ""

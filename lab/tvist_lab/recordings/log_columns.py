@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tvist_lab.recordings import checks
-from tvist_lab.recordings.checks import ACCELEROMETER, MEASURED, TIME, WIDTHS, LogError
+from tvist_lab.recordings.checks import ACCELEROMETER, TIME, WIDTHS, LogError, is_measured
 from tvist_lab.recordings.recording import Floats, Recording
 from tvist_lab.words import counted
 from tvist_plant.user_file import is_name
@@ -43,11 +43,7 @@ class Needs:
 
 
 ROBOT = Needs(("target_q", "actual_q"), "--columns time=…,q=joint_{}", "--columns time=1,q=2-7")
-ALONE = (
-    "an accelerometer alone, without joint angles: tvist log analyze measures how it rings, and --imu joins it to a "
-    "robot's log"
-)
-"""Note about such a log."""
+ROBOT_OR_SENSOR = Needs((*ROBOT.columns, ACCELEROMETER), ROBOT.option, ROBOT.positions)
 SENSOR = Needs(
     (ACCELEROMETER,), "--imu-columns time=…,accelerometer=a{}", "--imu-columns time=1,accelerometer=2-4"
 )
@@ -70,7 +66,7 @@ class Rows:
     """What the reader of the file left out."""
     needs: Needs = ROBOT
     header: Sequence[str] = ()
-    """The file's own names of its columns, for messages."""
+    """Names that the file itself gives its columns, where they differ."""
 
 
 def recording_of(rows: Rows) -> Recording:
@@ -87,9 +83,12 @@ def recording_of(rows: Rows) -> Recording:
     columns, notes = _vectors(rows)
     if TIME not in columns or columns[TIME].ndim != 1:
         raise LogError(f"{rows.path} has no column {TIME}: {_remedy(rows)}")
-    if rows.needs == ROBOT and ACCELEROMETER in columns and not columns.keys() & {*ROBOT.columns}:
-        notes.append(ALONE)
-    elif not any(name in columns and columns[name].ndim == 2 for name in rows.needs.columns):
+    if not any(name in columns and columns[name].ndim == 2 for name in rows.needs.columns):
+        if rows.needs == ROBOT and ACCELEROMETER in columns:
+            raise LogError(
+                f"{rows.path} holds an accelerometer alone, no joint angles: tvist log analyze measures frequency and "
+                "damping from it, and --imu joins it with a robot's log"
+            )
         lacking = [f"{name}_0 …" for name in rows.needs.columns]
         has = f"neither {' nor '.join(lacking)}" if len(lacking) > 1 else f"no {lacking[0]}"
         raise LogError(f"{rows.path} has {has}: {_remedy(rows)}")
@@ -111,11 +110,11 @@ def recording_of(rows: Rows) -> Recording:
 
 def check_known(path: Path, line: int, names: Sequence[str], needs: Needs) -> None:
     """Refuse a text none of whose columns has a name of a robot's log, which is some other text mostly."""
-    if not any(name == TIME or MEASURED.fullmatch(name) for name in names):
+    if not any(name == TIME or is_measured(name) for name in names):
         found = f"; {found_columns(names)}" if all(map(is_name, names)) else ""
         raise LogError(
-            f"{path} {STRANGE}: its line {line} names no column that is known, such as timestamp or actual_q_0. If it "
-            f"is a log, name them with {needs.option}{found}"
+            f"{path} {STRANGE}: its line {line} has none of the names that are known, as in timestamp,actual_q_0. "
+            f"If it is a log, name its columns with {needs.option}{found}"
         )
 
 

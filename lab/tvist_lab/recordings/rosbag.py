@@ -13,6 +13,7 @@ from mcap.records import Channel, Message, Schema
 from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
+from tvist_lab.recordings.checks import ACCELEROMETER as SENSOR
 from tvist_lab.recordings.checks import GYROSCOPE, LogError
 from tvist_lab.recordings.log_columns import ROBOT, Needs, Rows, recording_of
 from tvist_lab.recordings.mcap_records import DAMAGE, records
@@ -67,7 +68,8 @@ def read_rosbag(path: Path, needs: Needs = ROBOT) -> Recording:
             notes.append(
                 f"{topic.unstamped} messages of {name} have no time in their header: the time of recording counts"
             )
-    wanted, *others = (JOINTS, TARGET, ACCELEROMETER) if needs == ROBOT else (ACCELEROMETER,)
+    kinds = {"actual_q": JOINTS, "target_q": TARGET, SENSOR: ACCELEROMETER}
+    wanted, *others = (kind for column, kind in kinds.items() if column in needs.columns)
     if not any(kind in chosen for kind in (wanted, *others)):
         there = ", ".join(sorted(topics)) or "nothing that is read"
         raise LogError(f"{path} has no sensor_msgs/msg/{wanted}; it has {there}")

@@ -5,6 +5,6 @@
 """
 
 from tvist_lab.runners.interface import Failed, Outcome, Runner, TaskError, in_order
-from tvist_lab.runners.processes import Processes, cores
+from tvist_lab.runners.processes import Processes
 
-__all__ = ["Failed", "Outcome", "Processes", "Runner", "TaskError", "cores", "in_order"]
+__all__ = ["Failed", "Outcome", "Processes", "Runner", "TaskError", "in_order"]

@@ -24,8 +24,9 @@ from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 
 from tvist_lab.runners.interface import Failed, Outcome, Result, Task, TaskError
 from tvist_lab.runners.parcels import do, pack, unpack
-from tvist_lab.runners.processes import OF_TERMINAL, cores, start_tracker
+from tvist_lab.runners.processes import OF_TERMINAL, start_tracker
 from tvist_server.own_folder import OwnFolder
+from tvist_server.punctual import processors
 
 SHARE = 16
 """Least number of batches for each worker thread, so that all end at about the same time."""
@@ -73,7 +74,7 @@ class Cluster:
             with _connected(self.scheduler) as client:
                 yield client
             return
-        processes = self.processes or cores()
+        processes = self.processes or processors()
         with (
             closing(OwnFolder()) as folder,
             dask.config.set({"temporary-directory": str(folder.path)}),

@@ -2,7 +2,6 @@
 
 import multiprocessing
 import multiprocessing.resource_tracker
-import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -12,14 +11,10 @@ from dataclasses import dataclass
 from tvist_lab.runners.interface import Failed, Outcome, Result, Task
 from tvist_lab.runners.parcels import attempt, do, pack, unpack
 from tvist_server.ending import end_with_parent, signals_held
+from tvist_server.punctual import processors
 
 AHEAD = 4
 """Number of chunks handed out for each process, so that none waits for the next one."""
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 OF_TERMINAL = {signal.SIGINT, signal.SIGHUP, signal.SIGQUIT}
@@ -63,7 +58,7 @@ class Processes:
         Raises:
             ChildProcessError: A process died, such as for want of memory.
         """
-        processes = min(cores(), len(tasks))
+        processes = min(processors(), len(tasks))
         if processes <= 1 or len(tasks) <= self.few:
             for index, task in enumerate(tasks):
                 yield index, attempt(work, task)

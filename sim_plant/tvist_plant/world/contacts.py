@@ -41,6 +41,9 @@ MOST_PAIRS = 4000
 FIRMEST = 0.5
 """Largest A k h²: beyond, a contact is an oscillation of few steps [-]."""
 
+TURNS = 50.0
+"""How much smaller a body's inverse mass at its centre of mass is than at its reach if all that it does is turn [-]."""
+
 _FLAT = {int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_PLANE)}
 
 ALL = 0x7FFFFFFF
@@ -76,11 +79,11 @@ def add_pairs(spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names) -> Con
         pair.margin = max(first.margin, second.margin)
         pair.solimp = [IMPEDANCE, IMPEDANCE, 1e-3, 0.5, 2.0]
         given.append(_in_series(first, second))
-    if len(given) > MOST_PAIRS:
-        raise SceneError(
-            f"{len(given)} pairs of shapes may touch, too many for real time: must be at most {MOST_PAIRS}; "
-            'give what is only seen contype="0" conaffinity="0"'
-        )
+        if len(given) > MOST_PAIRS:
+            raise SceneError(
+                f"more than {MOST_PAIRS} pairs of shapes may touch, too many for real time; "
+                'give what is only seen contype="0" conaffinity="0"'
+            )
     for one in spec.geoms:  # only the pairs touch
         one.contype = one.conaffinity = 0
     return given
@@ -93,14 +96,30 @@ def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
         model: The world.
         given: Result of `add_pairs`.
     """
+    _count_turning(model)
     for number, (stiffness, damping) in enumerate(given):
         if model.pair_solimp[number][0] != IMPEDANCE:
             continue  # the scene's own pair is as its file says
-        inverse = _inverse_mass(model, number)
+        if (inverse := _inverse_mass(model, number)) == 0.0:
+            continue  # no force moves either
         k = STIFFNESS if stiffness is None else stiffness
         c = 2.0 * DAMPING_RATIO * np.sqrt(k / inverse) if damping is None else damping
         model.pair_solref[number] = np.array([-k * inverse, -c * inverse]) / _points(model, number)
         model.pair_solreffriction[number] = [0.0, -GRIP * IMPEDANCE]
+
+
+def _count_turning(model: "mujoco.MjModel") -> None:
+    """Give bodies that turn about their centre of mass the inverse mass that their inertia has where they are touched.
+
+    MuJoCo's estimate Â is that of the centre of mass, which stands still then, so it would be 0 or far too small.
+    """
+    for body in range(1, model.nbody):
+        light, turning = model.body_invweight0[body]
+        shapes = slice(first := model.body_geomadr[body], first + model.body_geomnum[body])
+        away = np.linalg.norm(model.geom_pos[shapes] - model.body_ipos[body], axis=1)
+        reach = np.max(away + model.geom_rbound[shapes], initial=0.0)
+        if TURNS * light < turning * reach**2:
+            model.body_invweight0[body, 0] = turning * reach**2
 
 
 def check_masses(model: "mujoco.MjModel", timestep: float) -> None:
@@ -167,5 +186,7 @@ def _in_series(first: "mujoco.MjsGeom", second: "mujoco.MjsGeom") -> tuple[float
     given = [-np.array(one.solref[:2]) for one in (first, second) if one.solref[0] < 0.0]
     if not given:
         return None, None
+    if not all(np.isfinite(one).all() and one[1] >= 0.0 for one in given):
+        raise SceneError(f'{first.name} or {second.name} has a solref that is not "-N/m -N s/m"')
     k, c = ([float(one[part]) for one in given] for part in (0, 1))
     return 1.0 / sum(1.0 / one for one in k), 0.0 if 0.0 in c else 1.0 / sum(1.0 / one for one in c)

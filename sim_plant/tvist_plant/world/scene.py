@@ -58,17 +58,6 @@ def build(
     Raises:
         SceneError: The file is no scene, or no arm can stand in it.
     """
-    try:
-        return _build(description, payload, scene, timestep, hand)
-    except SceneError as error:
-        raise SceneError(f"world {scene.name}: {error}") from error
-    except (ValueError, mujoco.FatalError) as error:  # what MuJoCo says, in several lines
-        raise SceneError(f"world {scene.name}: {' '.join(str(error).split())}") from error
-
-
-def _build(
-    description: RobotDescription, payload: Payload, scene: SceneFile, timestep: float, hand: Hand | None
-) -> World:
     spec = arm_spec(description, payload, timestep)
     option = spec.option
     option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONTACT)

@@ -5,10 +5,13 @@ from hashlib import file_digest, sha256
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from tvist_plant.user_file import UserFileError, read_bytes, xml
+from tvist_plant.user_file import LARGEST, UserFileError, check_is_file, one_line, read_bytes, xml
 
 SCENES = Path(__file__).parent / "scenes"
 """Folder of the scenes that come with the package."""
+
+LARGEST_FILES, MOST_PLACES = 256 << 20, 20_000
+"""Largest size of all files that a scene names [byte], and number of their names, each in each folder."""
 
 
 class SceneError(ValueError):
@@ -55,7 +58,7 @@ def find_scene(name: str) -> SceneFile:
         root = xml(content)
         others = [_hash(file) for file in _named(root, path.parent)]
     except (UserFileError, OSError) as error:
-        raise SceneError(f"world {name}: {error}") from error
+        raise SceneError(f"world {name}: {one_line(str(error))}") from error
     if root.tag != "mujoco":
         raise SceneError(
             f"world {name}: it begins with <{root.tag}>: must be a file in MuJoCo's format, <mujoco>"
@@ -70,7 +73,7 @@ def _named(root: Element, folder: Path) -> list[Path]:
 
     Missing files are left out: MuJoCo reports them.
     """
-    folders, names, elements = {folder}, set[str](), list(root.iter())
+    folders, names, elements, included = {folder}, set[str](), list(root.iter()), 0
     for one in elements:  # they become more with each included file
         for key, value in one.items():
             if one.tag == "compiler" and key.endswith("dir"):
@@ -79,9 +82,19 @@ def _named(root: Element, folder: Path) -> list[Path]:
                 names.update((value, Path(value).name))  # `strippath` leaves the name only
                 if one.tag in {"include", "model"} and (folder / value).is_file():
                     folders.add((folder / value).parent)
-                    elements += xml(read_bytes(folder / value, "included file")).iter()
-    places = {place / name for place in folders for name in names}
-    return sorted(place for place in places if place.is_file())
+                    content = read_bytes(folder / value, "included file")
+                    included += len(content)
+                    elements += xml(content).iter()
+        if included > LARGEST or len(folders) * len(names) > MOST_PLACES:
+            raise UserFileError(
+                f"it names too many files: at most {MOST_PLACES}, and {LARGEST >> 20} MiB included"
+            )
+    places = sorted({place / name for place in folders for name in names})
+    for place in (found := [place for place in places if place.exists() and not place.is_dir()]):
+        check_is_file(place, "file")
+    if sum(place.stat().st_size for place in found) > LARGEST_FILES:
+        raise UserFileError(f"the files that it names have more than {LARGEST_FILES >> 20} MiB")
+    return found
 
 
 def _hash(file: Path) -> str:

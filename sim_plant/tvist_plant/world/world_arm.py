@@ -11,10 +11,10 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.model import Floats
 from tvist_plant.plant import Hand, Measurement, PlantError, Response, Things
 from tvist_plant.sensors import Accelerometer, ForceSensor
+from tvist_plant.world.apart import build_apart
 from tvist_plant.world.contacts import PREFIX, set_contacts
 from tvist_plant.world.fingers import Fingers
 from tvist_plant.world.mujoco_arm import TIMESTEP, MujocoArm
-from tvist_plant.world.scene import build
 from tvist_plant.world.scene_file import SceneFile
 from tvist_plant.world.second_opinion import SecondOpinion
 
@@ -44,7 +44,7 @@ class WorldArm(MujocoArm):
         self._seeded(0)
 
     def _made(self, payload: Payload) -> SecondOpinion:
-        self._world = build(self._description, payload, self._scene, TIMESTEP, self._hand)
+        self._world = build_apart((self._description, payload, self._scene, TIMESTEP, self._hand))
         self._bodies, self._own = (
             np.array(one, dtype=np.int64) for one in (self._world.bodies, self._world.arm)
         )

@@ -277,7 +277,7 @@ def attack(house, interface, random, packages):
 
 
 @pytest.mark.parametrize(
-    "packages", [500, pytest.param(25_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
+    "packages", [500, pytest.param(50_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
 )
 @pytest.mark.parametrize("interface", INTERFACES)
 def test_a_door_stands_and_nobody_else_notices(interface, packages):

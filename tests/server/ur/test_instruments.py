@@ -64,6 +64,18 @@ def test_what_there_is_not_is_an_attribute_error(snapshot):
             getattr(snapshot, name)
 
 
+@pytest.mark.parametrize("slider", [1.0, 0.5, 0.2])
+def test_the_slider_and_the_scaling_together_are_the_speed(ur5e, slider):
+    """Drivers multiply the two, and hold their trajectories while the product is 0."""
+    robot = ur5e(io_changes={"target_speed_fraction": slider})
+    robot.send(c.SetSpeed, fraction=slider)
+    robot.send(c.MoveJ, q=UR5E.poses["Q2"])
+    snapshot = robot.tick(100)
+    assert snapshot.state.speed_scaling == pytest.approx(slider)
+    assert snapshot.speed_scaling == pytest.approx(1.0)
+    assert ur5e(io_changes={"program_state": "PAUSED"}).tick().speed_scaling == 0.0
+
+
 def test_registers_are_those_of_io(ur5e):
     changes = {
         "input_int_register": list(range(48)),

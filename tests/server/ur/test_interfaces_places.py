@@ -5,7 +5,7 @@ import struct
 
 import pytest
 
-from tvist_server.gateways.ur.connection import FIRST_WORD
+from tvist_server.gateways.ur.connection import UNREAD_FOR
 from tvist_server.gateways.ur.places import MOST
 
 from .desks import PATIENCE, connect, lines, until
@@ -81,26 +81,40 @@ async def test_clients_that_say_nothing_lock_nobody_out(interface, desk):
     assert len(await asyncio.wait_for(reader.readexactly(5), PATIENCE)) == 5
 
 
-async def test_who_says_nothing_for_half_a_minute_is_closed_and_who_reads_or_has_spoken_stays(
-    later, desk, caplog
-):
+async def test_a_client_may_be_silent_for_any_time_whether_it_has_spoken_or_not(later, desk):
     (reading,) = await readers(desk, 1)
-    spoken, writer = await dashboard(desk)
     served, _ = await rtde(desk)
-    silent_ones = [(await connect(desk, interface))[0] for interface in ("dashboard", "rtde")]
-    await until(lambda: len(desk.interfaces._connections) == 5)
-    later(FIRST_WORD - 1.0)
-    await asyncio.sleep(0)
-    assert len(desk.interfaces._connections) == 5
-    later(1.0)
-    for reader in silent_ones:
-        assert await is_cut_off(reader)
+    silent_ones = [await connect(desk, interface) for interface in ("dashboard", "rtde")]
+    await until(lambda: len(desk.interfaces._connections) == 4)
     later(86_400.0)
     await desk.tick()
     assert len(await reading.readexactly(1220)) == 1220
     assert await package(served) == b"U"
-    assert await lines(spoken, writer, "robotmode") == ["Robotmode: RUNNING"]
-    assert "was closed: it said nothing for 30 s" in caplog.text
+    (dashboard_reader, dashboard_writer), (rtde_reader, rtde_writer) = silent_ones
+    assert (await dashboard_reader.readline()).startswith(b"Connected")
+    assert await lines(dashboard_reader, dashboard_writer, "robotmode") == ["Robotmode: RUNNING"]
+    rtde_writer.write(VERSION_2)
+    assert await package(rtde_reader) == b"V"
+
+
+async def test_a_client_of_rtde_that_does_not_read_is_disconnected_after_ten_seconds_and_no_other(
+    later, desk, caplog
+):
+    reading, (_, sleeping) = (await rtde(desk))[0], await rtde(desk)
+    port = sleeping.get_extra_info("sockname")[1]
+    (stuck,) = [one for one in desk.interfaces._connections if f":{port} " in one.peer]
+    await desk.tick()
+    sleeping.transport.pause_reading()
+    stuck._transport.write(bytes(20_000_000))  # more than the system holds for it
+    later(UNREAD_FOR - 1.0)
+    await desk.tick(3)
+    assert len(desk.interfaces._connections) == 2
+    later(2.0)
+    await desk.tick()
+    await until(lambda: len(desk.interfaces._connections) == 1)
+    assert f":{port} of port" in caplog.text
+    assert "has not read for 10 s" in caplog.text
+    assert [await package(reading) for _ in range(5)] == [b"U"] * 5
 
 
 async def test_for_a_newcomer_the_one_that_has_been_silent_for_longest_goes(later, desk, caplog):

@@ -14,6 +14,7 @@ from tvist_protocol.io import Registers, SetIo, SetRegisters
 from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.input_owners import InputOwners
 from tvist_server.gateways.ur.rtde.board import Board
+from tvist_server.gateways.ur.rtde.inputs import matching
 from tvist_server.gateways.ur.rtde.session import RtdeSession, ticks_between
 from tvist_server.rtde.codec import PackageReader
 
@@ -106,11 +107,29 @@ class TestSetUp:
         assert one.say(with_comma) == one.say(client.outputs(["timestamp", "actual_q"]))
         assert one.say(client.package("I", b"input_int_register_0,")) == [("I", b"\x01INT32")]
 
+    @pytest.mark.parametrize("before", [[], ["input_int_register_0"]])
+    def test_a_start_without_outputs_is_refused_and_one_with_them_is_not(self, one, before):
+        one.say(client.version(), *([client.inputs(before)] if before else []))
+        assert one.say(client.package("S")) == [("S", NO)]
+        assert one.say(client.outputs(["timestamp"]), client.package("S"))[1] == ("S", YES)
+
     def test_outputs_that_are_not_there_are_named_and_cannot_be_started(self, one):
         one.say(client.version())
         assert one.say(client.outputs(["timestamp", "nonsense"])) == [("O", b"\x00DOUBLE,NOT_FOUND")]
         assert one.say(client.package("S")) == [("S", NO)]
         assert one.say(client.outputs(["timestamp"]), client.package("S"))[1] == ("S", YES)
+
+    def test_no_client_owns_what_is_reserved_and_clients_that_come_and_go_free_none_of_it(
+        self, one, other, robot
+    ):
+        reserved = matching(["speed_slider_*", "input_int_register_[0-9]"])
+        assert set(reserved) == {"speed_slider_mask", "speed_slider_fraction", *ints[:10]}
+        robot.inputs.take(reserved, "a fieldbus")
+        for client_ in (one, other):
+            client_.say(client.version())
+            wanted = ["speed_slider_mask", "standard_digital_output", ints[9], ints[10]]
+            assert client_.say(client.inputs(wanted)) == [("I", b"\x00IN_USE,UINT8,IN_USE,INT32")]
+            client_.session.closed()
 
     def test_inputs_are_numbered_in_order_and_wrong_ones_take_no_number(self, one):
         one.say(client.version())
@@ -221,11 +240,6 @@ class TestSamples:
         one.started(["actual_q"])
         one.say(client.outputs(["robot_mode"]))
         assert client.decoded(one.session.sample(snapshots[5]), ["robot_mode"]) == {"robot_mode": 7}
-
-    def test_a_start_without_outputs_is_accepted_and_brings_none(self, one, snapshot):
-        one.with_inputs(["input_int_register_0"])
-        assert one.say(client.package("S")) == [("S", YES)]
-        assert one.session.sample(snapshot) == b""
 
 
 class TestOwnership:

@@ -35,6 +35,19 @@ class Configuration(NamedTuple):
     d: np.ndarray
     alpha: np.ndarray
 
+    def trouble(self) -> str | None:
+        """Return why no motion can be planned within its limits, equal in both directions; None if it can."""
+        for name, found, least, most in (
+            ("smallest angles", self.least, -1e3, -0.1),
+            ("largest angles", self.most, 0.1, 1e3),
+            ("largest velocities", self.velocity, 0.05, 1e2),
+            ("largest accelerations", self.acceleration, 0.5, 1e4),
+        ):
+            if not ((least <= found) & (found <= most)).all():
+                must = f"must be {least:g} to {most:g}"
+                return f"the {name} of its joints are {found.tolist()}: {must}; correct them in its safety settings"
+        return None
+
     def is_of(self, description: RobotDescription) -> bool:
         """Return whether its dimensions are those of a robot file."""
         file = description.kinematics

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from tvist_protocol.errors import short
 from tvist_server.moving.dialogue import NoAnswerError, ask
 from tvist_server.watching.place import Place
 
@@ -15,13 +16,12 @@ def asked(place: Place, questions: Sequence[str]) -> dict[str, str]:
     text = "".join(f"{question}\n" for question in (*questions, "quit")).encode()
 
     def answers(heard: bytes) -> dict[str, str] | None:
-        lines = heard.decode(errors="replace").split("\n")[
-            1:-1
-        ]  # without the greeting, and what is incomplete
+        # Without the greeting, and what is incomplete.
+        lines = heard.decode(errors="replace").split("\n")[1:-1]
         if len(lines) < len(questions):
             return None
         found = zip(questions, lines, strict=False)
-        return {question: line.strip() for question, line in found if _UNKNOWN not in line}
+        return {question: short(line.strip()) for question, line in found if _UNKNOWN not in line}
 
     try:
         return ask(place.beside(PORT), text, answers)

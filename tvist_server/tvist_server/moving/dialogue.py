@@ -1,13 +1,14 @@
 """Short conversations with a robot's interfaces, each over a connection of its own."""
 
 import socket
+import time
 from collections.abc import Callable
 from typing import TypeVar
 
 from tvist_server.watching.place import Place
 
 PATIENCE = 2.0
-"""Longest wait for a connection or an answer [s]."""
+"""Longest duration of a conversation [s]."""
 MOST = 1 << 20
 """Most bytes that are taken as an answer."""
 T = TypeVar("T")
@@ -28,11 +29,12 @@ def ask(place: Place, question: bytes, answer: Callable[[bytes], T | None]) -> T
     Raises:
         NoAnswerError: There is no interface, or it does not answer in time.
     """
-    heard = b""
+    heard, ends = b"", time.monotonic() + PATIENCE
     try:
         with socket.create_connection((place.host, place.port), PATIENCE) as connection:
             connection.sendall(question)
-            while len(heard) < MOST:
+            while len(heard) < MOST and (left := ends - time.monotonic()) > 0.0:
+                connection.settimeout(left)
                 data = connection.recv(1 << 16)
                 heard += data
                 found = answer(heard)
@@ -40,10 +42,6 @@ def ask(place: Place, question: bytes, answer: Callable[[bytes], T | None]) -> T
                     return found
                 if not data:
                     break
-    except TimeoutError as error:
-        raise NoAnswerError(
-            f"port {place.port} of {place.host} does not answer within {PATIENCE:g} s"
-        ) from error
     except OSError as error:
         raise NoAnswerError(f"port {place.port} of {place.host}: {error.strerror or error}") from error
-    raise NoAnswerError(f"port {place.port} of {place.host} closes without an answer")
+    raise NoAnswerError(f"port {place.port} of {place.host} gives no answer within {PATIENCE:g} s")

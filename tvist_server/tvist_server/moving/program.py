@@ -23,7 +23,7 @@ FADE = 0.05
 """Time constant with which a distance from the set-points fades [s]."""
 MARGIN = 1.05
 """Speed of the arm over that of the fastest set-points, at most."""
-_REGISTERS = ("NUMBER", "ORDER", "SETPOINTS", "STATE", "PLAYED", "ENDED", "ALONE", "LEFT_OUT", "RUN")
+_REGISTERS = ("NUMBER", "ORDER", "SETPOINTS", "STATE", "PLAYED", "ENDED", "ALONE", "LEFT_OUT", "RUN", "MOST")
 
 
 def program(run: int, *, speed: float, deceleration: float, lookahead: float, gain: float) -> str:
@@ -159,8 +159,12 @@ def $name():
   while why == $ended_not:
     now = read_input_integer_register($NUMBER)
     silence = silence + step
-    if now > newest:
+    if now != newest:
       silence = 0.0
+      if now < newest: # 1 has followed the largest number
+        number = number - $MOST
+        last_number = last_number - $MOST
+      end
     end
     number = number + 1
     behind = now - number
@@ -171,7 +175,7 @@ def $name():
 
     if read_input_integer_register($ORDER) != $run:
       why = $ended_ordered
-    elif now < newest or behind > missed: # another sender, or a pause: it must not catch up
+    elif behind > missed: # another sender, or a pause: it must not catch up
       why = $ended_lost
     elif silence > patience:
       why = $ended_silence

@@ -5,13 +5,13 @@ All are of the upper range, which UR leaves to clients of RTDE.
 
 from enum import IntEnum
 
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import Field, Wire
 
 JOINTS = 6
 KEPT = 4
 """Number of set-points in a package: the newest and those before it."""
-MOST = 2**31 - 1
-"""Largest number of a set-point, and of a run; 1 follows it."""
+MOST = 2**30
+"""Largest number of a set-point, and of a run; 1 follows it. Differences fit into the 32 bits of a register."""
 
 NUMBER = 24
 """Input integer: number n of the newest set-point, 1 more in each control period of the robot; 0: none yet."""
@@ -23,7 +23,7 @@ SETPOINTS = 24
 STATE = 24
 """Output integer: a `State`."""
 PLAYED = 25
-"""Output integer: number of the set-point whose turn it is."""
+"""Output integer: number of the set-point whose turn it is; 0 and less stand for `MOST` and those before it."""
 ENDED = 26
 """Output integer: an `Ended`."""
 ALONE = 27
@@ -68,7 +68,8 @@ INPUTS: dict[str, Wire] = {
     **{f"input_double_register_{SETPOINTS + place}": Wire.DOUBLE for place in range(KEPT * JOINTS)},
 }
 """What is written, in the order of a package's values."""
-OUTPUTS: dict[str, Wire] = {
-    f"output_int_register_{place}": Wire.INT32 for place in (STATE, PLAYED, ENDED, ALONE, LEFT_OUT, RUN)
-}
+OUTPUTS: dict[str, Field] = dict.fromkeys(
+    [f"output_int_register_{place}" for place in (STATE, PLAYED, ENDED, ALONE, LEFT_OUT, RUN)],
+    Field(Wire.INT32),
+)
 """What is read."""

@@ -59,8 +59,9 @@ class Run:
         check: Callable[[], str | None],
     ) -> None:
         self._robot, self._number, self._window = robot, number, Window()
-        stands, speed = np.array(robot.newest["target_q"]), max(limits.velocity)
-        self._setpoints = Setpoints(stands, lag, fastest=speed, reach=np.array(limits.position))
+        self._stands, speed = robot.newest["target_q"], max(limits.velocity)
+        here = np.array(self._stands)
+        self._setpoints = Setpoints(here, lag, fastest=speed, reach=np.array(limits.position))
         self._begun, self._plays = time.monotonic(), False
         self._waiting, self._settled, self._ending = False, 0, 0
         self._follows, self._played, self._still = False, 0, 0
@@ -91,7 +92,7 @@ class Run:
             if played:
                 self._window.add(setpoint)
         elif played and (self._follows or (self._waiting and self._settled > SETTLES)):
-            stands = self._robot.newest["target_q"] if self.last is None else self.last
+            stands = self.last or self._stands  # first where it stood when that was checked
             self._setpoints.begin(np.array(stands))
             self._window.add(stands)
         self.ready = self._follows

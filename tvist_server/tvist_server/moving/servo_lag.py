@@ -8,7 +8,7 @@ import numpy as np
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.servo import DAMPED, DELAY
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD
+from tvist_plant.plant import PERIOD, PlantError
 
 LOOKAHEAD = 0.03
 """`lookahead_time` of `servoj`: the shortest, since the lag is compensated and a longer one only adds to what is sent
@@ -63,12 +63,14 @@ class Setpoints:
         self._qd = np.zeros_like(self._q)
 
     def next(self, command: DriveCommand) -> Floats:
-        """Return the set-point for the next command, shape (n,) [rad]."""
+        """Return the set-point for the next command, shape (n,) [rad]; one that is no number raises `PlantError`."""
         wanted, lag = command.q, self._lag
         if lag is not None:
             velocity = (command.q - self._q) / PERIOD
             acceleration = (command.qd - self._qd) / PERIOD
             wanted = 0.5 * (command.q + self._q) + lag.time * velocity + acceleration / lag.gain
+        if not np.isfinite(wanted).all():
+            raise PlantError("a set-point is no number: it is not sent")
         self._q, self._qd = command.q, command.qd
         within = np.clip(wanted, -self._reach, self._reach)
         sent = np.clip(within, self._sent - self._most, self._sent + self._most)

@@ -52,6 +52,8 @@ def answers_trouble(wanted: Wanted, answers: Mapping[str, str], own: Configurati
     told = answers.get(MODEL)
     if told is not None and series(told) != series(model):
         return f"it is a {told}, and the robot file is that of a {model}: give --robot its model"
+    if own is not None and (trouble := own.trouble()) is not None:
+        return trouble
     if own is not None and not own.is_of(wanted.description):
         return (
             f"its dimensions are not those of a {model}: give --robot its model, or a robot file of your own"

@@ -64,12 +64,12 @@ class BlackBox(Sink):
         self._failed |= event.code == "plant_failure"
 
     def raised(self, error: Exception) -> None:
-        """Log an exception of somebody's own arm with its traceback, but not the same one in every tick."""
+        """Log an exception with its traceback, but not the same one in every tick."""
         said = named(error)
         if said not in self._said and len(self._said) < MAX_FILES:
             self._said.add(said)
             log.error(
-                "robot %s: a method of the arm, or a study of its motions, has failed",
+                "robot %s: the arm, a program, a study of motions or the controller has failed",
                 self._info().name,
                 exc_info=error,
             )

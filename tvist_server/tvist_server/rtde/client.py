@@ -8,11 +8,12 @@ from collections.abc import Mapping, Sequence
 from struct import Struct
 from typing import NamedTuple
 
+from tvist_protocol.errors import quoted
 from tvist_server.rtde.codec import PackageKind, PackageReader, package
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import Field
 
 Row = Mapping[str, tuple[float, ...]]
-"""Values of one cycle of the robot by name; a number is a tuple of one."""
+"""Values of one cycle of the robot by name, each in its range; a number is a tuple of one."""
 PROTOCOL = 2
 """Version of the protocol, in which the client chooses the frequency."""
 RATE = 500.0
@@ -39,11 +40,11 @@ class RtdeClient:
     """Reads one robot's outputs.
 
     Args:
-        needed: Types of the variables without which the rows are of no use, by name.
-        optional: Types of further variables, which some robots do not know and rows then lack.
+        needed: Types and ranges of the variables without which the rows are of no use, by name.
+        optional: Those of further variables, which some robots do not know and rows then lack.
     """
 
-    def __init__(self, needed: Mapping[str, Wire], optional: Mapping[str, Wire]) -> None:
+    def __init__(self, needed: Mapping[str, Field], optional: Mapping[str, Field]) -> None:
         self._needed, self._types = needed, {**needed, **optional}
         self._names = list(self._types)
         self._reader = PackageReader()
@@ -114,10 +115,10 @@ class RtdeClient:
             self._names = [name for name in self._names if name not in unknown]
             return self._set_up()
         for name, word in zip(self._names, words, strict=True):
-            if word != self._types[name].name:
-                raise RtdeError(f"{name} is of type {word[:20]}, and should be {self._types[name].name}")
+            if word != self._types[name].wire.name:
+                raise RtdeError(f"{name} is of type {quoted(word)}, not {self._types[name].wire.name}")
         self._recipe = payload[0]
-        self._row = Struct(">" + "".join(self._types[name].value for name in self._names))
+        self._row = Struct(">" + "".join(self._types[name].wire.value for name in self._names))
         return self._begin_rows()
 
     def _begin_rows(self) -> bytes:
@@ -131,7 +132,10 @@ class RtdeClient:
             raise RtdeError(f"a row has {len(payload) - 1} bytes instead of {self._row.size}")
         numbers, row, at = self._row.unpack_from(payload, 1), dict[str, tuple[float, ...]](), 0
         for name in self._names:
-            length = self._types[name].length
-            row[name] = numbers[at : at + length]
-            at += length
+            wire, least, most = self._types[name]
+            row[name] = values = numbers[at : at + wire.length]
+            wrong = [value for value in values if not least <= value <= most]  # or no number
+            if wrong:
+                raise RtdeError(f"its {name} is {wrong[0]:g}: must be {least:g} to {most:g}")
+            at += len(values)
         return (row,)

@@ -5,7 +5,7 @@ from struct import Struct
 
 from tvist_server.rtde.client import RtdeClient, RtdeError
 from tvist_server.rtde.codec import PackageKind, package, words
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import Field, Wire
 
 
 class CommandingClient(RtdeClient):
@@ -18,7 +18,7 @@ class CommandingClient(RtdeClient):
     """
 
     def __init__(
-        self, needed: Mapping[str, Wire], optional: Mapping[str, Wire], inputs: Mapping[str, Wire]
+        self, needed: Mapping[str, Field], optional: Mapping[str, Field], inputs: Mapping[str, Wire]
     ) -> None:
         super().__init__(needed, optional)
         self._inputs = inputs

@@ -2,6 +2,7 @@
 
 from enum import Enum
 from struct import Struct
+from typing import NamedTuple
 
 
 class Wire(Enum):
@@ -27,3 +28,11 @@ class Wire(Enum):
     def length(self) -> int:
         """Number of entries of a vector; 1 for a type that is no vector."""
         return int(self.value[:-1] or 1)
+
+
+class Field(NamedTuple):
+    """A variable that is read: its type, and the range of its numbers."""
+
+    wire: Wire
+    least: float = -(2.0**63)
+    most: float = 2.0**63

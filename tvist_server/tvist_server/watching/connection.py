@@ -8,13 +8,14 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
+from tvist_plant.plant import PERIOD
 from tvist_server.rtde.client import Row, RtdeClient, RtdeError
 from tvist_server.watching.place import PORT, Place
 
 ANSWERS = 3.0
 """Longest time in which a robot must accept a connection and start to send [s]."""
 SILENT = 1.0
-"""Time without a byte after which a connection is lost [s], as UR's own clients have it."""
+"""Time without a new row after which a connection is lost [s], as UR's own clients have it."""
 Address = tuple[socket.AddressFamily, tuple[Any, ...]]
 """Family of an address, and the address as `socket` has it."""
 AT_ONCE = 1 << 16
@@ -43,7 +44,7 @@ class Connection:
         self.texts: list[str] = []
         """Messages of the controller since somebody has emptied the list."""
         self._begun = self._heard = time.monotonic()
-        self._connected = False
+        self._connected, self._newest = False, -1
         self._socket = socket.socket(address[0], socket.SOCK_STREAM)
         self._selector = selectors.DefaultSelector()
         self._socket.setblocking(False)
@@ -62,15 +63,14 @@ class Connection:
             if ready and not self._connected:
                 self._begin()
                 return ()
-            if ready:
-                return self._read()
+            rows = self._read() if ready else ()
         except RtdeError as error:
             raise LostError(f"{self._place}: {error}") from error
         except OSError as error:
             why = error.strerror or str(error)
             raise UnreachableError(f"no robot answers at {self._place}: {why}") from error
         self._check_silence()
-        return ()
+        return rows
 
     def close(self) -> None:
         """Close the connection."""
@@ -81,7 +81,7 @@ class Connection:
         error = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         if error:
             raise OSError(error, os.strerror(error))
-        self._connected, self._heard = True, time.monotonic()
+        self._connected = True
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._selector.modify(self._socket, selectors.EVENT_READ)
         self._socket.sendall(self.client.begin())
@@ -90,9 +90,14 @@ class Connection:
         data = self._socket.recv(AT_ONCE)
         if not data:
             raise LostError(f"the robot at {self._place} has closed the connection")
-        self._heard = time.monotonic()
+        news = not self.client.started
         received = self.client.receive(data)
         self.texts += received.texts
+        for row in received.rows:
+            before, self._newest = self._newest, round(row["timestamp"][0] / PERIOD)
+            news |= self._newest != before
+        if news:
+            self._heard = time.monotonic()
         if received.send:
             self._socket.sendall(received.send)
         return received.rows
@@ -100,7 +105,7 @@ class Connection:
     def _check_silence(self) -> None:
         now = time.monotonic()
         if self.client.started and now - self._heard > SILENT:
-            raise LostError(f"the robot at {self._place} has sent nothing for {SILENT:g} s")
+            raise LostError(f"the robot at {self._place} has sent no new row for {SILENT:g} s")
         if not self.client.started and now - self._begun > ANSWERS:
             if self._connected:
                 hint = "" if self._place.port == PORT else f", whose port is {PORT} on a robot of UR's"

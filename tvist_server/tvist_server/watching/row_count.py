@@ -3,9 +3,10 @@
 from typing import NamedTuple
 
 from tvist_plant.plant import PERIOD
+from tvist_server.rtde.client import RtdeError
 
 SAME_CLOCK = 1.0
-"""Largest difference between the robot's clock and ours over a lost connection; more, and it began anew [s]."""
+"""Largest lead of a row over those before it, and difference of the clocks over a lost connection [s]."""
 
 
 class Counted(NamedTuple):
@@ -31,7 +32,7 @@ class RowCount:
     def __init__(self, interval: int) -> None:
         self._interval = interval
         self._own: int | None = None
-        self._offset, self._heard = 0, 0.0
+        self._offset, self._heard, self._ahead = 0, 0.0, 0.0
         self.tick = 0
         """Number of the last row; 0 before the first."""
         self.rows = self.missing = self.doubled = 0
@@ -43,13 +44,18 @@ class RowCount:
         Args:
             timestamp: The robot's time [s].
             now: Our time [s].
-            reconnected: Whether the connection was lost before it.
+            reconnected: Whether the connection was lost before it. If not, time that does not go on as ours does, or
+                goes back, raises `RtdeError`.
         """
         own, before = round(timestamp / PERIOD), self._own
         if own == before:
             self.doubled += 1
             return None
-        missing, anew = 0, False
+        missing, anew, ahead = 0, False, timestamp - now
+        if before is not None and not reconnected:
+            if own < before or ahead > self._ahead + SAME_CLOCK:
+                raise RtdeError(f"the robot's timestamp goes from {before * PERIOD:g} to {timestamp:g} s")
+            ahead = max(ahead, self._ahead)
         if before is not None:
             passed, elapsed = own - before, round((now - self._heard) / PERIOD)
             anew = passed < 0 or (reconnected and abs(passed - elapsed) > SAME_CLOCK / PERIOD)
@@ -57,7 +63,7 @@ class RowCount:
                 passed = max(1, elapsed)
                 self._offset = self.tick + passed - own
             missing = max(0, round(passed / self._interval) - 1)
-        self._own, self._heard = own, now
+        self._own, self._heard, self._ahead = own, now, ahead
         self.tick = max(own + self._offset, self.tick + 1)
         self.rows += 1
         self.missing += missing

@@ -7,45 +7,39 @@ import numpy as np
 from tvist_plant.description import Payload, is_real_body
 from tvist_plant.plant import Measurement, Sight
 from tvist_server.rtde.client import Row
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import Field, Wire
 
-NEEDED: dict[str, Wire] = {
-    "timestamp": Wire.DOUBLE,
-    "target_q": Wire.VECTOR6D,
-    "target_qd": Wire.VECTOR6D,
-    "target_qdd": Wire.VECTOR6D,
-    "target_moment": Wire.VECTOR6D,
-    "actual_q": Wire.VECTOR6D,
-    "actual_qd": Wire.VECTOR6D,
-    "actual_current": Wire.VECTOR6D,
-    "actual_TCP_pose": Wire.VECTOR6D,
-    "actual_TCP_force": Wire.VECTOR6D,
-    "actual_tool_accelerometer": Wire.VECTOR3D,
-    "robot_mode": Wire.INT32,
-    "safety_mode": Wire.INT32,
-    "runtime_state": Wire.UINT32,
-    "speed_scaling": Wire.DOUBLE,
+NEEDED: dict[str, Field] = {
+    "timestamp": Field(Wire.DOUBLE, 0.0, 1e9),
+    "target_q": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "target_qd": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "target_qdd": Field(Wire.VECTOR6D, -1e5, 1e5),
+    "target_moment": Field(Wire.VECTOR6D, -1e5, 1e5),
+    "actual_q": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "actual_qd": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "actual_current": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "actual_TCP_pose": Field(Wire.VECTOR6D, -1e3, 1e3),
+    "actual_TCP_force": Field(Wire.VECTOR6D, -1e5, 1e5),
+    "actual_tool_accelerometer": Field(Wire.VECTOR3D, -1e4, 1e4),
+    "robot_mode": Field(Wire.INT32, -1, 255),
+    "safety_mode": Field(Wire.INT32, -1, 255),
+    "runtime_state": Field(Wire.UINT32, -1, 255),
+    "speed_scaling": Field(Wire.DOUBLE, 0.0, 2.0),
 }
-"""Variables that every robot with RTDE has."""
-OPTIONAL: dict[str, Wire] = {
-    "actual_current_as_torque": Wire.VECTOR6D,
-    "target_speed_fraction": Wire.DOUBLE,
-    "tcp_offset": Wire.VECTOR6D,
-    "payload": Wire.DOUBLE,
-    "payload_cog": Wire.VECTOR3D,
-    "payload_inertia": Wire.VECTOR6D,
-    "actual_digital_input_bits": Wire.UINT64,
-    "actual_digital_output_bits": Wire.UINT64,
+"""Variables that every robot with RTDE has. The ranges exclude what no robot can mean."""
+OPTIONAL: dict[str, Field] = {
+    "actual_current_as_torque": Field(Wire.VECTOR6D, -1e5, 1e5),
+    "target_speed_fraction": Field(Wire.DOUBLE, 0.0, 1.0),
+    "tcp_offset": Field(Wire.VECTOR6D, -10.0, 10.0),
+    "payload": Field(Wire.DOUBLE, 0.0, 100.0),
+    "payload_cog": Field(Wire.VECTOR3D, -2.0, 2.0),
+    "payload_inertia": Field(Wire.VECTOR6D, -10.0, 10.0),
+    "actual_digital_input_bits": Field(Wire.UINT64, 0, 2**32 - 1),
+    "actual_digital_output_bits": Field(Wire.UINT64, 0, 2**32 - 1),
 }
 """Variables that older software does not have."""
 JOINTS = 6
 """Joints of every robot with RTDE."""
-_FINITE = ("actual_q", "actual_qd", "actual_current", "actual_tool_accelerometer", "timestamp", "target_q")
-
-
-def is_finite(row: Row) -> bool:
-    """Return whether a row has numbers where a state needs some."""
-    return all(np.isfinite(row[name]).all() for name in _FINITE)
 
 
 def sight_of(row: Row, constants: Sequence[float], tick: int, missed: int, told: Sequence[str] = ()) -> Sight:

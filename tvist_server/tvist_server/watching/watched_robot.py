@@ -14,17 +14,20 @@ from tvist_controller.line.kinematics import ForwardKinematics
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, Measurement, PlantError, Sight
+from tvist_protocol.errors import harmless
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
-from tvist_server.rtde.client import Row, RtdeClient
-from tvist_server.watching.connection import Connection, LostError, UnreachableError, resolved
+from tvist_server.rtde.client import Row, RtdeClient, RtdeError
+from tvist_server.watching.connection import ANSWERS, Connection, LostError, UnreachableError, resolved
 from tvist_server.watching.place import Place
 from tvist_server.watching.row_count import RowCount
-from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, has_real_payload, is_finite, sight_of
+from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, has_real_payload, sight_of
 
 LOOKED_AT = 25
 """Number of rows from which the time between two is found."""
 INTERVALS = {1: "500", 4: "125"}
 """Control periods between two rows, and the rate of such a robot [Hz]."""
+TEXTS = 10
+"""Most texts of the robot's that are passed on in a second, and that wait for its next row."""
 RETRY = 1.0
 """Time between two attempts to connect [s]."""
 TELL_EVERY = 1.0
@@ -67,8 +70,8 @@ class WatchedRobot:
         """Whether the present connection has sent a row of the right robot."""
         self._lost = 0.0, ""
         """When the connection was lost [s], and why; nothing while it is there."""
-        self._retry_at = self._told_at = 0.0
-        self._untold = 0
+        self._retry_at = self._told_at = self._texts_at = 0.0
+        self._untold = self._room = self._left_out = 0
         self._notes: list[str] = []
         try:
             self._address = resolved(place)
@@ -113,7 +116,7 @@ class WatchedRobot:
         try:
             for row in self._rows(timeout):
                 self._take(row)
-        except LostError as error:
+        except (LostError, RtdeError) as error:
             self._lose(error)
         return bool(self._sights)
 
@@ -130,8 +133,11 @@ class WatchedRobot:
         self._connect()
         rows = self.looked_at
         try:
+            ends = time.monotonic() + ANSWERS
             while len(rows) < LOOKED_AT:
                 rows += self._rows(1.0)
+                if time.monotonic() > ends:
+                    raise LostError(f"{self._place} sends only {len(rows)} rows in {ANSWERS:g} s")
             self._check(rows[-1])
             self.version = self._client.version
             """Version of its software: major, minor, bugfix, build."""
@@ -174,13 +180,18 @@ class WatchedRobot:
         return Connection(self._place, self._address, RtdeClient(NEEDED, OPTIONAL))
 
     def _rows(self, timeout: float) -> list[Row]:
-        """Return the rows that have come; those of the wrong robot or without numbers end the connection."""
+        """Return the rows that have come, and note what the robot says with them."""
         assert self._connection is not None
-        rows = list(self._connection.rows(timeout))
-        self._notes += [f"the robot says: {text}" for text in self._connection.texts]
-        self._connection.texts.clear()
-        if not all(map(is_finite, rows)):
-            raise LostError(f"the robot at {self._place} sends what is no number")
+        rows, texts = list(self._connection.rows(timeout)), self._connection.texts
+        if (now := time.monotonic()) - self._texts_at >= 1.0:
+            self._texts_at, self._room = now, TEXTS
+            if self._left_out and len(self._notes) < TEXTS:
+                self._notes.append(f"{self._left_out} more texts of the robot are left out")
+                self._left_out = 0
+        kept = texts[: max(0, min(self._room, TEXTS - len(self._notes)))]  # notes wait while no row comes
+        self._room, self._left_out = self._room - len(kept), self._left_out + len(texts) - len(kept)
+        self._notes += [f"the robot says: {harmless(' '.join(text.split()))}" for text in kept]
+        texts.clear()
         return rows
 
     def _check(self, row: Row) -> None:
@@ -234,7 +245,7 @@ class WatchedRobot:
         self.payload = sight.payload or self.payload
         return sight
 
-    def _lose(self, error: LostError) -> None:
+    def _lose(self, error: LostError | RtdeError) -> None:
         """Give up the connection, and say so in a tick of its own; once for each reason.
 
         That nobody answers there is news only if it is the first.

@@ -29,7 +29,7 @@ export function read(hash: string): { state: State; refused: string[] } {
   const state: State = { ...FIRST }, refused: string[] = [];
   for (const [name, text] of new URLSearchParams(hash.replace(/^#/, ""))) {
     const number = Number(text);
-    if (name in RANGES) {
+    if (Object.hasOwn(RANGES, name)) {
       const [low, high] = RANGES[name as keyof typeof RANGES];
       if (text !== "" && number >= low && number <= high) state[name as keyof typeof RANGES] = number;
       else refused.push(`${name}=${text}`);

@@ -1,5 +1,6 @@
 """`tvist log analyze`: measure the motions of a recording or of a robot's log."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,8 +26,9 @@ def analyze(
     """Measure each motion of a recording or a robot's log, and print the columns of the paper's Table 2.
 
     Frequency and damping have 95 % intervals. A dash has its reason in a line below the table. A line says from which
-    motion on payload, gears or what rings after stops are not what they were before. Of an accelerometer alone, which
-    shows no motions, frequency and damping of a ring-down or a sweep are measured.
+    motion on payload, gears or what rings after stops are not what they were before.
+
+    A log of an accelerometer alone has no motions: its ring-downs, or a sweep of frequencies, are measured.
 
     Args:
         file: Recording of `tvist serve --record`, `tvist log record` or `tvist log export`; or a log of another robot:
@@ -41,9 +43,9 @@ def analyze(
     from tvist_lab.recordings import RecordingError
     from tvist_lab.words import counted
 
-    (recording,) = logs.read(file)
+    (recording,) = logs.read(file, sensor=True)
     if "actual_q" not in recording and "target_q" not in recording:
-        _of_sensor(file, recording, json=json)
+        _sensor_alone(file, recording, json=json)
         return
     with told(RecordingError):
         found = motions(recording)
@@ -78,20 +80,29 @@ def analyze(
         out.print(note, markup=False)
 
 
-def _of_sensor(file: Path, recording: "Recording", *, json: bool) -> None:
-    """Print what has rung in the log of an accelerometer alone."""
-    from tvist_lab.metrics.autocorrelation import fit_autocorrelation
+def _sensor_alone(file: Path, recording: "Recording", *, json: bool) -> None:
+    """Print frequency and damping from a log that has no joint angles."""
+    from tvist_lab.metrics import NotMeasurableError
+    from tvist_lab.metrics.columns import number
+    from tvist_lab.metrics.sensor_alone import free_vibrations
 
-    fit, notes = fit_autocorrelation(recording), list(recording.notes)
-    modes = [{"f_d_hz": mode.f_d, "zeta": mode.zeta} for mode in fit.found if fit.ok]
-    for note in notes:
-        say(f"{file}: {note}")
+    with told(NotMeasurableError):
+        found = free_vibrations(recording)
     if json:
-        print_json({"file": str(file), "motions": [], "modes": modes, "changes": [], "notes": notes})
+        vibrations, notes = [asdict(one) for one in found], list(recording.notes)
+        print_json({"file": str(file), "motions": [], "free_vibrations": vibrations, "notes": notes})
         return
-    rung = ", ".join(f"{one['f_d_hz']:.2f} Hz with a damping ratio of {one['zeta']:.3f}" for one in modes)
-    none = f"{file} shows neither a ring-down nor a sweep: {fit.reason}."
-    out.print(f"{file} rings at {rung}." if modes else none, markup=False)
+    for note in recording.notes:
+        say(f"{file}: {note}")
+    rows = [
+        [cell.replace("\n", " ") for cell in (
+            one.kind, number(one.start_s - recording.origin, 3), number(one.f_d_hz, 2, one.f_d_interval_hz),
+            number(one.zeta, 3, one.zeta_interval),
+        )]
+        for one in found
+    ]  # fmt: skip
+    names = ("vibration", "start s", "frequency f_d Hz", "damping ζ")
+    table(f"{file}: an accelerometer alone, no joint angles", names, rows)
 
 
 def _draw(recording: "Recording", found: "list[MotionRows]", files: "FigureFiles") -> None:

@@ -20,7 +20,7 @@ def info(file: Path, *, logs: LogOptions = AS_IT_IS, json: bool = False) -> None
     from tvist_lab.summary import summary
 
     with told(RecordingError):
-        found = summary(file, logs.read(file)[0] if logs.given else None)
+        found = summary(file, logs.read(file, sensor=True)[0] if logs.given else None)
     if json:
         print_json(found)
         return

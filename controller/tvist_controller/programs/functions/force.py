@@ -5,10 +5,13 @@ import numpy as np
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.motion.task_frame import Feature
 from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import flag, integer, number, numbers, pose, shown
+from tvist_controller.programs.arguments import bounds, flag, integer, number, numbers, pose, shown
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.journey import Turns
 from tvist_controller.trajectory import ForceTask
+from tvist_protocol.forces import Push
+from tvist_protocol.io import Length
+from tvist_protocol.values import Mass
 from tvist_urscript import Array, Fault, costs
 
 MOST_LIMIT = 1e3
@@ -37,7 +40,7 @@ class ForceFunctions:
         feature, kind = pose("task_frame", task_frame), integer("type", type, 1, 3)
         task = ForceTask(
             _choice("selection_vector", selection_vector),
-            np.array(numbers("wrench", wrench, 6)),
+            np.array(numbers("wrench", wrench, 6, Push)),
             _limits(limits),
             self._damping,
             self._gain,
@@ -90,9 +93,9 @@ class ForceFunctions:
         sensor_cog: object = NOWHERE,
     ) -> Turns:
         """Use the force sensor whose values clients write by RTDE; its mass is part of the payload to declare."""
-        number("sensor_mass", sensor_mass, 0.0)
-        numbers("sensor_cog", sensor_cog, 3)
-        offset = numbers("sensor_measuring_offset", sensor_measuring_offset, 3)
+        number("sensor_mass", sensor_mass, *bounds(Mass))
+        numbers("sensor_cog", sensor_cog, 3, Length)
+        offset = numbers("sensor_measuring_offset", sensor_measuring_offset, 3, Length)
         if self._access.force.compliant is not None:
             raise Fault(
                 "the force sensor stays the same in force mode and freedrive: call end_force_mode before"
@@ -102,7 +105,7 @@ class ForceFunctions:
 
     enable_external_ft_sensor = ft_rtde_input_enable
 
-    @costs(60)
+    @costs(250)
     def tool_contact(self, direction: object = None) -> int:
         """Return the number of steps since just before the tool touched something in a direction; 0 if it does not."""
         way = (0.0,) * 3 if direction is None else numbers("direction", direction, 6)[:3]

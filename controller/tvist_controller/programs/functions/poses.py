@@ -10,6 +10,7 @@ from tvist_controller.programs import arguments
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import a_list, a_pose, is_pose, numbers
 from tvist_controller.programs.kinematics import ProgramKinematics
+from tvist_protocol.io import Length
 from tvist_urscript import Array, Fault, Pose, costs
 
 
@@ -111,4 +112,4 @@ class PoseFunctions:
 
 
 def _tool(tcp: object) -> Sequence[float] | None:
-    return None if tcp is None else arguments.pose("tcp", tcp)
+    return None if tcp is None else arguments.pose("tcp", tcp, Length)

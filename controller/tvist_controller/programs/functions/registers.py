@@ -47,19 +47,19 @@ class RegisterFunctions:
         """Read an output number, which programs write."""
         return self._registers.doubles("output_double")[integer("address", address, 0, NUMBERS - 1)]
 
-    @costs(4)
+    @costs(8)
     def write_output_boolean_register(self, address: object, value: object) -> None:
         """Write an output bit, which clients read."""
         place, bit = integer("address", address, 0, BITS - 1), flag("value", value)
         self._arm.then(lambda: self._registers.write("output_bit", place, bit))
 
-    @costs(4)
+    @costs(8)
     def write_output_integer_register(self, address: object, value: object) -> None:
         """Write an output integer of 32 bits, which clients read."""
         place, wanted = integer("address", address, 0, NUMBERS - 1), integer("value", value, LEAST, MOST)
         self._arm.then(lambda: self._registers.write("output_int", place, wanted))
 
-    @costs(4)
+    @costs(8)
     def write_output_float_register(self, address: object, value: object) -> None:
         """Write an output number, which clients read."""
         place, wanted = integer("address", address, 0, NUMBERS - 1), number("value", value)

@@ -24,10 +24,10 @@ class SafetyFunctions:
 
     @costs(10)
     def protective_stop(self) -> Turns:
-        """Make a protective stop, which pauses the program here; a secondary program waits until it is unlocked."""
+        """Make a protective stop, which pauses the program here, or ends it if nothing follows; secondary ones wait."""
         motion = self._access.motion
         motion.protect("the program asked for a protective stop")
-        while motion.activity.protective:
+        while motion.activity.protective and not self._arm.ends:
             yield
 
     @costs(10)

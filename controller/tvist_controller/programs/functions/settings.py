@@ -3,15 +3,17 @@
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import number, numbers, pose
+from tvist_controller.programs.arguments import bounds, number, numbers, pose
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.journey import DELAY, Turns
 from tvist_controller.programs.moves import OWN_TOKEN
+from tvist_plant.plant import PERIOD
 from tvist_plant.robot_checks import lacking_inertia
 from tvist_plant.robot_tables import Tensor
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.forces import ZeroFtsensor
-from tvist_protocol.io import SetTcp
+from tvist_protocol.io import Length, SetTcp
+from tvist_protocol.values import Mass, Moment, Offset
 from tvist_urscript import Array, Fault, costs
 
 GRAVITY = 9.82
@@ -39,39 +41,35 @@ class SettingFunctions:
         """Set the tool centre point in the flange frame."""
         del tcp_name  # names are for people
         yield from self._arm.finish()
-        self._send(SetTcp(token=OWN_TOKEN, offset=pose("tcp", tcp)))
+        self._send(SetTcp(token=OWN_TOKEN, offset=pose("tcp", tcp, Length)))
 
     @costs(20)
     def set_payload(self, m: object, cog: object = None) -> Turns:
         """Declare a payload without inertia; without a centre of mass, it is at the tool centre point."""
-        com = self._access.motion.tcp[:3] if cog is None else numbers("cog", cog, 3)
-        yield from self._declare(number("m", m, 0.0), com, (0.0,) * 6)
+        com = self._access.motion.tcp[:3] if cog is None else numbers("cog", cog, 3, Offset)
+        yield from self._declare(number("m", m, *bounds(Mass)), com, (0.0,) * 6)
 
     @costs(20)
     def set_payload_mass(self, m: object) -> Turns:
         """Change the mass of the declared payload."""
         declared = self._access.declared()
-        yield from self._declare(number("m", m, 0.0), declared.com, declared.inertia)
+        yield from self._declare(number("m", m, *bounds(Mass)), declared.com, declared.inertia)
 
     @costs(20)
     def set_payload_cog(self, cog: object) -> Turns:
         """Change the centre of mass of the declared payload."""
         declared = self._access.declared()
-        yield from self._declare(declared.mass, numbers("cog", cog, 3), declared.inertia)
+        yield from self._declare(declared.mass, numbers("cog", cog, 3, Offset), declared.inertia)
 
     @costs(20)
     def set_target_payload(
         self, m: object, cog: object, inertia: object = None, transition_time: object = 0
     ) -> Turns:
-        """Declare a payload with its inertia, Ixx Iyy Izz Ixy Ixz Iyz, in a time."""
+        """Declare a payload with its inertia, Ixx Iyy Izz Ixy Ixz Iyz; clients see it change in a time."""
         seconds = number("transition_time", transition_time, 0.0, 3600.0)
-        xx, yy, zz, xy, xz, yz = (0.0,) * 6 if inertia is None else numbers("inertia", inertia, 6)
-        for name, value in (("inertia[0]", xx), ("inertia[1]", yy), ("inertia[2]", zz)):
-            number(name, value, 0.0, 133.0)
-        for name, value in (("inertia[3]", xy), ("inertia[4]", xz), ("inertia[5]", yz)):
-            number(name, value, -133.0, 133.0)
+        xx, yy, zz, xy, xz, yz = (0.0,) * 6 if inertia is None else numbers("inertia", inertia, 6, Moment)
         full = self._as_a_body((xx, xy, xz, yy, yz, zz))
-        yield from self._declare(number("m", m, 0.0), numbers("cog", cog, 3), full, seconds)
+        yield from self._declare(number("m", m, *bounds(Mass)), numbers("cog", cog, 3, Offset), full, seconds)
 
     def _as_a_body(self, inertia: Tensor) -> Tensor:
         """Make the moments of a body of those that were rounded, with a warning; others are left to be refused."""
@@ -119,7 +117,9 @@ class SettingFunctions:
         ordered = self._access.plans.later(command)
         for _ in range(DELAY):
             yield
+        before, ticks, now = self._access.declared(), round(seconds / PERIOD), self._access.latest().tick + 1
         self._send(command, ordered())
+        self._access.peripherals.payload_change = (before, ticks, now + ticks) if ticks else None
 
     def _send(self, command: SetTcp | SetPayload | ZeroFtsensor, plan: Plan | None = None) -> None:
         try:

@@ -24,6 +24,7 @@ class SetupFunctions:
 
     def __init__(self, access: Access, arm: ProgramArm, runstate: RunstateOutputs) -> None:
         self._access, self._arm, self._runstate = access, arm, runstate
+        self._motion_version = 2
 
     # ------------------------------------------------------------------ tool
 
@@ -144,6 +145,18 @@ class SetupFunctions:
     def reset_revolution_counter(self, qNear: object = _NO_TURNS) -> None:
         """Check joint positions: no joint of the simulated arm turns without end, so there is no counter to reset."""
         numbers("qNear", qNear, self._access.description.joints)
+
+    def motion_version_set(self, version: object) -> None:
+        """Remember a motion version, 1 or 2, for `motion_version_get`: moves are planned the same with both."""
+        self._motion_version = integer("version", version, 1, 2)
+
+    def motion_version_get(self) -> int:
+        """Return the motion version that a program has set, 2 if none has since the server started."""
+        return self._motion_version
+
+    def jerk_gain_scaling_set(self, gain: object) -> None:
+        """Check a gain, 0.01 to 1. It has no effect: profile and shaper say how quickly accelerations change."""
+        number("gain", gain, 0.01, 1.0)
 
     def high_holding_torque_enable(self) -> None:
         """Do nothing: the drives of the simulated arm hold it with the same torque at all times."""

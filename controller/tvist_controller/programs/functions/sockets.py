@@ -47,14 +47,14 @@ class SocketFunctions:
         gripper of a cell at `127.0.0.1` port 63352.
         """
         machine, at = text("address", address), integer("port", port, 1, 65535)
-        name = text("socket_name", socket_name)
+        name = _named(socket_name)
         yield from self._arm.finish()
         return (yield from self._sockets.connect(name, machine, at))
 
     @costs(5)
     def socket_close(self, socket_name: object = _ONE) -> None:
         """Close a socket. Nothing happens if it is not open."""
-        name = text("socket_name", socket_name)
+        name = _named(socket_name)
         self._arm.then(lambda: self._sockets.disconnect(name))
 
     @costs(10)
@@ -108,7 +108,7 @@ class SocketFunctions:
     @costs(20)
     def socket_get_var(self, name: object, socket_name: object = _ONE) -> Generator[None, None, int]:
         r"""Send `GET name\n` and return the integer of the answer `name value\n`; 0 if none comes within 2 s."""
-        wanted, socket = text("name", name), text("socket_name", socket_name)
+        wanted, socket = text("name", name), _named(socket_name)
         yield from self._arm.finish()
         self._sockets.send(socket, to_bytes(f"GET {wanted}\n"))
         found = yield from self._sockets.read(socket, lambda got: cut.variable(got, wanted), ANSWER, _idle)
@@ -141,7 +141,7 @@ class SocketFunctions:
         return self._send(socket_name, to_bytes(to_str(str)))
 
     def _send(self, socket_name: object, data: bytes) -> bool:
-        name = text("socket_name", socket_name)
+        name = _named(socket_name)
 
         def send() -> None:
             self._sockets.send(name, data)
@@ -162,7 +162,7 @@ class SocketFunctions:
         return a_list((0,) + (missing,) * count if found is None else (count, *found))
 
     def _read(self, socket_name: object, take: Take[T], timeout: object) -> Generator[None, None, T | None]:
-        name, longest = text("socket_name", socket_name), number("timeout", timeout)
+        name, longest = _named(socket_name), number("timeout", timeout)
         return self._sockets.read(name, take, longest, self._go_on)
 
     def _go_on(self, waited: int) -> Generator[None, None, None]:
@@ -170,6 +170,13 @@ class SocketFunctions:
         if waited >= MORE:
             self._arm.begin()
         yield from ()
+
+
+def _named(socket_name: object) -> str:
+    """Return the name of a socket; a number is one, as in the functions that Robotiq's URCap brings along."""
+    if isinstance(socket_name, int | float) and not isinstance(socket_name, bool):
+        return to_str(socket_name)
+    return text("socket_name", socket_name)
 
 
 def _idle(_: int) -> Generator[None, None, None]:

@@ -24,23 +24,23 @@ class TerminalFunctions:
 
     # ------------------------------------------------------------------ digital
 
-    @costs(4)
+    @costs(10)
     def set_digital_out(self, n: object, b: object) -> None:
         """Set a digital output: 0 to 7 standard, 8 and 9 those of the tool, as before configurable ones existed."""
         number_ = integer("n", n, 0, 9)
         self._set(number_ if number_ < len(STANDARD) else TOOL[number_ - 8], flag("b", b))
 
-    @costs(4)
+    @costs(10)
     def set_standard_digital_out(self, n: object, b: object) -> None:
         """Set one of the eight standard digital outputs."""
         self._set(STANDARD[integer("n", n, 0, 7)], flag("b", b))
 
-    @costs(4)
+    @costs(10)
     def set_configurable_digital_out(self, n: object, b: object) -> None:
         """Set one of the eight configurable digital outputs."""
         self._set(CONFIGURABLE[integer("n", n, 0, 7)], flag("b", b))
 
-    @costs(4)
+    @costs(10)
     def set_tool_digital_out(self, n: object, b: object) -> None:
         """Set one of the two digital outputs of the tool."""
         self._set(TOOL[integer("n", n, 0, 1)], flag("b", b))
@@ -81,12 +81,12 @@ class TerminalFunctions:
 
     # ------------------------------------------------------------------ analogue, tool and run state
 
-    @costs(6)
+    @costs(10)
     def set_analog_out(self, n: object, f: object) -> None:
         """Set an analogue output to a share of its range."""
         self.set_standard_analog_out(n, f)
 
-    @costs(6)
+    @costs(10)
     def set_standard_analog_out(self, n: object, f: object) -> None:
         """Set an analogue output to a share of its range."""
         place, share = integer("n", n, 0, 1), number("f", f, 0.0, 1.0)

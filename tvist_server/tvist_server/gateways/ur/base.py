@@ -54,13 +54,11 @@ class PortSession(ABC):
     over = False
     """Whether the client has asked to end the connection, which is then closed."""
     client_begins = False
-    """Whether the interface sends nothing to a client that requests nothing. Such a client has to send something soon
-    after it connects, and may later be disconnected to make room.
-    """
+    """Whether nothing is sent to a client that requests nothing, so that it may be disconnected to make room."""
 
     @property
     def served(self) -> bool:
-        """Whether the client is being sent what it requested; it may then be silent for any time."""
+        """Whether the client is being sent what it requested; it may then be silent for any time, but has to read."""
         return False
 
     @property

@@ -13,7 +13,6 @@ from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
-from tvist_server.gateways.ur.notices import Notices
 from tvist_server.gateways.ur.places import Places
 
 log = logging.getLogger(__name__)
@@ -36,8 +35,8 @@ MAX_UNREAD_LOCKSTEP = 64_000_000
 LAST_WORDS = 65_536
 """Most bytes that are still taken from a client that has reset its connection: the longest known program and more."""
 
-FIRST_WORD = 30.0
-"""Time within which a client has to send something if it has to begin [s]."""
+UNREAD_FOR = 10.0
+"""Time after which a client is disconnected, in real time, to which no sample of what it requested can be sent [s]."""
 
 MakeSession = Callable[[ConnectionControl, Send], PortSession]
 """Creates an interface's session from its access to the controller and the function that sends to the client."""
@@ -50,7 +49,6 @@ class Connection(asyncio.BufferedProtocol):
         make: Creates its session.
         lease: Returns the lease of a host.
         places: Places of the robot; the connection occupies one until it is closed.
-        notices: Notices on the server's console.
         lossless: Whether samples wait for a slow client, because a client advances time.
     """
 
@@ -59,22 +57,20 @@ class Connection(asyncio.BufferedProtocol):
         make: MakeSession,
         lease: Callable[[str], HostLease],
         places: "Places[Connection]",
-        notices: Notices,
         *,
         lossless: bool,
     ) -> None:
         self._make = make
         self._lease = lease
         self._places = places
-        self._notices = notices
         self._lossless = lossless
         self._most_unread = MAX_UNREAD_LOCKSTEP if lossless else MAX_UNREAD
         self._transport: asyncio.Transport | None = None
         self._piece = bytearray(PIECE)
         self._behind = False
         """Whether the client has left many answers unread."""
-        self._first_word: asyncio.TimerHandle | None = None
-        """Timer that disconnects a client that sends nothing."""
+        self._took = 0.0
+        """When a sample was last passed to the socket, which had sent the one before [s of the loop's clock]."""
         self.session: PortSession | None = None
         self.peer = "a client"
         """The client and its interface, as a phrase for messages to people."""
@@ -98,10 +94,7 @@ class Connection(asyncio.BufferedProtocol):
         self._control = ConnectionControl(self._lease(host), self._hear, self.peer)
         self.session = self._make(self._control, self.send)
         self._places.taken.add(self)
-        loop = asyncio.get_running_loop()
-        self.heard = loop.time()
-        if self.session.client_begins:
-            self._first_word = loop.call_later(FIRST_WORD, self._said_nothing)
+        self.heard = asyncio.get_running_loop().time()
         self._guarded(self.session.opened)
 
     def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002  the size is fixed
@@ -112,9 +105,6 @@ class Connection(asyncio.BufferedProtocol):
         """Pass received data to the session."""
         session = self.session
         self.heard = asyncio.get_running_loop().time()
-        if self._first_word is not None:
-            self._first_word.cancel()
-            self._first_word = None
         if session is not None:
             data = bytes(self._piece[:nbytes])
             self._guarded(lambda: session.receive(data))
@@ -155,8 +145,6 @@ class Connection(asyncio.BufferedProtocol):
             self._guarded(lambda: session.receive(left))
         self.session = self._transport = None
         self._places.taken.discard(self)
-        if self._first_word is not None:
-            self._first_word.cancel()
         if self.dropped:
             log.warning("a client of a UR interface read too slowly: %d samples were dropped", self.dropped)
         if session is not None:
@@ -198,13 +186,17 @@ class Connection(asyncio.BufferedProtocol):
 
     def put(self, sample: bytes) -> None:
         """Send a sample; in real time it is dropped if earlier bytes are still waiting, never queued."""
-        transport = self._transport
+        transport, now = self._transport, asyncio.get_running_loop().time()
         if self._lossless:
             self.send(sample)
-        elif transport is None or transport.get_write_buffer_size():
-            self.dropped += 1
-        else:
+        elif transport is not None and not transport.get_write_buffer_size():
+            self._took = now
             transport.write(sample)
+        else:
+            self.dropped += 1
+            if self.session is not None and self.session.served and now - self._took > UNREAD_FOR:
+                log.warning("%s was disconnected: it has not read for %.0f s", self.peer, UNREAD_FOR)
+                self.cut_off()
 
     def event(self, event: Event) -> None:
         """Pass an event to the session."""
@@ -222,11 +214,6 @@ class Connection(asyncio.BufferedProtocol):
         """Close the connection at once, even if the client has yet to read something."""
         if self._transport is not None:
             self._transport.abort()
-
-    def _said_nothing(self) -> None:
-        self._first_word = None
-        self._notices.tell(f"{self.peer} was closed: it said nothing for {FIRST_WORD:.0f} s")
-        self.cut_off()
 
     def close(self) -> None:
         """Close the connection after sending what a client that reads still has to get."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Final
 
 from tvist_plant.user_file import UserFileError
@@ -14,8 +15,11 @@ FILE: Final = "external_control.urp"
 """Program that consists of the node alone, which exists without a file."""
 ALONE: Final = program("external_control", EXTERNAL_CONTROL)
 
-Fetch = Callable[[str, Callable[[str | None], None]], None]
+Then = Callable[[str | None], None]
+Fetch = Callable[[str, Then], None]
 """Asks a machine for its part of the program, and calls back with it; with None if it does not answer."""
+Aside = Callable[[Callable[[], str | None], Then], None]
+"""Reads a text beside the thread that calls it, which serves all clients, and calls back there."""
 
 
 class ExternalControl:
@@ -24,22 +28,30 @@ class ExternalControl:
     Args:
         folder: Programs that clients load by their names; None if there is no such folder.
         fetch: Asks a machine for its part.
+        aside: Reads the files of the folder.
     """
 
-    def __init__(self, folder: ProgramFolder | None, fetch: Fetch) -> None:
+    def __init__(self, folder: ProgramFolder | None, fetch: Fetch, aside: Aside | None = None) -> None:
         self._folder, self._fetch = folder, fetch
+        self._aside = aside or (lambda read, then: then(read()))
 
-    def text(self, name: str) -> str | None:
-        """Return the text of a program that has to be completed; None if there is no such program of this name."""
+    def find(self, name: str, then: Then) -> None:
+        """Call back with the text of a program that has to be completed; with None if there is none of this name."""
+        if self._folder is None:
+            then(self._text(name, None))
+        else:
+            self._aside(partial(self._text, name, self._folder), then)
+
+    @staticmethod
+    def _text(name: str, folder: ProgramFolder | None) -> str | None:
         text = None
-        if self._folder is not None:
-            with suppress(UserFileError):  # loading it says what is wrong
-                text = self._folder.read(name)
+        with suppress(UserFileError):  # loading it says what is wrong
+            text = None if folder is None else folder.read(name)
         if text is None and name == FILE:
             return ALONE
         return text if text is not None and EXTERNAL_CONTROL in text else None
 
-    def complete(self, text: str, host: str, then: Callable[[str | None], None]) -> None:
+    def complete(self, text: str, host: str, then: Then) -> None:
         """Complete the text of a program.
 
         Args:

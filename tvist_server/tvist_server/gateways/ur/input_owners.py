@@ -1,6 +1,6 @@
 """Input variables of one robot: which connection may write each, and what was written."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 
 
 class InputOwners:
@@ -15,7 +15,7 @@ class InputOwners:
         """Return whether no other connection owns the variable."""
         return self._owners.get(name, connection) is connection
 
-    def take(self, names: tuple[str, ...], connection: object) -> None:
+    def take(self, names: Sequence[str], connection: object) -> None:
         """Make a connection the owner of variables, which must be free."""
         for name in names:
             self._owners[name] = connection

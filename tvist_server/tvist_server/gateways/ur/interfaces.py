@@ -6,7 +6,7 @@ import logging
 import socket
 import threading
 from collections import defaultdict, deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from weakref import WeakValueDictionary
 
@@ -63,6 +63,7 @@ class UrInterfaces(Gateway):
         lockstep: Whether a client advances time, so that no state may be lost.
         gripper: Has a request to the cell's gripper carried out; None without one, so that its port is closed.
         programs: Folder with programs that clients load by their names.
+        reserved: Input variables of RTDE that no client may own, as if a fieldbus did.
 
     Raises:
         GatewayError: The server cannot listen on a port.
@@ -81,6 +82,7 @@ class UrInterfaces(Gateway):
         lockstep: bool = False,
         gripper: AskGripper | None = None,
         programs: ProgramFolder | None = None,
+        reserved: Sequence[str] = (),
     ) -> None:
         self.setpoints_refused = 0
         self.address = address
@@ -89,8 +91,9 @@ class UrInterfaces(Gateway):
             Notices(lambda line: log.warning("robot %s: %s", name, line)) for _ in range(3)
         )
         self._requests = ProgramRequests()
-        external = ExternalControl(programs, self._requests.fetch)
+        external = ExternalControl(programs, self._requests.fetch, self._aside)
         self.robot = UrRobot(description, name, self._tell, external, self._scripts.tell, self._refusals.tell)
+        self.robot.inputs.take(reserved, self)
         self._instruments, self._boards = Instruments(description), defaultdict[int, Board](Board)
         self._io: Io | None = None
         self._early = deque[Report](maxlen=FIRST)
@@ -160,7 +163,6 @@ class UrInterfaces(Gateway):
                         partial(self._session, interface),
                         self._lease,
                         places,
-                        self._coming_and_going,
                         lossless=self._lockstep,
                     ),
                     sock=bound,
@@ -307,6 +309,19 @@ class UrInterfaces(Gateway):
         if loop is not None:
             with contextlib.suppress(RuntimeError):  # the loop is closed at shutdown
                 loop.call_soon_threadsafe(action)
+
+    def _aside(self, read: Callable[[], str | None], then: Callable[[str | None], None]) -> None:
+        """Read a file in a thread of its own, which nobody waits for, and call back in the interfaces' thread."""
+
+        def reading() -> None:
+            text = None
+            try:
+                text = read()
+            except Exception:
+                log.exception("a program could not be read")
+            self._soon(lambda: then(text))
+
+        threading.Thread(target=reading, name="tvist-ur-file", daemon=True).start()
 
     async def _keep_alive(self) -> None:
         while True:

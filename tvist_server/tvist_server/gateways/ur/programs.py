@@ -77,7 +77,7 @@ class Programs:
         """Accesses of clients whose secondary programs run. They last until no secondary program runs."""
         self._running_beside = 0
         self._asked: object | None = None
-        """The request to play a program whose client is being asked for its text; None if there is none."""
+        """The request to play a program whose text is being found; None if there is none."""
 
     @property
     def name(self) -> str | None:
@@ -114,7 +114,7 @@ class Programs:
             outcome(refused)
 
         if re.match(PROGRAM_NAME_PATTERN, name):
-            control.ask(ProgramLoad(name=name, text=self._external.text(name)), then)
+            self._external.find(name, lambda text: control.ask(ProgramLoad(name=name, text=text), then))
         else:
             why = f"the path does not name a file, which has {PATTERN_MEANINGS[PROGRAM_NAME_PATTERN]}"
             outcome(Refused(code="out_of_range", where="name", why=why))
@@ -153,16 +153,26 @@ class Programs:
         name = self.name
         if name is None or control.held_by_other:
             heard(False)
-            return
-        text = self._external.text(name) if self.state == "STOPPED" else None
-        if text is None:
+        elif self.state == "STOPPED":
+            self._complete(name, control, heard)
+        else:
             self._play(control, heard)
-            return
+
+    def _complete(self, name: str, control: ControllerAccess, heard: Heard) -> None:
+        """Start the program of a name once it is known whether it has to be completed, and is."""
         asked = self._asked = object()
 
         def wanted() -> bool:
             """Return False if it was stopped meanwhile, or another program was loaded or started."""
             return self._asked is asked and (self.name, self.state) == (name, "STOPPED")
+
+        def found(text: str | None) -> None:
+            if not wanted():
+                heard(False)
+            elif text is None:
+                self._play(control, heard)
+            else:
+                self._external.complete(text, control.host, completed)
 
         def completed(whole: str | None) -> None:
             if whole is None or not wanted():
@@ -179,7 +189,7 @@ class Programs:
             else:
                 heard(False)
 
-        self._external.complete(text, control.host, completed)
+        self._external.find(name, found)
 
     def _play(self, control: ControllerAccess, heard: Heard) -> None:
         lasting = control.lasting()

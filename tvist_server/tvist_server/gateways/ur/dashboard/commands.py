@@ -261,6 +261,7 @@ def _bool(value: bool) -> str:
 
 
 QUIT: Final = "quit"
+STOP: Final = "stop"
 COMMANDS: Final = (
     Command("power on", _power_on),
     Command("power off", _power_off),
@@ -275,7 +276,7 @@ COMMANDS: Final = (
     Command("load", _load, argument=True),
     Command("play", _play),
     Command("pause", _pause),
-    Command("stop", _stop),
+    Command(STOP, _stop),
     Command("running", _running),
     Command("programState", _program_state),
     Command("get loaded program", _loaded_program),

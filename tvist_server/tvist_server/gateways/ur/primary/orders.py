@@ -12,6 +12,9 @@ from tvist_server.gateways.ur.primary.scripts import LONGEST, Unit
 from tvist_server.gateways.ur.robot import UrRobot
 
 TOO_LONG: Final = f"program_too_long: it has more than {LONGEST} bytes and was thrown away"
+STOP: Final = "stop program"
+SHORT: Final = 1000
+"""Length from which on a unit is none of the interface's own commands."""
 READ_ONLY: Final = (
     "this interface is read-only: somebody else controls the robot, or the port takes no commands"
 )
@@ -43,7 +46,9 @@ class Orders:
         return self._units.waiting
 
     def carry_out(self, unit: Unit) -> None:
-        """Carry out a unit in its turn."""
+        """Carry out a unit in its turn; one that stops the arm also at once."""
+        if self.waiting and len(unit.text) < SHORT and unit.words == STOP:
+            self._robot.programs.stop(self._control, lambda _: None)
         self._units.add(unit)
 
     def leave(self, unfinished: Unit | None) -> None:
@@ -74,7 +79,7 @@ class Orders:
             self._robot.tell(messages.runtime_exception(stamp, unit.line, unit.column, TOO_LONG))
             self._report_refusal(unit, f"it has more than {LONGEST} bytes")
             done()
-        elif len(unit.text) >= 1000 or not self._command(unit, done):
+        elif len(unit.text) >= SHORT or not self._command(unit, done):
             self._run(unit, done)
 
     def _command(self, unit: Unit, done: Done) -> bool:

@@ -1,5 +1,7 @@
 """Input variables, which clients set, and their types."""
 
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
 from typing import get_args
 
 from tvist_protocol.io import Bank
@@ -53,3 +55,16 @@ NEED_CONTROL = frozenset(NAMED) - {"external_force_torque"}
 """Variables that only the client in control may own. Registers are memory, which any client may write; a wrench is for
 programs of the client in control, and `ur_rtde` asks for it with every connection.
 """
+
+
+def matching(patterns: Iterable[str]) -> list[str]:
+    """Return the input variables that patterns name, in which `*`, `?` and `[0-9]` stand for others.
+
+    Raises:
+        ValueError: A pattern names none.
+    """
+    found = {pattern: [name for name in INPUTS if fnmatchcase(name, pattern)] for pattern in patterns}
+    if wrong := [pattern for pattern, names in found.items() if not names]:
+        why = "must be the name of an RTDE input, such as speed_slider_mask or input_int_register_*"
+        raise ValueError(f"reserve_inputs has {wrong[0]!r}: {why}")
+    return [name for names in found.values() for name in names]

@@ -66,7 +66,6 @@ class RtdeSession(PortSession):
         self._head = b""
         self._started = False
         self._outputs: OutputRecipe | None = None
-        self._outputs_wrong = False
         self._inputs: list[InputRecipe] = []
         self._every = 1
         self._next: int | None = None
@@ -142,7 +141,6 @@ class RtdeSession(PortSession):
                 frequency = _DOUBLE.unpack_from(payload)[0]
             payload = payload[_DOUBLE.size :]
         recipe = OutputRecipe(split(payload))
-        self._outputs_wrong = not recipe.valid
         self._outputs = recipe if recipe.valid else None
         self._every, self._next = ticks_between(frequency), None
         self._read()
@@ -183,8 +181,8 @@ class RtdeSession(PortSession):
             self._complain(f"there is no input recipe {number}")
 
     def _start(self, _payload: bytes) -> None:
-        """Start to send outputs. This is refused if the last output recipe was invalid."""
-        self._started, self._next = not self._outputs_wrong, None
+        """Start to send outputs. This is refused without an output recipe, or if the last one was invalid."""
+        self._started, self._next = self._outputs is not None, None
         self._read()
         self._said.clear()
         self._send(package(PackageKind.START, _TRUE if self._started else _FALSE))

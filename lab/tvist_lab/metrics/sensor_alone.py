@@ -1,0 +1,117 @@
+"""Modes in the log of an accelerometer alone, from the ring-downs and the sweep of frequencies that it shows."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import correlate
+from scipy.stats import spearmanr
+
+from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.ring_down import FREQUENCIES, fit_ring_down
+from tvist_lab.metrics.vibration import SENSOR, parts
+from tvist_lab.recordings import Floats, Recording
+
+LEVEL = 0.05
+"""Time over which the level of a vibration is taken [s]."""
+LOUD = 4.0
+"""Level over that of the quiet tenth of a log from which on something vibrates [-]."""
+ONSET = 0.25
+"""Longest time from the beginning of a vibration to its largest value, of a ring-down [s]."""
+SWEEP, BLOCK = 3.0, 0.5
+"""Shortest sweep, and its parts of which each has a frequency [s]."""
+RISING = 0.8
+"""Smallest rank correlation of these frequencies with time [-]."""
+EDGE = 1.1
+"""Frequency of a mode over the lowest one of a sweep, and of the highest one over it, at least [-]."""
+EXPLAINED = 0.8
+"""Smallest share of the energy that damped sines explain [-]; a robot's motion is explained worse."""
+SCALED = 15.0
+"""Frequency in the middle of the range of the fit to which the strongest one is scaled [Hz]."""
+
+
+@dataclass(frozen=True)
+class FreeVibration:
+    """The strongest mode of one ring-down or sweep."""
+
+    kind: str
+    """`ring-down` or `sweep`."""
+    start_s: float
+    """Time at which it begins [s]."""
+    f_d_hz: float
+    """Damped frequency [Hz]."""
+    zeta: float
+    """Damping ratio [-]."""
+    f_d_interval_hz: tuple[float, float] | None = None
+    """Interval that contains the true frequency with a probability of 95 % [Hz]; None for a sweep."""
+    zeta_interval: tuple[float, float] | None = None
+    """The same for the damping ratio [-]."""
+
+
+def free_vibrations(recording: Recording) -> list[FreeVibration]:
+    """Measure the ring-downs and sweeps of a log of an accelerometer, in order.
+
+    Raises:
+        NotMeasurableError: There is none.
+    """
+    found = []
+    for rows in parts(recording.time):
+        seen = np.isfinite(recording[SENSOR][rows]).all(axis=1)
+        time, force = recording.time[rows][seen], recording[SENSOR][rows][seen]
+        if len(time) * recording.period > 4.0 * LEVEL:
+            found += _in_part(time, force - np.median(force, axis=0), recording.period)
+    if not found:
+        raise NotMeasurableError(
+            "neither a ring-down nor a sweep of frequencies stands out of the accelerometer's noise: record the sensor "
+            "at rest for half a second, then a knock or a stop, and nothing else until it is at rest again"
+        )
+    return found
+
+
+def _in_part(time: Floats, alpha: Floats, period: float) -> list[FreeVibration]:
+    level = np.sqrt(uniform_filter1d(np.sum(alpha**2, axis=1), max(round(LEVEL / period), 1)))
+    loud = np.flatnonzero(level > LOUD * np.percentile(level, 10))
+    runs = np.split(loud, np.flatnonzero(np.diff(loud) * period > LEVEL) + 1) if loud.size else []
+    firsts = [int(run[0]) for run in runs if len(run) * period > LEVEL]
+    spans = (slice(first, past) for first, past in pairwise([*firsts, len(time)]))
+    return [one for rows in spans if (one := _measured(time[rows], alpha[rows], period)) is not None]
+
+
+def _measured(time: Floats, alpha: Floats, period: float) -> FreeVibration | None:
+    peak = int(np.argmax(np.sum(alpha**2, axis=1)))
+    if time[peak] - time[0] <= ONSET:
+        return _fitted("ring-down", float(time[peak]), alpha[peak:], time[peak:] - time[peak], period)
+    count = int((time[-1] - time[0]) / BLOCK)
+    if time[-1] - time[0] < SWEEP:
+        return None
+    frequencies = [_strongest(block, period) for block in np.array_split(alpha, count)]
+    if abs(float(spearmanr(range(count), frequencies).statistic)) < RISING:
+        return None
+    inside = (EDGE * min(frequencies), max(frequencies) / EDGE)
+    # The autocorrelation of what a flat spectrum excites decays as the free vibration does.
+    decay = np.column_stack([correlate(axis, axis, "full", "fft")[len(axis) - 1 :] for axis in alpha.T])
+    decay = decay[: len(decay) // 4]
+    found = _fitted("sweep", float(time[0]), decay, period * np.arange(len(decay), dtype=np.float64), period)
+    return found if found is not None and inside[0] < found.f_d_hz < inside[1] else None
+
+
+def _fitted(kind: str, start: float, alpha: Floats, late: Floats, period: float) -> FreeVibration | None:
+    """Fit a mode of any frequency: time is scaled so that the strongest one lies in the range of the fit."""
+    scale = max(_strongest(alpha, period), FREQUENCIES[0]) / SCALED
+    fit = fit_ring_down(alpha, scale * period, modes=2, time=scale * late, offset=True)
+    if not fit.ok or fit.r_squared < EXPLAINED:
+        return None
+    if kind == "sweep":  # the errors of an autocorrelation are not those of noise
+        return FreeVibration(kind, start, scale * fit.f_d, fit.zeta)
+    low, high = fit.f_d_interval
+    return FreeVibration(
+        kind, start, scale * fit.f_d, fit.zeta, (scale * low, scale * high), fit.zeta_interval
+    )
+
+
+def _strongest(alpha: Floats, period: float) -> float:
+    """Frequency at which an acceleration has the most energy [Hz]."""
+    size = 4 * len(alpha)
+    power = np.sum(np.abs(np.fft.rfft(alpha - alpha.mean(axis=0), size, axis=0)) ** 2, axis=1)
+    return float(np.fft.rfftfreq(size, period)[np.argmax(power)])

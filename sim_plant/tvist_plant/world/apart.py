@@ -1,0 +1,61 @@
+"""A world made in a process of its own: no file of a scene can end this one, take its memory or hold it up."""
+
+import os
+import pickle
+import resource
+import signal
+import subprocess
+import sys
+
+import numpy as np
+
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.drives import DriveCommand
+from tvist_plant.plant import Hand
+from tvist_plant.user_file import named, one_line
+from tvist_plant.world.scene import World, build
+from tvist_plant.world.scene_file import SceneError, SceneFile
+from tvist_plant.world.second_opinion import SecondOpinion
+
+LONGEST, MOST_MEMORY = 30, 768 << 20
+"""Longest time [s] and largest memory [byte] that MuJoCo may take for a scene."""
+Asked = tuple[RobotDescription, Payload, SceneFile, float, Hand | None]
+"""Arguments of `build`."""
+
+
+def build_apart(asked: Asked) -> World:
+    """Put an arm into a scene as `build` does; a `SceneError` also says that MuJoCo fails with it."""
+    done = subprocess.run(  # noqa: S603
+        [sys.executable, "-P", "-m", __name__],
+        input=pickle.dumps((LONGEST, asked)),
+        capture_output=True,
+        check=False,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # the memory of others would be counted
+    )
+    found = f"MuJoCo ends with exit code {done.returncode}: a scene may take {LONGEST} s and {MOST_MEMORY >> 20} MiB"
+    if done.returncode == 0 and isinstance(found := pickle.loads(done.stdout), World):  # noqa: S301  from above
+        return found
+    raise SceneError(f"world {asked[2].name}: {found}")
+
+
+def _main() -> None:
+    """Build the world that stdin describes, and put the arm at rest in it once; write it, or what is wrong."""
+    answer = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # MuJoCo prints warnings, and writes a log of them where it is
+    os.chdir("/")
+    longest, asked = pickle.load(sys.stdin.buffer)  # noqa: S301  from above
+    description, payload, _, timestep, _ = asked
+    resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
+    signal.alarm(longest)  # also ends what waits inside MuJoCo, and what nobody waits for any more
+    found: World | str
+    try:
+        still, found = np.zeros(description.joints), build(*asked)
+        SecondOpinion(description, payload, timestep, found.model).reset(DriveCommand(still, still, still))
+    except Exception as error:  # noqa: BLE001  of all kinds, also of memory
+        found = one_line(str(error)) if isinstance(error, SceneError) else f"MuJoCo fails: {named(error)}"
+    with answer:
+        pickle.dump(found, answer)
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,0 +1,54 @@
+"""Results of acceptance tests: each test notes its own, and the page of tested clients is made from them.
+
+python3 tests/acceptance/report.py
+"""
+
+import json
+import subprocess
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "docs/reference/ur-clients.json"
+PAGE = RESULTS.with_suffix(".md")
+BEGIN, END = "<!-- results: tests/acceptance/report.py makes them -->\n", "<!-- end of the results -->\n"
+PASSED = "passed"
+
+
+def note(client: str, version: str, outcomes: Mapping[str, str], why: Mapping[str, str]) -> None:
+    """Keep what came of each test or call of a client, and why some are known not to pass."""
+    git = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    others = {
+        name: f"{came}: {why[name]}" if name in why else came
+        for name, came in outcomes.items()
+        if came != PASSED
+    }
+    results = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    results[client] = {
+        "version": version, "date": f"{datetime.now(UTC):%Y-%m-%d}", "tvist": git.stdout.strip(),
+        "passed": [name for name in outcomes if name not in others], "others": others,
+    }  # fmt: skip
+    RESULTS.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n")
+    PAGE.write_text(with_results(PAGE.read_text(), results))
+
+
+def with_results(page: str, results: Mapping[str, Any]) -> str:
+    """Return the page with these results in place of those that it has."""
+    lines = ["| client | version | on | TVIST | tests or calls | passed |", "|---|---|---|---|---:|---:|"]
+    for client, one in sorted(results.items()):
+        count = len(one["passed"])
+        cells = client, one["version"], one["date"], f"`{one['tvist']}`", count + len(one["others"]), count
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    for client, one in sorted(results.items()):
+        lines += ["", f"{client}, not passed:", ""] if one["others"] else []
+        lines += [f"- `{name}`: {came}" for name, came in sorted(one["others"].items())]
+    before, _, rest = page.partition(BEGIN)
+    return before + BEGIN + "\n" + "\n".join(lines) + "\n\n" + END + rest.partition(END)[2]
+
+
+if __name__ == "__main__":
+    PAGE.write_text(with_results(PAGE.read_text(), json.loads(RESULTS.read_text())))

@@ -1,0 +1,84 @@
+"""Which test executes which line of the product: `python -m tools.executed FOLDER [ARGUMENT OF PYTEST ...]`.
+
+Needs `pip install pytest-cov`. It runs tests side by side, and notes what they and the programs that they start run.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections import Counter
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+AT_START = """
+import atexit, os, runpy, sys
+def begin():
+    import coverage
+    test, _, when = os.environ["PYTEST_CURRENT_TEST"].rpartition(" ")
+    whose = test if when == "(call)" else test.partition("::")[0]  # what a fixture starts is the file's
+    one = coverage.Coverage({data!r}, True, config_file={rc!r}, context=whose)
+    one.start()
+    atexit.register(lambda: (one.stop(), one.save()))
+def after_begin(run):
+    return lambda *given, **named: (begin(), run(*given, **named))[1]
+if "tests.nursery" in sys.orig_argv:
+    runpy.run_module, runpy.run_path = after_begin(runpy.run_module), after_begin(runpy.run_path)
+elif "PYTEST_CURRENT_TEST" in os.environ:
+    begin()
+"""
+"""What a program of a test does first, or when it has been forked; a variable names the test."""
+
+
+def cover(folder: Path, arguments: list[str]) -> None:
+    """Run tests, and keep in a folder what they execute."""
+    folder.mkdir(parents=True, exist_ok=True)
+    data, rc = str(folder / "coverage"), str(folder / "rc")
+    quiet = "disable_warnings = no-data-collected, module-not-imported"
+    Path(rc).write_text(
+        f"[run]\ndata_file = {data}\ninclude = {ROOT}/*/tvist_*/*\n{quiet}\n", encoding="utf-8"
+    )
+    (folder / "sitecustomize.py").write_text(AT_START.format(data=data, rc=rc), encoding="utf-8")
+    side_by_side = ["-n2", "--dist=loadgroup", "-m", "not nightly"]
+    notes = ["--cov", f"--cov-config={rc}", "--cov-context=test", "--cov-report="]
+    paths = os.pathsep.join(filter(None, [str(folder), os.environ.get("PYTHONPATH")]))
+    command = [sys.executable, "-m", "pytest", *side_by_side, *notes, *arguments]
+    subprocess.run(command, cwd=ROOT, env={**os.environ, "PYTHONPATH": paths}, check=False)
+
+
+@cache
+def executed(folder: Path, file: str) -> dict[int, set[str]]:
+    """Return the tests, or files of tests, that execute the lines of a file, by the line."""
+    data = import_module("coverage").CoverageData(str(folder.resolve() / "coverage"))
+    data.read()
+    lines: dict[int, list[str]] = data.contexts_by_lineno(str(ROOT / file))
+    return {
+        line: {re.sub(r"(@[^]@]*)?([|].*)?$", "", one) for one in of if one} for line, of in lines.items()
+    }
+
+
+def shortest(tests: set[str], together: float) -> list[str]:
+    """Return the tests that take a time together by `durations.json`, the shortest first."""
+    kept = json.loads((ROOT / "tests" / "durations.json").read_text(encoding="utf-8"))
+    cases = Counter(one.partition("[")[0] for one in tests)
+
+    def seconds(test: str) -> float:
+        function = test.partition("[")[0]
+        file, _, name = function.partition("::")
+        of_file = kept.get(file, {})
+        return float(of_file.get(name, 0.1) / cases[function] if name else sum(of_file.values()))
+
+    chosen = []
+    for test in sorted(tests, key=lambda one: (seconds(one), one)):
+        together -= seconds(test)
+        if together < 0.0:
+            break
+        chosen.append(test)
+    return chosen
+
+
+if __name__ == "__main__":
+    cover(Path(sys.argv[1]).resolve(), sys.argv[2:])
