@@ -90,10 +90,6 @@ EXAMPLES = {
 
 `external_fts_through_rtde` waits for keys, and `direct_torque_control_example` needs PolyScope 5.23.
 """
-KNOWN_EXAMPLES = {
-    "tool_contact_example": "needs something to touch",
-}
-"""Examples that do not end well, and what the simulated robot cannot do."""
 
 
 class Result(NamedTuple):
@@ -301,8 +297,8 @@ def main() -> None:
         if options.examples:
             for name in chosen:
                 results.append(library.example(name))
-                unknown += report(name, results[-1:], KNOWN_EXAMPLES)
-            _note(options, "examples", results, KNOWN_EXAMPLES)
+                unknown += report(name, results[-1:], {})
+            _note(options, "examples", results, {})
         else:
             for program in chosen:
                 tests = library.tests(program, options.filter)

@@ -57,10 +57,7 @@ def test_moves_and_streams_at_all_limits_keep_them(arm, shaper):
 
 @pytest.mark.parametrize(
     ("arm", "shaper", "seed"),
-    [
-        ("seven joints", "none", 10),  # it accelerates between evenly spaced moments at which it is looked at
-        ("ur30", "auto-target", 15),  # made slower by half, it needs as much of the torque as before
-    ],
+    [("seven joints", "none", 10), ("ur30", "auto-target", 15)],
 )
 def test_so_do_those_that_are_heavy_for_a_moment_or_hardly_lighter_when_slower(arm, shaper, seed):
     moved(arm, shaper, seed)

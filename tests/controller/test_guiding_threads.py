@@ -187,6 +187,27 @@ LAST = {
     "before halt": ["protective_stop()", "halt"],
     "in a branch": ["if True:", "  protective_stop()", "else:", "  sync()", "end"],
     "in a function": ["def f():", "  protective_stop()", "end", "f()"],
+    "in a thread that is joined": [
+        "thread t():",
+        "  protective_stop()",
+        "end",
+        "handle = run t()",
+        "join handle",
+    ],
+    "in a thread of a thread": [
+        "thread t():",
+        "  protective_stop()",
+        "end",
+        "thread u():",
+        "  inner = run t()",
+        "  join inner",
+        "end",
+        "def wait():",
+        "  outer = run u()",
+        "  join outer",
+        "end",
+        "wait()",
+    ],
     "during a motion": ["speedj([0.1, 0, 0, 0, 0, 0], 1, 0.1)", "protective_stop()"],
 }
 
@@ -198,6 +219,18 @@ def test_a_program_ends_with_a_protective_stop_that_nothing_follows(lines):
     finish(robot)
     assert robot.controller.programs.state == "STOPPED"
     assert {"protective_stop", "program_stopped"} <= set(robot.kinds())
+
+
+@pytest.mark.parametrize("then", ["sync()", "textmsg(2)"])
+@pytest.mark.parametrize("where", ["thread", "main"])
+def test_a_thread_s_protective_stop_pauses_the_program_where_something_follows(where, then):
+    robot = a_robot()
+    inside, after = ([f"  {then}"], []) if where == "thread" else ([], [then])
+    start(
+        robot, "thread t():", "  protective_stop()", *inside, "end", "handle = run t()", "join handle", *after
+    )
+    finish(robot)
+    assert (robot.controller.programs.state, said(robot)) == ("PAUSED", [])
 
 
 @pytest.mark.parametrize("follows", ["x = 1", 'popup("a", blocking=True)', "sync()"])

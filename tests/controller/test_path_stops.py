@@ -18,21 +18,12 @@ from .spaces import BENT, away, begun, errors, tool_pose
 
 LEAD = 1e-8
 """A pause goes through a filter whose weights follow the posture, and so may lead by nanometres [m]."""
-SOME, ALL = 12, 110
 
 
-@pytest.mark.parametrize("seed", range(SOME))
+@pytest.mark.parametrize(
+    "seed", [*range(12), *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(12, 110))]
+)
 def test_every_kind_of_stop_stays_on_the_path_behind_the_motion_and_rests_no_later(seed):
-    stopped_as_promised(seed)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("seed", range(SOME, ALL))
-def test_so_do_many_more(seed):
-    stopped_as_promised(seed)
-
-
-def stopped_as_promised(seed):
     trip = journey([seed, 41], SHAPERS)
     random = np.random.default_rng([seed, 42])
     alone = Progress(trip.begin())

@@ -26,21 +26,12 @@ from .paths import journey
 from .robots import Q1, UR5E, H
 from .spaces import BENT, NO_TOOL, TOOL, away, begun, errors, pose_of, tool_pose
 
-SOME, ALL = 22, 120
 
-
-@pytest.mark.parametrize("seed", [*range(SOME), 581])  # the last one creeps to its end
+@pytest.mark.parametrize(
+    "seed",  # 581 creeps to its end
+    [*range(22), 581, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(22, 120))],
+)
 def test_a_random_path_is_where_it_should_be_with_every_shaper(seed):
-    is_where_it_should_be(seed)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("seed", range(SOME, ALL))
-def test_so_are_many_more(seed):
-    is_where_it_should_be(seed)
-
-
-def is_where_it_should_be(seed):
     trip = journey([seed, 31], [SHAPERS[seed % len(SHAPERS)]])
     robot = trip.begin()
     robot.until_rest(500_000)

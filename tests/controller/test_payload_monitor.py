@@ -109,18 +109,13 @@ def told_and_false(rounds, seed):
     return missed, false, worst
 
 
-def test_within_three_random_moves_a_wrong_payload_is_told_and_a_right_one_never():
-    missed, false, worst = told_and_false(5, seed=1)
-    assert (missed, false) == (0, 0)
-    assert worst < 0.6  # far from a false alarm
-
-
-@pytest.mark.nightly
-@pytest.mark.timeout(1200)
-def test_of_three_hundred_moves_with_a_right_payload_not_one_in_a_hundred_is_told_of():
-    missed, false, _ = told_and_false(100, seed=2)
-    assert missed <= 1
-    assert false <= 3
+@pytest.mark.parametrize(
+    "rounds", [5, pytest.param(100, marks=[pytest.mark.nightly, pytest.mark.timeout(1200)])]
+)
+def test_within_three_random_moves_a_wrong_payload_is_told_and_a_right_one_never(rounds):
+    missed, false, worst = told_and_false(rounds, seed=1)
+    assert max(missed, false) <= rounds // 100
+    assert rounds > 5 or worst < 0.6  # far from a false alarm
 
 
 def test_too_much_declared_is_told_as_well():

@@ -535,4 +535,4 @@ def test_every_log_command_reads_the_log_of_a_robot_and_that_of_a_sensor_with_it
     assert [one["stop_s"] for one in again] == [one["stop_s"] for one in analysed["motions"]]
     twice = tvist("log", "compare", log, log, *given, "--imu", imu, "--json").assert_done().json
     assert len(twice["motions"]) == devices.motions
-    tvist("log", "analyze", log, *of_robot, "--imu", log).assert_failed(1, "name its columns with --imu-columns")
+    tvist("log", "analyze", log, *of_robot, "--imu", log).assert_failed(1, "its columns with --imu-columns")

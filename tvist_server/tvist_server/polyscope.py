@@ -50,7 +50,8 @@ def script_of(name: str, data: bytes) -> str:
         raise PolyscopeError(
             f"it is PolyScope's and has {found}, which cannot be played; save it as a script"
         )
-    lines.append(_again(body) if main.get("runOnlyOnce") == "false" else body)
+    repeats = main.get("runOnlyOnce") == "false" and not _only_defines(body)
+    lines.append(_again(body) if repeats else body)
     return program(name, "\n".join(lines))
 
 
@@ -74,6 +75,19 @@ def with_external_control(text: str, sent: str) -> str:
         header, part = "", sent
     first, _, rest = text.partition("\n")
     return f"{first}\n{header}{mark}\n{rest.replace(EXTERNAL_CONTROL, part)}"
+
+
+def _only_defines(body: str) -> bool:
+    """Whether a text has definitions alone: repeated, it would compute for ever without doing anything."""
+    from tvist_urscript import tree
+    from tvist_urscript.errors import ScriptError
+    from tvist_urscript.parsing import parse
+
+    try:
+        statements = parse(f"{body}\n") if EXTERNAL_CONTROL not in body else [None]
+        return all(isinstance(one, tree.Function) for one in statements)
+    except ScriptError:  # compiling tells where
+        return False
 
 
 def _again(body: str) -> str:

@@ -3,10 +3,11 @@
 import sys
 from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
+from types import FrameType
 from typing import Any
 
 from tvist_urscript.errors import Fault, ScriptError
-from tvist_urscript.failures import FILE, TooDeep, failure, line_of, name_of, position_of
+from tvist_urscript.failures import FILE, TooDeep, all_lines_of, failure, line_of, name_of, position_of
 from tvist_urscript.functions import DEEPEST_CALLS
 from tvist_urscript.namespace import Namespace
 from tvist_urscript.pieces import HERE, MISSING
@@ -88,13 +89,21 @@ class Machine:
 
     @property
     def at_end(self) -> bool:
-        """Whether the main thread runs, and nothing follows the built-in function that it is in."""
-        frame = sys._getframe() if self._running is self._main and not self._main.added else None  # noqa: SLF001
-        ends = frame is not None
-        while ends and frame is not None:
-            ends = frame.f_code.co_filename != FILE or frame.f_lineno in self.script.last_lines
+        """Whether nothing follows the built-in function that runs, neither in its thread nor where that is joined."""
+        thread, lines = self._running, set[int]()
+        frame: FrameType | None = sys._getframe()  # noqa: SLF001
+        while frame is not None:
+            lines |= {frame.f_lineno} if frame.f_code.co_filename == FILE else set()
             frame = frame.f_back
-        return ends
+        while lines <= self.script.last_lines and not thread.added:
+            if thread is self._main:
+                return True
+            joining = [one for one in self._threads if one.joins is thread]
+            if not joining:
+                return False
+            thread = joining[0]
+            lines = all_lines_of(thread.steps)
+        return False
 
     @property
     def line(self) -> int:
@@ -138,6 +147,10 @@ class Machine:
                 self._missed.append(thread)
             else:
                 self._turn(thread)
+        while self._held and (over := [one for one in self._threads if one.joins and one.joins.ended]):
+            if not all_lines_of(over[0].steps) <= self.script.last_lines:
+                break
+            self._turn(over[0])  # nothing follows there but the end
         return self.left
 
     def hold(self) -> None:
@@ -326,8 +339,11 @@ class Machine:
         if thread is None:
             return
         yield from self._finish()
+        waiting = self._running
+        waiting.joins = thread
         while not thread.ended:
             yield
+        waiting.joins = None
 
     def _enter(self) -> Steps:
         thread = self._running

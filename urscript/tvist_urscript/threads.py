@@ -20,6 +20,7 @@ class Thread:
         critical: How many critical sections it is in.
         spent: Evaluations since it has waited for time to pass, or has got something from outside.
         owes: Evaluations of what it does first in its next turn, which that tick has to bear.
+        joins: The thread for whose end it waits.
         added: Whether it was started by statements that were added to the program, or is the main thread and runs such
             statements now.
     """
@@ -30,6 +31,7 @@ class Thread:
     critical: int = 0
     spent: int = 0
     owes: int = 0
+    joins: "Thread | None" = None
     added: bool = False
 
     @property
