@@ -28,8 +28,9 @@ from tvist_protocol.recorded import THIS_BEHAVIOUR
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording.recorder import Recorder
 
-MOST_MISSING = 30_000
-"""A recording may lack so many ticks, a minute, and as many more as it has; each of them takes time in a replay."""
+ALWAYS, PER_STATE = 30_000, 100
+"""Number of ticks that a recording may have, a minute, and how many more for each of its states: a tick takes time in a
+replay even if its state is missing."""
 
 
 class ReplayError(TvistError):
@@ -109,9 +110,9 @@ def replay_file(
     if (content.dropped or {}).get("journal"):
         raise ReplayError("the recorder dropped messages of the journal, so an equal run is not possible")
     last, there = int(content.recording["tick"][-1]), len(content.recording)
-    if last > MOST_MISSING + 2 * there:
+    if last > (most := ALWAYS + PER_STATE * there):
         raise ReplayError(
-            f"the recording has {there} states up to tick {last}: at most {MOST_MISSING + there} may be missing"
+            f"the recording goes on to tick {last}, but of {there} states at most {most} are replayed"
         )
     used, notes = _used(content.start, own_shapers)
     plant, said = _same_plant(content.start, plant)

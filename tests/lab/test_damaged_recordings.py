@@ -7,9 +7,8 @@ import pytest
 import zstandard
 from mcap.opcode import Opcode
 from tests.lab.test_mcap_file import STATE, record, states
-from tests.lab.test_mutated_files import HARMFUL
 
-from tvist_lab.recordings import Recording, RecordingError, read
+from tvist_lab.recordings import RecordingError, read
 from tvist_lab.recordings.mcap_file import read as read_file
 from tvist_lab.recordings.mcap_records import DAMAGE, MAGIC, records
 from tvist_lab.replay import ReplayError, replay_file
@@ -46,10 +45,10 @@ def test_a_vector_of_another_width_than_it_needs_is_refused(name, width, tmp_pat
         read(path)
 
 
-def test_a_recording_that_lacks_more_ticks_than_it_has_is_not_replayed(tmp_path):
+def test_a_recording_that_lacks_nearly_all_ticks_is_not_replayed(tmp_path):
     late = msgspec.structs.replace(STATE, tick=10**7, timestamp=2e4)
     content = read_file(record(tmp_path / "run.mcap", [*states(20), late]))
-    with pytest.raises(ReplayError, match="21 states up to tick 10000000: at most 30021 may be missing"):
+    with pytest.raises(ReplayError, match="to tick 10000000, but of 21 states at most 32100"):
         replay_file(content)
 
 
@@ -76,10 +75,3 @@ def test_a_chunk_holds_no_more_than_its_size_allows(kind, tmp_path):
     path.write_bytes(MAGIC + _part(Opcode.HEADER, bytes(8)) + _part(Opcode.CHUNK, head + packed) * chunks)
     with path.open("rb") as stream, pytest.raises(DAMAGE, match="a chunk of"):
         list(records(stream))
-
-
-def test_all_that_is_said_of_a_file_is_one_short_printable_line():
-    notes = Recording({"tick": [1.0]}, notes=[HARMFUL * 1000]).notes
-    for said in (str(RecordingError(HARMFUL * 1000)), *notes):
-        assert said.isprintable()
-        assert len(said) < 1000

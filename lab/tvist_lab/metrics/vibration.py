@@ -19,6 +19,8 @@ TRUTH = "truth_tool_acceleration"
 TRUE_POSE = "truth_flange_pose"
 
 
+FILLED = 10
+"""A part of a log is filled to at most so many times its rows, so that a sparse one cannot take the memory."""
 ALL = slice(None)
 """All rows of a recording."""
 
@@ -87,9 +89,10 @@ def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BA
     filtered = np.array(signal)
     for rows in parts(time):
         if len(own := time[rows]) > 1:
-            grid = np.arange(own[0], own[-1] + 0.5 * period, period)
+            step = max(period, float(own[-1] - own[0]) / (FILLED * len(own)))
+            grid = np.arange(own[0], own[-1] + 0.5 * step, step)
             below = low_pass(
-                np.column_stack([np.interp(grid, own, axis) for axis in signal[rows].T]), period, cut_off
+                np.column_stack([np.interp(grid, own, axis) for axis in signal[rows].T]), step, cut_off
             )
             filtered[rows] = np.column_stack([np.interp(own, grid, axis) for axis in below.T])
     return filtered

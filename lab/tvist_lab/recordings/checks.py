@@ -32,8 +32,6 @@ MOST = 1e6
 """Largest number in such a column; more is damage."""
 LONG_GAP = 1.0
 """Time without rows on both sides of which a log is two [s]; shorter ones are filled with straight lines."""
-SPARSE = 10.0
-"""Largest time of a log without its long gaps, over that of its rows [-]."""
 Places = tuple[str, Floats]
 """Where rows stand in a file: what is counted, such as "line", and the number of each row, shape (T,)."""
 PERIODS = (1e-4, 0.1)
@@ -101,6 +99,3 @@ def check_recording(path: Path, recording: Recording, places: Places | None = No
     # The clock of another controller may go on beside its ticks.
     for period in (np.median(periods), recording.period, *([] if recording.foreign else [np.max(periods)])):
         check_period(path, float(period))
-    short = step[step <= LONG_GAP]
-    if np.sum(short) > SPARSE * len(short) * np.median(periods):
-        raise LogError(f"{path}: nine of ten rows are missing, so that no vibration shows")

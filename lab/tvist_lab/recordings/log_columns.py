@@ -125,7 +125,7 @@ def _remedy(rows: Rows) -> str:
 def found_columns(names: Sequence[str]) -> str:
     """Return the names of a file's columns as the part of a sentence."""
     there = [name for name in names if name]
-    return f"its columns are {', '.join(there[:12])}{', …' if len(there) > 12 else ''}"
+    return f"its columns are {', '.join(there[:24])}{', …' if len(there) > 24 else ''}"
 
 
 def _vectors(rows: Rows) -> tuple[dict[str, Floats], list[str]]:
