@@ -25,7 +25,7 @@ def summary(path: str | os.PathLike[str], recording: Recording) -> dict[str, Any
     path = Path(path)
     content: mcap_file.RecordingFile | None = None
     with suppress(mcap_file.RecordingFileError):
-        content = mcap_file.read(path)
+        content = mcap_file.read_checked(path)
     info = recording.info
     return {
         "file": str(path),

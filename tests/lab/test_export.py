@@ -22,7 +22,7 @@ from tvist_protocol.generate import FOLDER
 from tvist_protocol.recorded import topics
 from tvist_server.recording.writer import RecordingWriter, heading
 
-HARD_FLOATS = [5e-324, -0.0, 0.1 + 0.2, 1e300, np.nan, 2.0**53 + 2]
+HARD_FLOATS = [5e-324, -0.0, 0.1 + 0.2, 1e-300, np.nan, 1e6 - 2.0**-33]
 
 
 def golden(name, kind):

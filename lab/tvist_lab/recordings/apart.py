@@ -97,8 +97,16 @@ def _parquet(path: Path) -> Arrays:
     rows, columns = pl.scan_parquet(path).select(pl.len()).collect().item(), pl.read_parquet_schema(path)
     check_size(path, rows * len(columns))
     text = pl.read_parquet_metadata(path).get(KEY)
-    numeric = pl.read_parquet(path).select(pl.selectors.numeric() | pl.selectors.boolean())
-    arrays = {column.name: column.cast(pl.Float64).fill_null(np.nan).to_numpy() for column in numeric}
+    numeric = pl.selectors.numeric() | pl.selectors.boolean()
+    table = pl.read_parquet(path).with_columns(pl.selectors.array().arr.to_list())
+    for column in table.select(pl.selectors.list()):
+        width = int(np.max(column.list.len().fill_null(0).to_numpy(), initial=0))
+        check_size(path, rows * width)
+        entries = [column.list.get(at, null_on_oob=True).alias(f"{column.name}_{at}") for at in range(width)]
+        table = table.drop(column.name).hstack(entries)
+    arrays = {
+        column.name: column.cast(pl.Float64).fill_null(np.nan).to_numpy() for column in table.select(numeric)
+    }
     return arrays if text is None else arrays | {KEY: np.array(text)}
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from tvist_cli.failure import Failure
+from tvist_cli.failure import Failure, told
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import out, print_json, progress, say, table, typed, write_report
 
@@ -30,14 +30,15 @@ def advise(
     from tvist_lab.advice import advise as advised
     from tvist_lab.advice import as_dict, command, verdict
     from tvist_lab.metrics import Measured
+    from tvist_lab.recordings import RecordingError
     from tvist_lab.report.of_advice import MODES, OPTIONS, advice_page, modes_rows, option_rows
 
     measured = []
-    with progress(len(files), "logs") as bar:
+    with told(RecordingError), progress(len(files), "logs") as bar:
         for recording in logs.read(*files):
             measured.append(Measured.of(recording))
             bar(1, None)
-    joints = sorted({log.recording["actual_q"].shape[1] for log in measured})
+    joints = sorted({log.recording.joints for log in measured})
     if len(joints) > 1:
         have = " and ".join(map(str, joints))
         raise Failure(f"advice is about one robot: these logs have {have} joints; give the logs of one")

@@ -50,7 +50,7 @@ def export(
         if kind == FOXGLOVE:
             from tvist_lab.foxglove.export import export as draw
 
-            content = mcap_file.read(file)
+            content = mcap_file.read_checked(file)
             recording = content.recording.noted(*filter(None, [content.note]), *draw(content, path))
         else:
             (recording,) = logs.read(file)
