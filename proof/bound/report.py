@@ -9,7 +9,7 @@ import numpy as np
 from proof.bound.least_time import MODES, bound
 from proof.bound.with_lead import bound_with_lead
 from tvist_controller.api.line import body, load_calibration, paper_payload
-from tvist_lab.runners import Processes, in_order
+from tvist_lab.runners import in_order
 from tvist_lab.study.case import Case
 from tvist_lab.study.line import PAPER
 from tvist_lab.study.menus import names
@@ -78,7 +78,7 @@ def compare(random: int, seed: int, shapers: Sequence[str] = SHAPERS) -> list[Bo
         drawn = draw_moves(arm, random, seed, (0.0, arm.limits.payload)).moves
         moves += [(str(number), move) for number, move in enumerate(drawn, 1)]
     jobs = [BoundJob(name, arm, known, tuple(shapers), move) for name, move in moves]
-    return list(in_order(Processes(few=2, chunk=1), bounded, jobs))
+    return list(in_order(bounded, jobs, few=2))
 
 
 def bounded(job: BoundJob) -> Bounded:

@@ -10,7 +10,7 @@ from tvist_controller.api.line import Driven, DrivenLine, body, paper_payload, r
 from tvist_controller.api.robot import AFTER, Beliefs, MotionRecord, MotionStudent, Repetition, added, heights
 from tvist_lab.metrics.common_clock import AFTER_STOP
 from tvist_lab.recordings import Floats
-from tvist_lab.runners import Processes, in_order
+from tvist_lab.runners import in_order
 from tvist_lab.study.line import RESTING, Unchanged, point_to_point
 from tvist_lab.study.measures import WORTH
 from tvist_lab.study.method import Named, Task
@@ -87,7 +87,7 @@ def learn(job: LearningJob) -> Learnt:
 
 def learnt(jobs: Sequence[LearningJob]) -> Iterator[Learnt]:
     """Do all jobs; yield what became of each in order."""
-    return in_order(Processes(few=2), learn, jobs)
+    return in_order(learn, jobs, few=2)
 
 
 def report(done: Sequence[Learnt]) -> list[dict[str, Any]]:

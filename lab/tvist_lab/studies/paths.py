@@ -9,7 +9,7 @@ import numpy as np
 from tvist_controller.api.line import RefusalError, body, elastic_feed_forward, paper_payload
 from tvist_lab.metrics import in_motion_rms, motions, peak_after_stop, rigid_acceleration
 from tvist_lab.recordings import Floats
-from tvist_lab.runners import Processes, in_order
+from tvist_lab.runners import in_order
 from tvist_lab.studies.pages import page
 from tvist_lab.studies.path_examples import circle_in_words
 from tvist_lab.studies.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, Reference, planned, shaped
@@ -115,7 +115,7 @@ def compare(jobs: Sequence[PathJob]) -> Iterator[Judged]:
         PathsError: Hardly any drawn path can be followed.
         RefusalError: There is no such shaper for this robot.
     """
-    return in_order(Processes(few=1, chunk=1), judge, jobs)
+    return in_order(judge, jobs, few=1)
 
 
 def judge(job: PathJob) -> Judged:

@@ -11,7 +11,7 @@ from tvist_controller.api.line import Setup
 from tvist_controller.api.robot import Controller
 from tvist_lab.in_process import free_setup
 from tvist_lab.recordings import Floats
-from tvist_lab.runners import Processes, in_order
+from tvist_lab.runners import in_order
 from tvist_lab.studies.pages import page
 from tvist_lab.studies.tracking.following import follow
 from tvist_lab.studies.tracking.ways import APPROACH, CONSTANT, DISTANCE, RAMP, WAYS, WayName, level_end
@@ -80,7 +80,7 @@ def compare(jobs: Sequence[TrackingJob]) -> Iterator[Row]:
     Raises:
         TrackingError: A stop, or an error of the program, ended a motion.
     """
-    return in_order(Processes(), track, jobs)
+    return in_order(track, jobs)
 
 
 def track(job: TrackingJob) -> Row:
