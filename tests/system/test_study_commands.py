@@ -160,7 +160,7 @@ RUNS = {
     "map": (MAP, {"map_f_d.svg", "map_zeta.svg", "map_delay.svg"}, over_two_joints),
     "shapers": (
         "shapers --f-d 6.7 --zeta 0.34 --figures .",
-        {"shapers.png", "settling.png", "mean_delay.png", "elastic.png"},
+        {"shapers.png", "settling.png"},
         as_they_are,
     ),
     "sensitivity": (

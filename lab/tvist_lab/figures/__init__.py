@@ -15,7 +15,6 @@ from tvist_lab.figures.path_shaping import corner_figure, path_shaping_figure
 from tvist_lab.figures.recorded import Recorded, motion_figure, observed_figure
 from tvist_lab.figures.ring_down import ring_down_figure
 from tvist_lab.figures.studies import residual_by_move_figure, robustness_figure, study_figure, sweep_figure
-from tvist_lab.figures.through_filters import elastic_figure, mean_delay_figure
 from tvist_lab.figures.wrong_frequency import (
     catalogue_figure,
     figure_4,
@@ -32,7 +31,6 @@ __all__ = [
     "catalogue_figure",
     "compared_figure",
     "corner_figure",
-    "elastic_figure",
     "figure_1",
     "figure_2",
     "figure_3",
@@ -42,7 +40,6 @@ __all__ = [
     "figure_15",
     "figure_16",
     "identified_figure",
-    "mean_delay_figure",
     "motion_figure",
     "move_plan_figure",
     "observed_figure",
