@@ -56,7 +56,7 @@ GROUPS = {
     "Make and manage": {
         "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",
         "paper": "Run the paper's experiment and print its tables beside ours.",
-        "lesson": "Open a page on which to try shaping, or show why a fixed shaper is not enough.",
+        "lesson": "Open a page on which to try shaping.",
         "identify": "Calibrate a robot from its own accelerometer, or from its logs.",
         "robots": "List the arms: what is measured, what assumed, and how well auto stills each.",
         "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",
