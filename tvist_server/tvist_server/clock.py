@@ -28,7 +28,7 @@ HAND_ON_EVERY = 0.0009
 """Longest time for which robots that tick one after another keep their messages [s]. To hand them on costs two thread
 switches, about as much as a tick, so they are handed on together before the thread sleeps.
 """
-LONGEST_TICK = 10.0
+LONGEST_TICK = 1.5
 """Longest wait at the end for a tick in progress [s]: a call of somebody's own arm may never return."""
 REPEAT_EVERY = 1.0
 """Time after which a robot in lockstep publishes its last state again, if there was no step meanwhile [s]."""
@@ -74,7 +74,7 @@ class Mailbox:
         self.jobs.post(do, client)
 
     def guarded(self, do: Do) -> None:
-        """Do something of the robot; an exception that its host does not survive ends this robot alone."""
+        """Do something of the robot; an exception that its host does not survive ends the robot alone."""
         try:
             do()
         except Exception:
@@ -132,7 +132,7 @@ class Clock(ABC):
         if self._thread.is_alive():
             self._thread.join(LONGEST_TICK)
             if self._thread.is_alive():
-                log.error("a call of the arm has not returned for %g s", LONGEST_TICK)
+                log.error("a tick, or a call of the arm, has not returned for %g s", LONGEST_TICK)
 
     @abstractmethod
     def punctuality(self, robot: Mailbox) -> Punctuality | None:
