@@ -28,7 +28,7 @@ LOG = {
     "advise": "Say from logs what rings, and which shaper to take.",
     "compare": "Compare two recordings of the same motions, motion by motion.",
     "report": "Write a web page about recordings: a verdict, tables and figures in one file.",
-    "export": "Write a recording as CSV, Parquet, npz or mat, or for Foxglove.",
+    "export": "Write a recording as CSV or Parquet, or for Foxglove.",
     "fit": "Fit a robot file to logs, with which a simulated arm does what the robot did.",
     "replay": "Run a recording's commands again and compare bit by bit, or publish it.",
 }

@@ -196,12 +196,12 @@ def _mcap(folder):
     return found
 
 
-def _exported(folder, kind):
+def _exported(folder):
     from tests.lab.test_export import recording
 
     from tvist_lab.recordings.export import export
 
-    export(recording(), path := folder / f"run.{kind}", kind)
+    export(recording(), path := folder / "run.parquet", "parquet")
     return path
 
 
@@ -211,21 +211,13 @@ def _parquet(folder):
     plain = folder / "plain.parquet"
     names, values = _log().table()
     pl.DataFrame(values, schema=names).write_parquet(plain, compression="uncompressed", row_group_size=40)
-    return [_exported(folder, "parquet"), plain]
+    return [_exported(folder), plain]
 
 
 def _npz(folder):
     path = folder / "plain.npz"
     np.savez(path, **_log().columns)
-    return [_exported(folder, "npz"), path]
-
-
-def _mat(folder):
-    from scipy.io import savemat
-
-    for version in ("4", "5"):
-        savemat(folder / f"plain{version}.mat", _log().columns, format=version, oned_as="column")
-    return [_exported(folder, "mat"), folder / "plain4.mat", folder / "plain5.mat"]
+    return [path]
 
 
 def _toml(folder):
@@ -359,7 +351,6 @@ READERS = {
     "mcap": (_mcap, _read_recording),
     "parquet": (_parquet, _read_recording),
     "npz": (_npz, _read_recording),
-    "mat": (_mat, _read_recording),
     "toml": (_toml, _read_robot),
     "urdf": (_urdf, _read_robot),
     "calibration": (_calibration, _read_calibration),
@@ -431,8 +422,8 @@ HOSTILE = {
 }  # fmt: skip
 """Files made to hang a reader or to take its memory, each with its kind."""
 
-APART = {"parquet": 10, "mat": 10}
-"""How many times fewer files are tried of kinds that are read in a process of their own, a second each."""
+APART = {"parquet": 10}
+"""How many times fewer files are tried of a kind that is read in a process of its own, a second each."""
 
 
 def _limit_time() -> None:

@@ -1,9 +1,8 @@
-"""Recordings from Parquet, npz and mat: those of `tvist log export`, and others with columns of RTDE's names."""
+"""Recordings from Parquet that `tvist log export` wrote, and Parquet and npz with columns of RTDE's names."""
 
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,17 +20,17 @@ class ExportedError(RecordingError):
 
 
 def read_exported(path: Path, needs: Needs = ROBOT) -> Recording:
-    """Read a table in Parquet, arrays that NumPy saved, or a MAT-file of version 4 to 7, by the ending of its name.
+    """Read a table in Parquet, or arrays that NumPy saved, by the ending of its name.
 
     Raises:
         RecordingError: The file cannot be read, or holds no recording.
     """
     kind = path.suffix.lower()
     try:
-        arrays = unpacked(path) if kind == ".npz" else read_apart(path)
+        arrays = read_apart(path) if kind == ".parquet" else unpacked(path)
     except Exception as error:  # a damaged file can raise nearly anything
         raise ExportedError(f"{path} cannot be read: {in_words(error)}") from error
-    return _of_table(path, arrays, needs) if kind == ".parquet" else _of_arrays(path, arrays, needs)
+    return _of_table(path, arrays, needs) if kind == ".parquet" else _log(path, _flat(arrays), needs)
 
 
 def with_sidecar(recording: Recording, path: Path) -> Recording:
@@ -68,32 +67,18 @@ def _of_table(path: Path, flat: Arrays, needs: Needs) -> Recording:
     return _recording(path, description, columns)
 
 
-def _of_arrays(path: Path, arrays: Mapping[str, Any], needs: Needs) -> Recording:
-    numbers = {
-        name: array.astype(np.float64)
-        for name, array in arrays.items()
-        if array.dtype.kind in "biuf" and array.ndim in (1, 2) and len(array)
-    }
-    if KEY not in arrays:
-        flat: dict[str, Floats] = {}
-        for name, array in numbers.items():
-            if array.ndim == 1 or array.shape[1] == 1:
-                flat[name] = array.reshape(-1)
-            else:
-                flat |= {f"{name}_{index}": array[:, index] for index in range(array.shape[1])}
-        return _log(path, flat, needs)
-    description = _described(path, "".join(map(str, arrays[KEY].reshape(-1)[:1])))
-    columns = {}
-    for name, about in description.columns.items():
-        if name not in numbers:
-            raise ExportedError(f"{path} has no array {name}, which its description names")
-        array = numbers[name]
-        if array.size != len(array) * (1 if about.width is None else about.width):
-            raise ExportedError(
-                f"{path}: array {name} has the shape {array.shape}, not the one of its description"
-            )
-        columns[name] = array.reshape(-1) if about.width is None else array.reshape(len(array), about.width)
-    return _recording(path, description, columns)
+def _flat(arrays: Arrays) -> dict[str, Floats]:
+    """Columns for each entry of the arrays of numbers."""
+    flat: dict[str, Floats] = {}
+    for name, array in arrays.items():
+        if array.dtype.kind not in "biuf" or array.ndim not in (1, 2) or not len(array):
+            continue
+        numbers = array.astype(np.float64)
+        if array.ndim == 1 or array.shape[1] == 1:
+            flat[name] = numbers.reshape(-1)
+        else:
+            flat |= {f"{name}_{index}": numbers[:, index] for index in range(array.shape[1])}
+    return flat
 
 
 def _joined(parts: list[Floats], rows: int) -> Floats:

@@ -16,7 +16,7 @@ SHOWN = 4096
 def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs = ROBOT) -> Recording:
     """Read a recording of this controller, or a log of another one.
 
-    Recordings: MCAP, and what `tvist log export` writes (CSV, Parquet, npz, mat). Logs: CSV with RTDE's names, dumps of
+    Recordings: MCAP, and what `tvist log export` writes (CSV, Parquet). Logs: CSV with RTDE's names, dumps of
     UR's port 30003, rosbag2 in MCAP (a file, or its folder). CSV and dumps may be compressed by gzip.
 
     Args:
@@ -65,7 +65,7 @@ def _named(path: Path, needs: Needs) -> Recording | None:
         raise RecordingError(f"{path} is no MCAP file")
     if head.startswith(MCAP):
         return _read_mcap(path, needs)
-    if path.suffix.lower() in (".parquet", ".npz", ".mat"):
+    if path.suffix.lower() in (".parquet", ".npz"):
         from tvist_lab.recordings.exported import read_exported
 
         return read_exported(path, needs)
