@@ -77,15 +77,6 @@ def _parser() -> argparse.ArgumentParser:
     search.add_argument(
         "--flexible", action="store_true", help="Simulate the flexible arm in stops and streams, too."
     )
-    watch = part(
-        _monitor, "monitor", "Count which changes of hidden robots are noticed within three motions."
-    )
-    watch.add_argument("--robots", type=_up_to(1000), default=5, help="Number of hidden robots [5].")
-    watch.add_argument("--seed", type=_up_to(2**31 - 1), default=1, help="Seed of the first of them.")
-    watch.add_argument(
-        "--arms", nargs="+", default=["ur5e", "ur5-light"], help="Robot files [ur5e ur5-light]."
-    )
-    watch.add_argument("--shapers", nargs="+", default=["none", "zv"], help="Shapers [none zv].")
     ringing = part(_ringing, "ringing", "Judge the modes that are found in recorded and in made-up stops.")
     ringing.add_argument(
         "logs", nargs="*", type=Path, help="Logs, or folders of logs [the recorded stops among the tests]."
@@ -290,17 +281,6 @@ def _check_built_in(given: argparse.Namespace) -> None:
 
     if unknown := set(given.shapers or ()) - set(BUILT_IN.names()):
         given.refuse(f"there is no shaper {min(unknown)}")
-
-
-def _monitor(given: argparse.Namespace) -> int:
-    from proof.monitor.measure import CHANGES, measure
-
-    seeds = range(given.seed, given.seed + given.robots)
-    progress = _counted(len(seeds) * len(given.arms) * len(given.shapers) * len(CHANGES))
-    rows = measure(given.arms, seeds, given.shapers, progress)
-    columns = list(rows[0])
-    _print({"rows": rows}, given.json, [(columns, [[str(row[name]) for name in columns] for row in rows])])
-    return 0
 
 
 def _ringing(given: argparse.Namespace) -> int:

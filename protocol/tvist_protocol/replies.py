@@ -31,7 +31,6 @@ Code = Literal[
     "unknown_fault",
     "plant_failure",
     "payload_mismatch",
-    "model_mismatch",
     "unsupported_version",
     "script_error",
     "starting",
@@ -65,7 +64,6 @@ CODE_MEANINGS: dict[Code, str] = {
     "plant_failure": "the state of the simulated arm was no longer finite, or the controller has failed",
     "payload_mismatch": "the calibration was made with a payload other than the declared one, or the arm carries "
     "another",
-    "model_mismatch": "the arm has changed: a gear, or what rings after stops, is not what it was in motions before",
     "unsupported_version": "the server does not speak this version of the protocol",
     "script_error": "the text of a program is not valid; `where` is `text:LINE:COLUMN`",
     "starting": "the robot is not ready yet, as after an installation, when a start compiles; `why` says how far it is",

@@ -11,7 +11,6 @@ from tvist_controller.motion.filter_control import Filters
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import Planning
-from tvist_controller.safety.fit_monitor import FitMonitor
 from tvist_controller.safety.payload_monitor import PayloadMonitor
 from tvist_controller.setup import body
 from tvist_plant.description import RobotDescription
@@ -51,17 +50,11 @@ class DeclaredPayload:
         self._motion, self._filters, self._emit = motion, filters, emit
         self._description = motion.cycle.description
         self._monitor = PayloadMonitor(self._description, body(payload), follows=follows)
-        self._fit = FitMonitor(self._description, filters.source.calibration, body(payload))
-        self._rested = True
-        """Whether the shaped reference rested in the last tick."""
         self._held = False
         """Whether the brakes have held the arm since the last measurement of the drives."""
 
     def watch(self, sample: Sample) -> None:
-        """Warn if the arm does not carry the declared payload, or is not what it was before.
-
-        Neither can be checked while the brakes hold it.
-        """
+        """Warn if the arm does not carry the declared payload, which cannot be checked while the brakes hold it."""
         if self._motion.robot_mode is not RobotMode.RUNNING:
             self._held = True
             return
@@ -72,17 +65,11 @@ class DeclaredPayload:
         )
         if why is not None:
             self._emit("warning", code="payload_mismatch", why=why)
-        for code, changed in self._fit.update(sample, self._monitor.of_motion):
-            self._emit("warning", code=code, why=changed)
-        if self._rested and not sample.mode.at_rest:
-            self._monitor.begin_motion()
-        self._rested = sample.mode.at_rest
 
     def begin_anew(self) -> None:
         """Discard past measurements, since the arm was placed elsewhere or its power was off."""
         self._held = False
         self._monitor.reset()
-        self._fit.reset()
 
     def _declare(self, call: Call[SetPayload]) -> None:
         payload = _payload_of(call.command)
@@ -117,7 +104,6 @@ class DeclaredPayload:
         found = payload is not self.payload
         self._filters.declare(payload, tvist, found=found)
         self._monitor.declare(carried, found=found, told=beyond)
-        self._fit.declare(carried)
         self._held = False
 
     rows: ClassVar[tuple[Row, ...]] = (

@@ -59,8 +59,8 @@ def correlate(
         scratch: Scratch, shape (n+1, 28).
         friction: F of each joint, shape (n,) [N m].
         feedback: Sum of r over `EVERY` ticks, shape (n,) [N m]; set to zero.
-        fade: What is left of each memory after these ticks, shape (3,) [-].
-        sums: yᵀ W y [1/kg²], yᵀ W r [1/kg] and φ Σ |y_j| W_j F_j [1/kg] in each memory, shape (3, 3); changed.
+        fade: What is left of each memory after these ticks, shape (2,) [-].
+        sums: yᵀ W y [1/kg²], yᵀ W r [1/kg] and φ Σ |y_j| W_j F_j [1/kg] in each memory, shape (3, 2); changed.
     """
     per_kg = np.empty(q.shape[0])
     torques(chain, q, qd, qdd, GRAVITY, scratch, per_kg)
@@ -141,7 +141,7 @@ class PayloadMonitor:
         self._sum = np.zeros(description.joints)
         # Without this floor, a joint without friction would dominate the estimate.
         self._friction = np.maximum(drives.coulomb_friction, 0.01 * np.array(description.limits.torque))
-        self._fade = np.exp(-EVERY * PERIOD / np.array([MEMORY, RECENT, np.inf]))
+        self._fade = np.exp(-EVERY * PERIOD / np.array([MEMORY, RECENT]))
         self.declare(declared)
         still = np.zeros_like(self._sum)  # the first calls load compiled code, which takes many ticks
         add(still, still, still)
@@ -178,17 +178,8 @@ class PayloadMonitor:
         """Estimated mass error of the declaration, and its bound from friction, which may be infinite [kg]."""
         return self._estimate(0)
 
-    @property
-    def of_motion(self) -> tuple[float, float]:
-        """The same of all ticks since the present motion has begun, if the arm is judged at all [kg]."""
-        return self._estimate(2) if self._judges else (0.0, np.inf)
-
-    def begin_motion(self) -> None:
-        """Note that a motion begins."""
-        self._sums[:, 2] = 0.0
-
     def _estimate(self, memory: int) -> tuple[float, float]:
-        """The same with `MEMORY`, 0, with `RECENT`, 1, or of the whole motion, 2."""
+        """The same with `MEMORY`, 0, or with `RECENT`, 1."""
         square, product, bound = self._sums[:, memory].tolist()
         return (0.0, np.inf) if square <= 0.0 else (product / square, bound / square)
 

@@ -6,25 +6,17 @@ from functools import cache
 
 import numpy as np
 
-from tvist_controller.api.monitor import (
-    SIGNALS,
-    ChangeDetector,
-    FitMonitor,
-    LineMode,
-    PayloadMonitor,
-    Q,
-    Sample,
-)
+from tvist_lab.metrics.change_detector import ChangeDetector
+from tvist_lab.metrics.fit_monitor import LISTENED, SHORTEST, FitMonitor
 from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.ring_down import CERTAIN
 from tvist_lab.metrics.table import Measured, MotionResult
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription, load, robots
-from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Measurement
+from tvist_plant.plant import PERIOD
 
 NEEDED = ("target_q", "actual_q", "actual_moment", "target_moment", "actual_tool_accelerometer")
-"""Columns by which a recording is judged as the robot judges itself."""
+"""Columns by which the arm of a recording is compared with itself."""
 SAME = 0.1
 """Largest difference of any joint between two poses that count as one [rad]."""
 SCATTER, LEAST = 0.015, 0.04
@@ -34,7 +26,7 @@ SCATTER, LEAST = 0.015, 0.04
 def changes(measured: Measured) -> list[str]:
     """Return what has changed about the arm, a sentence each, in the order of the motions.
 
-    A recording of this controller is judged as the robot judges itself, see `FitMonitor`. Of a log of another one the
+    In a recording of this controller the arm is compared with its model, see `FitMonitor`. Of a log of another one the
     masses are not known: there the strongest mode after each stop is compared with those before in the same pose.
     """
     if not measured.motions:
@@ -47,7 +39,7 @@ def changes(measured: Measured) -> list[str]:
         and description.joints == recording.joints
         and abs(recording.period - PERIOD) < 1e-6
     ):
-        return list(_as_the_robot(recording, measured.motions, description))
+        return list(_by_model(recording, measured.motions, description))
     return list(_by_pose(recording, measured.motions, measured.results))
 
 
@@ -57,36 +49,21 @@ def _described(model: str) -> RobotDescription | None:
     return next((one for one in map(load, robots()) if one.robot.model == model), None)
 
 
-def _as_the_robot(
+def _by_model(
     recording: Recording, found: Sequence[MotionRows], description: RobotDescription
 ) -> Iterator[str]:
     said = recording.info.payload
-    payload = Payload(mass=said.mass, com=said.com, inertia=said.inertia)
-    felt, fit = PayloadMonitor(description, payload), FitMonitor(description, None, payload)
-    names = {name: recording[name] for name in NEEDED}
-    still, signals = np.zeros(description.joints), np.zeros((SIGNALS, description.joints))
-
-    def tick(row: int, mode: LineMode) -> list[str]:
-        q, moment = names["actual_q"][row], names["actual_moment"][row]
-        signals[Q] = names["target_q"][row]
-        if mode.at_rest:
-            felt.update(signals, names["target_moment"][row], moment, at_rest=True)
-        sample = Sample(
-            mode, signals[Q], (q, q, q), (q, q, q), signals, DriveCommand(signals[Q].copy(), still, still),
-            Measurement(q, still, moment, names["actual_tool_accelerometer"][row]),
-        )  # fmt: skip
-        return [why for _, why in fit.update(sample, felt.of_motion)]
-
+    arm = FitMonitor(description, Payload(mass=said.mass, com=said.com, inertia=said.inertia))
+    target, *measured = (recording[name] for name in NEEDED)
     for number, motion in enumerate(found, 1):
-        last = number - 1
-        said_in = tick(motion.start + 1, LineMode.SHAPED)
-        felt.begin_motion()
-        yield from (f"After motion {last}, {why}." for why in said_in)
-        if np.any(np.diff(recording["tick"][motion.shaped_stop : motion.end]) != 1.0):
-            fit.reset()  # of a rest with gaps nothing is known
+        first = motion.shaped_stop + 1
+        rest = slice(first, min(motion.end, first + LISTENED))
+        if rest.stop - first < SHORTEST:
             continue
-        for row in range(motion.shaped_stop + 1, motion.end):
-            yield from (f"After motion {number}, {why}." for why in tick(row, LineMode.REST))
+        if np.any(np.diff(recording["tick"][motion.shaped_stop : motion.end]) != 1.0):
+            continue  # of a rest with gaps nothing is known
+        changed = arm.stop(target[rest.stop - 1], *(column[rest] for column in measured))
+        yield from (f"After motion {number}, {why}." for why in changed)
 
 
 def _by_pose(

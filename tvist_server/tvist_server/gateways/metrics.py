@@ -146,9 +146,7 @@ class Metrics(Collector):
                     family.add_metric(labels, value)
                 yield family
         yield self._counted("tvist_events", "Events of each kind.", "kind")
-        yield self._counted(
-            "tvist_warnings", "Warnings of each code; with model_mismatch, the arm has changed.", "code"
-        )
+        yield self._counted("tvist_warnings", "Warnings of each code.", "code")
 
     def _counted(self, name: str, what: str, label: str) -> "Metric":
         """Return how many events or warnings there were of each kind or code."""

@@ -1,19 +1,16 @@
 """How far the modes that ring after a stop are from those that a model of the arm has there."""
 
 import math
-from collections.abc import Generator, Iterable
-from contextlib import suppress
+from collections.abc import Iterable
 
 import numpy as np
 
-from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.calibrations.modal import drivetrain, mass_matrix
-from tvist_controller.line.differentiator import Floats
+from tvist_controller.api.line import mass_matrix
+from tvist_lab.recordings import Floats
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.imperfections import YieldingBase, on_base
 from tvist_plant.model import Integers, flexible_model
 from tvist_plant.plant import PERIOD
-from tvist_protocol.calibration import Calibration
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
@@ -40,67 +37,24 @@ VAGUE = 0.1
 """Standard error from which on a stop says nothing of the factor: it did not ring."""
 FIRST = 8
 """Number of stops by which the stiffness of the base is found."""
-PIECE = 4
-"""Number of factors that are tried at a time."""
 
 
-@compiled_for_ticks
-def describe(f_d: Floats, zeta: Floats, T: int, columns: Floats) -> int:
-    """Write a constant, a slow tail, and cosine and sine of each mode into the first rows; return their number."""
-    used = 2
-    for t in range(T):
-        columns[0, t], columns[1, t] = 1.0, math.exp(-SLOW_POLE * PERIOD * t)
-    for k in range(f_d.shape[0]):
-        if f_d[k] > HIGHEST:
-            continue
-        turn = 2.0 * math.pi * f_d[k] * PERIOD
-        fade = math.exp(-turn * zeta[k] / math.sqrt(1.0 - zeta[k] * zeta[k]))
-        c, s, x, y = fade * math.cos(turn), fade * math.sin(turn), 1.0, 0.0
-        for t in range(T):
-            columns[used, t], columns[used + 1, t] = x, y
-            x, y = c * x - s * y, s * x + c * y
-        used += 2
-    return used
-
-
-@compiled_for_ticks
-def along(a: Floats, b: Floats) -> float:
-    """Scalar product of two rows."""
-    product = 0.0
-    for t in range(a.shape[0]):
-        product += a[t] * b[t]
-    return product
-
-
-@compiled_for_ticks
-def unexplained(alpha: Floats, f_d: Floats, zeta: Floats, columns: Floats) -> float:
-    """Return what modes, a constant and a slow tail leave of a ring-down, as a sum of squares [m²/s⁴].
+def unexplained(alpha: Floats, f_d: Floats, zeta: Floats) -> Floats:
+    """Return what modes, a constant and a slow tail leave of a ring-down, for each factor in `SCALES` [m²/s⁴].
 
     Args:
         alpha: Readings of the accelerometer from `SKIP` ticks after the stop on, shape (T, 3) [m/s²].
-        f_d: Damped frequencies, shape (k,) [Hz].
+        f_d: Damped frequencies before they are scaled, shape (k,) [Hz].
         zeta: Damping ratios, shape (k,) [-].
-        columns: Scratch, shape (2 k + 5, at least T).
     """
-    T, left = alpha.shape[0], 0.0
-    used = describe(f_d, zeta, T, columns)
-    for axis in range(3):
-        for t in range(T):
-            columns[used + axis, t] = alpha[t, axis]
-    for i in range(used + 3):  # Gram and Schmidt's, modified: each row loses what the rows before explain
-        row = columns[i, :T]
-        before = along(row, row)
-        for j in range(min(i, used)):
-            product = along(row, columns[j, :T])
-            for t in range(T):
-                row[t] -= product * columns[j, t]
-        after = along(row, row)
-        if i >= used:
-            left += after
-        else:
-            inverse = 1.0 / math.sqrt(after) if after > 1e-10 * before else 0.0
-            for t in range(T):
-                row[t] *= inverse
+    time, left = PERIOD * np.arange(len(alpha)), np.empty(len(SCALES))
+    common = [np.ones_like(time), np.exp(-SLOW_POLE * time)]
+    for place, scale in enumerate(np.exp(SCALES)):
+        known = scale * f_d <= HIGHEST
+        omega, ratio = 2.0 * np.pi * scale * f_d[known], zeta[known]
+        waves = np.exp(np.outer(1j * omega - omega * ratio / np.sqrt(1.0 - ratio * ratio), time))
+        basis, _ = np.linalg.qr(np.vstack([common, waves.real, waves.imag]).T)
+        left[place] = np.sum((alpha - basis @ (basis.T @ alpha)) ** 2)
     return left
 
 
@@ -113,41 +67,22 @@ class RingListener:
     found once, as the likeliest one for the first `FIRST` stops.
 
     Args:
-        description: The robot.
-        calibration: Springs and drives, if it is modal; else those of the robot file are taken.
-        payload: Payload that the arm is assumed to carry.
+        description: The robot, with its springs and drives.
+        payload: Payload that the arm carries.
     """
 
-    def __init__(
-        self, description: RobotDescription, calibration: Calibration | None, payload: Payload
-    ) -> None:
+    def __init__(self, description: RobotDescription, payload: Payload) -> None:
         arm = flexible_model(description, payload)
-        self._flexible = on_base(arm, YieldingBase())
-        known = None
-        if (
-            calibration is not None
-            and calibration.modal is not None
-            and calibration.robot == description.robot.model
-        ):
-            known = drivetrain(calibration.modal.parameters, description, arm).rows
-        rows = _of_file(description, arm.joints, arm.model.nv) if known is None else known
-        mass = mass_matrix(self._flexible)
+        rows = _of_file(description, arm.joints, arm.model.nv)
+        mass = mass_matrix(on_base(arm, YieldingBase()))
         self._models = [
             Modal(mass, _standing(rows, float(base)), modes=min(MODES, len(rows[0]))) for base in BASES
         ]
-        self._columns = np.empty((2 * MODES + 5, 1024))
         self._heard: list[Floats] = []
         self._base: int | None = None
-        unexplained(np.zeros((4, 3)), np.ones(1), 0.1 * np.ones(1), self._columns)
-        with suppress(EstimatorError):  # the first call loads compiled code, which takes many ticks
-            self._models[0].settle(np.zeros(description.joints))
 
-    def declare(self, payload: Payload) -> None:
-        """Assume another payload."""
-        self._flexible.carry(payload)
-
-    def study(self, alpha: Floats, q: Floats) -> Generator[None, None, list[tuple[float, float]]]:
-        """Compare a ring-down with the modes in a pose, in pieces of some 0.1 ms, but 0.6 ms for the modes.
+    def study(self, alpha: Floats, q: Floats) -> list[tuple[float, float]]:
+        """Compare a ring-down with the modes in a pose.
 
         Args:
             alpha: Readings of the accelerometer in the flange's axes, with gravity, from the stop on, shape (T, 3)
@@ -158,23 +93,16 @@ class RingListener:
             u and its standard error [-]: none if the stop did not ring, or the base is yet to be found; of all stops
             so far with the one by which it is found.
         """
-        alpha, count = alpha[SKIP : self._columns.shape[1]], alpha[SKIP : self._columns.shape[1]].size
+        alpha = alpha[SKIP:]
         if not np.isfinite(alpha).all():  # as of a log in which the accelerometer has a gap
             return []
-        chosen = range(len(BASES)) if self._base is None else [self._base]
-        left = np.empty((len(chosen), len(SCALES)))
-        for row, base in enumerate(chosen):
-            try:
-                f_d, zeta = self._models[base].settle(q)
-            except EstimatorError:  # so much damping that the arm does not vibrate there
-                return []
-            yield
-            for place, scale in enumerate(np.exp(SCALES)):
-                left[row, place] = unexplained(alpha, scale * f_d, zeta, self._columns)
-                if place % PIECE == PIECE - 1:
-                    yield
-        left = np.maximum(left, 1e-12 * count)
-        likely = -0.5 * count / COLOUR * np.log(left / left.min())
+        chosen = self._models if self._base is None else [self._models[self._base]]
+        try:
+            left = np.array([unexplained(alpha, *model.settle(q)) for model in chosen])
+        except EstimatorError:  # so much damping that the arm does not vibrate there
+            return []
+        left = np.maximum(left, 1e-12 * alpha.size)
+        likely = -0.5 * alpha.size / COLOUR * np.log(left / left.min())
         if self._base is not None:
             return _certain([likely[0]])
         self._heard.append(likely)

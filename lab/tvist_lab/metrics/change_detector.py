@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.line.differentiator import Floats
+from tvist_lab.recordings import Floats
 
 WINDOWS = (2, 3, 5, 8)
 """Numbers of latest measurements that are compared with those before; one alone may be an accident, and a small change
