@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.conformance.served import PATIENCE
 from tests.view.browser import Page, browser
-from tools.one_mass import STEP, swing
+from tests.view.one_mass import STEP, swing
 
 frequencies, dampings = st.floats(3.0, 10.0), st.floats(0.0, 0.3)
 
