@@ -30,8 +30,7 @@ INSTEAD = {
     "check-script": "tvist run --check",
     "kernels": "tvist serve --compile",
     "sensitivity": "tvist shapers --sensitivity",
-    "search": "python -m proof search, in a checkout",
-    "bound": "python -m proof bound, in a checkout",
+    "search": "make search, in a checkout",
 }
 """What does the work of a removed command, by its old name. No entry hides a command that exists."""
 _ANGLES = re.compile(r"-[\d.][^=/]*,.*")

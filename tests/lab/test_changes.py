@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from proof.monitor.changing_arm import Change
-from proof.monitor.measure import Worker
+from tests.lab.changing_arm import Change
+from tests.lab.worker import Worker
 
 from tvist_lab.metrics import Measured, changes, motions
 from tvist_lab.recordings import Recording
@@ -19,20 +19,15 @@ PEOPLE = "look whether mount, base, a joint or the tool is loose, or whether ano
 
 
 def recorded(change, before=8, after=4):
-    worker, states = Worker("ur5e", "none", 4, None), []
-    controller, tick = worker._controller, worker._tick
-
-    def kept():
-        tick()
-        states.append(controller.latest)
-
-    worker._tick = kept
+    worker = Worker("ur5e", 4)
     for number in range(before + after):
         if number == before:
             worker.arm.change(change)
         worker.move()
-    columns = {name: np.array([getattr(state, name) for state in states], dtype=float) for name in COLUMNS}
-    info = SimpleNamespace(model="UR5e", payload=controller.declared)
+    columns = {
+        name: np.array([getattr(state, name) for state in worker.states], dtype=float) for name in COLUMNS
+    }
+    info = SimpleNamespace(model="UR5e", payload=worker.controller.declared)
     recording = Recording(columns, (), info)
     found = motions(recording)
     assert len(found) == before + after
@@ -40,7 +35,7 @@ def recorded(change, before=8, after=4):
 
 
 def test_a_payload_that_was_picked_up_is_told_with_its_mass():
-    said = changes(recorded(Change("", mass=2.0)))
+    said = changes(recorded(Change(mass=2.0)))
     (mass,) = [one for one in said if "kg" in one]
     number, more = re.match(
         r"After motion (\d+), the arm carries about ([\d.]+) kg more than in", mass
@@ -50,7 +45,7 @@ def test_a_payload_that_was_picked_up_is_told_with_its_mass():
 
 
 def test_of_an_arm_that_stays_as_it_was_nothing_is_told():
-    assert changes(recorded(Change(""), after=2)) == []
+    assert changes(recorded(Change(), after=2)) == []
 
 
 def by_hand(f_d, poses):

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from proof.search.subject import Subject
 from scipy.spatial.transform import Rotation
+from tests.search.subject import Subject
 
 from tvist_controller import calibrations
 from tvist_controller.setup import paper_payload

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from proof.search.subject import RigidArm
+from tests.search.subject import RigidArm
 
 from tvist_lab.studies.tracking.following import BEFORE, LOOKAHEAD, TrackingError, follow
 from tvist_lab.studies.tracking.study import (
