@@ -63,15 +63,15 @@ async def asked(process: Process, words: str) -> float:
 
 
 def observers(endpoint: str, robot: str, count: str) -> None:
-    """Read every state, each observer over a connection of its own."""
+    """Read every state of a robot, or of all (`*`), each observer over a connection of its own."""
     sessions = [open_session(endpoint) for _ in range(int(count))]
 
     def read(sample: zenoh.Sample) -> None:
         decode_state(sample.payload.to_bytes())
 
     for session in sessions:
-        session.declare_subscriber(keys.state(robot), Callback(read, indirect=False))
-        list(session.get(keys.info(robot)))  # goes the same way as the subscription
+        session.declare_subscriber(f"{keys.PREFIX}/{robot}/state", Callback(read, indirect=False))
+        list(session.get(f"{keys.PREFIX}/{robot}/info"))  # goes the same way as the subscription
     print("ready", flush=True)
     sys.stdin.read()
     for session in sessions:

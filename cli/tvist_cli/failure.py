@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 from tvist_client.errors import ClientError
 from tvist_plant.user_file import UserFileError
-from tvist_protocol.errors import ProtocolError, TvistError
+from tvist_protocol.errors import ProtocolError, TvistError, one_line
 
 
 class Failure(Exception):  # noqa: N818  the plain word for it
@@ -35,9 +35,9 @@ def told(*errors: type[Exception], code: int = 1) -> Iterator[None]:
     try:
         yield
     except UserFileError as error:
-        raise Failure(str(error)) from error
+        raise Failure(one_line(str(error))) from error
     except kinds as error:
-        raise Failure(_sentence(error), code=code) from error
+        raise Failure(one_line(_sentence(error)), code=code) from error
 
 
 def _sentence(error: Exception) -> str:

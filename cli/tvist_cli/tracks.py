@@ -59,12 +59,12 @@ class Shows:
 def recorded(file: Path) -> Shows:
     """The run in a recording."""
     from tvist_lab.recordings import RecordingError
-    from tvist_lab.recordings.mcap_file import read
+    from tvist_lab.recordings.mcap_file import read_checked
     from tvist_view.look import GeometryError
     from tvist_view.track import Shown, Track, TrackError
 
     with told(RecordingError, TrackError, GeometryError, ValueError):
-        content = read(file)
+        content = read_checked(file)
         return Shows(file.stem, [Track(Shown(file.stem, _look_of(content)), content.states, content.truths)])
 
 
@@ -74,14 +74,14 @@ def repeated(file: Path) -> Shows:
 
     from tvist_lab.metrics import Measured, pairs
     from tvist_lab.recordings import RecordingError
-    from tvist_lab.recordings.mcap_file import read
+    from tvist_lab.recordings.mcap_file import read_checked
     from tvist_plant.plant import PERIOD
     from tvist_view.look import GeometryError
     from tvist_view.playback import said
     from tvist_view.track import Shown, Track, TrackError
 
     with told(RecordingError, TrackError, GeometryError, ValueError):
-        content = read(file)
+        content = read_checked(file)
         measured = Measured.of(content.recording)
         found = [one for one in pairs(measured) if one.change.less_percent is not None]
         if not found:

@@ -28,6 +28,10 @@ from tvist_protocol.recorded import THIS_BEHAVIOUR
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording.recorder import Recorder
 
+ALWAYS, PER_STATE = 30_000, 100
+"""Number of ticks that a recording may have, a minute, and how many more for each of its states: a tick takes time in a
+replay even if its state is missing."""
+
 
 class ReplayError(TvistError):
     """A recording cannot be replayed; the message says why."""
@@ -105,6 +109,11 @@ def replay_file(
         )
     if (content.dropped or {}).get("journal"):
         raise ReplayError("the recorder dropped messages of the journal, so an equal run is not possible")
+    last, there = int(content.recording["tick"][-1]), len(content.recording)
+    if last > (most := ALWAYS + PER_STATE * there):
+        raise ReplayError(
+            f"the recording goes on to tick {last}, but of {there} states at most {most} are replayed"
+        )
     used, notes = _used(content.start, own_shapers)
     plant, said = _same_plant(content.start, plant)
     notes += said

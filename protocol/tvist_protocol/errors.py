@@ -12,6 +12,8 @@ from tvist_protocol.replies import Code, Refused
 
 SHOWN = 60
 """Largest number of characters of a sender's text that a message repeats."""
+LONGEST = 900
+"""Largest number of characters of a message about a file."""
 HARMFUL: Final = re.compile(
     r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )
@@ -65,10 +67,15 @@ def harmless(text: str) -> str:
     return HARMFUL.sub("\N{REPLACEMENT CHARACTER}", text)
 
 
-def short(text: str) -> str:
+def short(text: str, most: int = SHOWN) -> str:
     """Make a sender's text safe for a message: printable and shortened."""
-    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text[:SHOWN])
-    return shown if len(text) <= SHOWN else f"{shown}…"
+    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text[:most])
+    return shown if len(text) <= most else f"{shown}…"
+
+
+def one_line(text: str) -> str:
+    """Make a message that repeats text of a file safe to show: one printable line, shortened."""
+    return short(re.sub(r"\s", " ", text), LONGEST)
 
 
 def quoted(value: object) -> str:

@@ -62,7 +62,7 @@ CODE_MEANINGS: dict[Code, str] = {
     "unknown_estimator": "there is no estimator of this name",
     "unknown_calibration": "there is no calibration of this name; `info` lists them",
     "unknown_fault": "there is no fault of this name, or the plant cannot simulate it; the faults are listed below",
-    "plant_failure": "the state of the simulated arm was no longer finite",
+    "plant_failure": "the state of the simulated arm was no longer finite, or the controller has failed",
     "payload_mismatch": "the calibration was made with a payload other than the declared one, or the arm carries "
     "another",
     "model_mismatch": "the arm has changed: a gear, or what rings after stops, is not what it was in motions before",

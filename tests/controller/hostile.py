@@ -1,16 +1,12 @@
 """Hostile programs from seeds: every dear function in loops, threads and secondary programs, at edges of arguments."""
 
+import re
 from random import Random
 
 import numpy as np
 
 from tvist_controller.dispatch.planner import Planner
-from tvist_controller.programs.functions.motions import MotionFunctions
-from tvist_controller.programs.functions.settings import SettingFunctions
-from tvist_controller.programs.functions.unsimulated import SUBJECTS
-from tvist_controller.programs.library import known_signatures
 from tvist_protocol.programs import ProgramRun
-from tvist_urscript import names
 
 from .robots import UR5E
 from .scripts import URSIM, a_robot
@@ -155,69 +151,28 @@ def begin(seed: int):
     return robot, beside, texts
 
 
-# ---------------------------------------------------------------- odd numbers
-
-NUMBERS = (
-    *(
-        "0",
-        "1",
-        "-1",
-        "0.5",
-        "2",
-        "1e-300",
-        "1e-12",
-        "1e-9",
-        "-1e-3",
-        "0.002",
-        "0.03",
-        "0.999999",
-        "7",
-        "100",
-    ),
-    *("999.9", "1000", "-1000", "1e5", "1e8", "-1e8", "2147483647", "1e160", "-1e160", "1e300", "1e308"),
+ODD = (
+    *("0", "-1", "1e-300", "1e-9", "0.999999", "7", "100"),
+    *("-1000", "1e5", "1e8", "-1e8", "1e160", "-1e160", "1e308"),
 )
-POSE = frozenset({"pose", "pose_via", "pose_to", "x", "goal", "tcp", "task_frame", "feature"})
-POSTURE = frozenset({"q", "qnear", "qNear"})
-LISTS = {"d": "0 0 9.82", "cog": "0.01 0 0.05", "sensor_cog": "0 0 0.05", "sensor_measuring_offset": "0 0 0.1",
-         "selection_vector": "0 0 1 0 0 1", "freeAxes": "1 1 1 0 0 0", "qd": "0.1 0 -0.2 0 0 0.1",
-         "xd": "0 0.05 0 0 0 0.1", "wrench": "0 0 -10 0 0 0", "limits": "0.1 0.1 0.1 0.3 0.3 0.3",
-         "inertia": "0.01 0.01 0.01 0 0 0", "direction": "0 0 -1 0 0 0"}  # fmt: skip
-PLAIN = {"r": "0.01", "t": "0.1", "lookahead_time": "0.1", "gain": "300", "v": "0.3", "damping": "0.5"}
-SETTINGS, MOTIONS = names(SettingFunctions), names(MotionFunctions)
-WAITING = {"socket_open", "socket_read_string", "interpreter_mode", "popup", "rtde_set_watchdog"}
-OTHERS = sorted(set(known_signatures()) - WAITING - set(SUBJECTS) - set(SETTINGS) - set(MOTIONS))
+SETTINGS = (
+    *("set_tcp(p[0, 0.01, 0.1, 0, 0, 0.5])", "set_payload(1.5, [0, 0.02, 0.05])", "set_payload_mass(2)", "force()"),
+    *("set_target_payload(1, [0, 0, 0.05], [0.01, 0.01, 0.01, 0, 0, 0], 0.01)", "set_payload_cog([0, 0, 0.1])"),
+    *("get_inverse_kin({safe}, {q}, 0, 0, p[0, 0, 0.1, 0, 0, 0])", "get_jacobian({q})", "tool_contact()"),
+    *("force_mode({safe}, [0, 0, 1, 0, 0, 0], [0, 0, -5, 0, 0, 0], 2, [0.1, 0.1, 0.1, 0.3, 0.3, 0.3])", "servoj({q})"),
+    *("ft_rtde_input_enable(True, 0.5, [0, 0, 0.1], [0, 0, 0.05])", "movel(p[-0.2, -0.3, 0.3, 2, 2, 0], r=0.01)"),
+    *("movec({safe}, p[-0.1, -0.4, 0.3, 2, 2, 0], 1, 0.2)", "optimovej({q}, 0.5, 0.5)", "speedl([0, 0.1, 0, 0, 0, 0])"),
+)  # fmt: skip
 
 
 def odd(seed: int) -> str:
-    """A program that sets the robot up and moves it, with some odd numbers among plausible ones."""
-    r, signatures = Random(seed), known_signatures()
-    oddness = r.choice((0.02, 0.1, 0.3))
-
-    def number(plain) -> str:
-        return r.choice(NUMBERS) if r.random() < oddness else str(plain)
-
-    def numbers(values) -> str:
-        return f"[{', '.join(map(number, values))}]"
-
-    def posture() -> str:
-        return numbers(round(angle + r.uniform(-0.3, 0.3), 3) for angle in URSIM)
-
-    def pose() -> str:
-        if r.random() < 0.3:
-            return f"pose_trans(get_target_tcp_pose(), p{numbers([0.02, -0.02, -0.05, 0, 0, 0.1])})"
-        return f"p{numbers((round(r.uniform(-0.4, 0.1), 3), -0.35, round(r.uniform(0.1, 0.4), 3), 2.2, 2.2, 0.1))}"
-
-    def argument(name: str) -> str:
-        if name in POSE | POSTURE:
-            return pose() if (name in POSE) == (r.random() < 0.8) else posture()
-        return numbers(LISTS[name].split()) if name in LISTS else number(PLAIN.get(name, 1))
-
-    def call(name: str) -> str:
-        known = [one.name for one in signatures[name].parameters]
-        given = known[: r.randint(signatures[name].required, len(known))]
-        return f"  x = {name}({', '.join(map(argument, given))})"
-
-    lines = [call(r.choice(SETTINGS)) for _ in range(r.randrange(3))]
-    lines += [call(r.choice((r.choice(OTHERS), "force_mode"))) for _ in range(r.randrange(2))]
-    lines += [call(r.choice(MOTIONS)) for _ in range(r.randrange(1, 5))]
-    return "\n".join(("def odd():", *lines, "end", ""))
+    """A program that sets the robot up and moves it, with odd numbers among plausible ones."""
+    r = Random(seed)
+    share = r.choice((0.02, 0.1, 0.3))
+    lines = [r.choice((r.choice(SETTINGS), r.choice(MOVES))) for _ in range(r.randrange(1, 7))]
+    near = [round(angle + r.uniform(-0.3, 0.3), 3) for angle in URSIM]
+    text = "\n".join(lines).format(q=near, safe=POSES[0], a=1.4, v=1.05, s=0.1, gain=300, lag=0.1)
+    odd_one = re.sub(
+        r"(?<![\w.])-?\d[\d.]*", lambda found: r.choice(ODD) if r.random() < share else found[0], text
+    )
+    return f"def odd():\n{HEAD}\n{odd_one}\nend\n"

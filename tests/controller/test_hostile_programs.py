@@ -50,10 +50,8 @@ class Counts:
         return found
 
 
-@pytest.mark.parametrize("seed", [*range(12), 12, 93, 156])
-def test_no_tick_spends_more_than_the_budget_whatever_the_programs_do(seed, monkeypatch):
-    """All programs of the robot together; a statement that a tick began late is borne by the next one."""
-    robot, beside, _ = begin(seed)
+def spending(monkeypatch):
+    """Count the evaluations of all machines."""
     spent, resume = [0], Machine.resume
 
     def counted(machine, budget=EVALUATIONS):
@@ -62,6 +60,14 @@ def test_no_tick_spends_more_than_the_budget_whatever_the_programs_do(seed, monk
         return max(machine.left, 0)
 
     monkeypatch.setattr(Machine, "resume", counted)
+    return spent
+
+
+@pytest.mark.parametrize("seed", [*range(12), 12, 93, 156])
+def test_no_tick_spends_more_than_the_budget_whatever_the_programs_do(seed, monkeypatch):
+    """All programs of the robot together; a statement that a tick began late is borne by the next one."""
+    robot, beside, _ = begin(seed)
+    spent = spending(monkeypatch)
     solved = Counts(
         monkeypatch, type(robot.controller.programs.arm._access.motion.cycle.line.dynamics), "inertia"
     )

@@ -3,6 +3,7 @@
 import contextlib
 
 import numpy as np
+import polars as pl
 import pytest
 from tests.lab.synthetic_logs import SyntheticLog
 
@@ -455,15 +456,15 @@ def test_names_of_other_vendors_are_recognised_with_their_units_and_said(tmp_pat
 @pytest.mark.parametrize("comma", [False, True])
 def test_a_file_without_a_header_is_read_by_the_places_of_its_columns(tmp_path, separator, comma):
     t = 0.01 * np.arange(300)
-    table = np.column_stack([np.arange(300), t, np.sin(t), np.cos(t), 20 * t])
+    table = np.column_stack([np.arange(300), t, np.sin(t), np.cos(t), 20 * t, 9 * t])
     lines = [separator.join(f"{value:.6f}" for value in row) for row in table]
     path = tmp_path / "log.txt"
     path.write_text("\n".join(line.replace(".", ",") if comma else line for line in lines) + "\n")
     if comma and separator == ",":
         with pytest.raises(RecordingError, match="row"):  # nobody can tell these commas apart
-            read(path, "time=2,q=3-4:rad,target_q=5-5:deg")
+            read(path, "time=2,q=3-4:rad,target_q=5-6:deg")
         return
-    found = read(path, "time=2,q=3-4:rad,target_q=5-5:deg")
+    found = read(path, "time=2,q=3-4:rad,target_q=5-6:deg")
     assert len(found) == 300
     assert found.time == pytest.approx(t, abs=1e-6)
     assert found["actual_q"] == pytest.approx(table[:, 2:4], abs=1e-6)
@@ -478,13 +479,28 @@ def test_places_that_a_file_does_not_have_are_refused_with_those_that_it_has(tmp
         read(path, columns)
 
 
-def test_names_for_a_file_that_has_its_own_are_not_used_and_a_note_says_so(tmp_path):
-    t = 0.002 * np.arange(100)
-    path = tmp_path / "log.npz"
-    np.savez(path, timestamp=t, actual_q=np.column_stack([np.sin(t), np.cos(t)]))
-    found = read(path, "q=joint_{}:deg")
-    assert found["actual_q"][:, 0] == pytest.approx(np.sin(t))
+def test_names_for_a_recording_that_has_its_own_are_not_used_and_a_note_says_so(tmp_path):
+    found = read(SyntheticLog(motions=1).dump(tmp_path / "log"), "q=joint_{}:deg")
     assert found.notes[-1] == "its columns have names, so those given were not used"
+
+
+@pytest.mark.parametrize("kind", ["lists", "arrays", "npz"])
+def test_vectors_of_a_table_are_read_under_any_name_and_named_when_they_are_not(tmp_path, kind):
+    t = 0.002 * np.arange(100)
+    q = np.column_stack([np.sin(t), np.cos(t)])
+    path = tmp_path / ("log.npz" if kind == "npz" else "log.parquet")
+    if kind == "npz":
+        np.savez(path, stamp=t, **{"observation.state": q})
+    else:
+        lists = pl.Series("observation.state", q, dtype=pl.Array(pl.Float64, 2))
+        lists = lists if kind == "arrays" else lists.arr.to_list()
+        pl.DataFrame([pl.Series("stamp", t), lists]).write_parquet(path)
+    with pytest.raises(
+        RecordingError, match=r"columns are stamp, observation\.state_0, observation\.state_1"
+    ):
+        read(path)
+    found = read(path, "time=stamp,q=observation.state_{}:rad")
+    assert found["actual_q"] == pytest.approx(q)
 
 
 @pytest.mark.filterwarnings("error")

@@ -7,7 +7,9 @@ memory without end, ends the child and not the tests. The file at fault remains 
 import os
 import resource
 import signal
+import struct
 import sys
+import warnings
 from importlib import resources
 from pathlib import Path
 
@@ -15,7 +17,7 @@ import numpy as np
 import pytest
 from tests import forked
 
-SECONDS = 10
+SECONDS = 5
 """Longest processor time for one file, some hundred times what a good one takes [s]."""
 MEMORY = 1 << 30
 """Largest memory that reading may add to what the good files took [bytes]."""
@@ -24,16 +26,18 @@ TREE = Path(__file__).parents[2]
 NUMBERS = (
     b"1e308", b"-1e308", b"1e999", b"nan", b"-inf", b"null", b"-1", b"0", b"2.5", b"9" * 20, b"-" + b"9" * 400,
     b"9" * 5000, b"1e-320", b"99999999", b"[]", b'"x"', b"1,5", b"true", b"0x7f", b"\xff", b"",
+    b"1e300", b"-1e160", b"10000000", b"1e18",
 )  # fmt: skip
 WHOLE = (
     0, 1, 0x7F, 0xFF, 0xFFFF, 10**6, 10**9, 2**31 - 1, 2**31, 2**32 - 1, 10**13, 2**40, 2**63 - 1, 2**64 - 1,
 )  # fmt: skip
+FLOATS = (1e300, -1e160, 1e18, 1e7, 0.0, -1.0, 5e-324, float("nan"), float("-inf"))
 BEGINNINGS = (b"[", b"{", b"<a>", b'"', b"\0", b"\xff\xfe", b"#", b"\n", b",", b"\x1b]0;x\x07", b"(", b"a.")
 
 
-def mutated(data: bytes, random: np.random.Generator) -> bytes:
-    """Change a file in one to three ways."""
-    for _ in range(int(random.integers(1, 4))):
+def mutated(data: bytes, random: np.random.Generator, most: int = 3) -> bytes:
+    """Change a file in one to so many ways."""
+    for _ in range(int(random.integers(1, most + 1))):
         data = MUTATIONS[int(random.integers(len(MUTATIONS)))](bytearray(data), random)
     return data
 
@@ -109,6 +113,15 @@ def resized(data: bytearray, random: np.random.Generator) -> bytes:
     return bytes(data)
 
 
+def refloated(data: bytearray, random: np.random.Generator) -> bytes:
+    """Overwrite what could be a float."""
+    place = int(random.integers(len(data) + 1))
+    place -= place % int(random.choice([1, 4]))
+    value = FLOATS[int(random.integers(len(FLOATS)))]
+    data[place : place + 8] = struct.pack("<d" if random.random() < 0.5 else ">d", value)
+    return bytes(data)
+
+
 def shuffled(data: bytearray, random: np.random.Generator) -> bytes:
     """Exchange, repeat or drop lines."""
     lines = bytes(data).splitlines(keepends=True)
@@ -122,7 +135,7 @@ def shuffled(data: bytearray, random: np.random.Generator) -> bytes:
     return b"".join(lines)
 
 
-MUTATIONS = (flipped, cut, removed, doubled, overwritten, inserted, renumbered, resized, shuffled)
+MUTATIONS = (flipped, cut, removed, doubled, overwritten, inserted, renumbered, resized, shuffled, refloated)
 
 
 def _log():
@@ -144,15 +157,15 @@ def _dump(folder):
     return [_log().dump(folder / "dump", size=size) for size in (1116,)]
 
 
-def _rosbag(folder):
+def _repacked(whole, folder, compression):
+    """Copy an MCAP file; without compression, a changed byte changes a value."""
     from mcap.writer import CompressionType, Writer
 
     from tvist_lab.recordings.mcap_records import records
 
-    whole = _log().rosbag(folder / "bag") / "bag.mcap"
-    plain = folder / "plain.mcap"
-    with whole.open("rb") as source, plain.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.NONE, enable_crcs=False)
+    path = folder / f"{compression}.mcap"
+    with whole.open("rb") as source, path.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType[compression], enable_crcs=False)
         writer.start()
         for record in records(source):
             match type(record).__name__:
@@ -162,46 +175,41 @@ def _rosbag(folder):
                     writer.register_channel(record.topic, record.message_encoding, record.schema_id)
                 case "Message":
                     writer.add_message(record.channel_id, record.log_time, record.data, record.publish_time)
+                case "Metadata":
+                    writer.add_metadata(record.name, record.metadata)
         writer.finish()
-    return [whole, plain]
+    return path
+
+
+def _rosbag(folder):
+    whole = _log().rosbag(folder / "bag") / "bag.mcap"
+    return [whole, _repacked(whole, folder / "bag", "NONE")]
 
 
 def _mcap(folder):
-    from mcap.writer import CompressionType, Writer
-    from tests.lab.test_mcap_file import INFO, START, TRUTH, msgspec, record, states
+    from tests.lab.test_mcap_file import TRUTH, msgspec, record, states
 
     from tvist_protocol import Event
-    from tvist_protocol.recorded import to_json, topics
-    from tvist_server.recording.writer import heading
 
-    messages = [
+    whole = record(folder / "zstd.mcap", [
         *states(30), *(msgspec.structs.replace(TRUTH, tick=tick) for tick in range(1, 9)),
         Event(tick=9, kind="motion_started", id=1),
-    ]  # fmt: skip
-    found = [record(folder / "zstd.mcap", messages)]
-    for compression in (CompressionType.LZ4, CompressionType.NONE):
-        path = folder / f"{compression.name}.mcap"
-        with path.open("wb") as stream:
-            writer = Writer(stream, compression=compression, enable_crcs=False)
-            writer.start()
-            writer.add_metadata("tvist", heading(INFO, START))
-            channels = {
-                kind: writer.register_channel(topic, "json", 0) for kind, topic in topics(INFO.name).items()
-            }
-            for message in messages:
-                at = message.tick * 2_000_000
-                writer.add_message(channels[type(message)], at, to_json(message), at)
-            writer.finish()
-        found.append(path)
-    return found
+    ])  # fmt: skip
+    return [whole, _repacked(whole, folder, "LZ4"), _repacked(whole, folder, "NONE")]
 
 
-def _exported(folder, kind):
+def _logs(folder):
+    (folder / "run").mkdir()
+    run = _repacked(TREE / "tests" / "journals" / "live_lost_lease.mcap", folder / "run", "NONE")
+    return [*_csv(folder), *_dump(folder), *_rosbag(folder), *_mcap(folder), run]
+
+
+def _exported(folder):
     from tests.lab.test_export import recording
 
     from tvist_lab.recordings.export import export
 
-    export(recording(), path := folder / f"run.{kind}", kind)
+    export(recording(), path := folder / "run.parquet", "parquet")
     return path
 
 
@@ -211,21 +219,13 @@ def _parquet(folder):
     plain = folder / "plain.parquet"
     names, values = _log().table()
     pl.DataFrame(values, schema=names).write_parquet(plain, compression="uncompressed", row_group_size=40)
-    return [_exported(folder, "parquet"), plain]
+    return [_exported(folder), plain]
 
 
 def _npz(folder):
     path = folder / "plain.npz"
     np.savez(path, **_log().columns)
-    return [_exported(folder, "npz"), path]
-
-
-def _mat(folder):
-    from scipy.io import savemat
-
-    for version in ("4", "5"):
-        savemat(folder / f"plain{version}.mat", _log().columns, format=version, oned_as="column")
-    return [_exported(folder, "mat"), folder / "plain4.mat", folder / "plain5.mat"]
+    return [path]
 
 
 def _toml(folder):
@@ -280,6 +280,32 @@ def _read_recording(path):
     from tvist_lab.recordings import RecordingError, read
 
     return read, RecordingError
+
+
+def _run_commands(path):
+    """What a user does with a log: each command ends well or refuses in one line, whatever the others do."""
+    import contextlib
+    import io
+
+    from tvist_cli.commands.log import analyze, export, replay
+    from tvist_cli.failure import Failure
+
+    def run(path):
+        to = {"to": "csv", "output": path.with_name("written.csv")}
+        commands = {analyze.analyze: {"json": True}, export.export: to, replay.replay: {}}
+        refused = []
+        for command, options in commands.items():
+            _limit_time()
+            with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+                try:
+                    command(path, **options)
+                except Failure as failure:
+                    refused.append(str(failure))
+        assert all(said.isprintable() and len(said) < 1000 for said in refused), refused
+        if len(refused) == len(commands):
+            raise Failure(refused[0])
+
+    return run, Failure
 
 
 def _read_robot(path):
@@ -359,7 +385,7 @@ READERS = {
     "mcap": (_mcap, _read_recording),
     "parquet": (_parquet, _read_recording),
     "npz": (_npz, _read_recording),
-    "mat": (_mat, _read_recording),
+    "commands": (_logs, _run_commands),
     "toml": (_toml, _read_robot),
     "urdf": (_urdf, _read_robot),
     "calibration": (_calibration, _read_calibration),
@@ -431,8 +457,8 @@ HOSTILE = {
 }  # fmt: skip
 """Files made to hang a reader or to take its memory, each with its kind."""
 
-APART = {"parquet": 10, "mat": 10}
-"""How many times fewer files are tried of kinds that are read in a process of their own, a second each."""
+APART = {"parquet": 10, "commands": 3}
+"""How many times fewer files are tried of kinds of which each takes long."""
 
 
 def _limit_time() -> None:
@@ -444,6 +470,7 @@ def _limit_time() -> None:
 def main(kind: str, count: int, seed: int, folder: Path) -> None:
     """Read mutated files; whatever ends this function is a fault, and the last file is the one that has it."""
     hostile = HOSTILE.get(kind)
+    warnings.simplefilter("error", RuntimeWarning)
     write, reader = READERS[kind if hostile is None else hostile[0]]
     (folder / "good").mkdir()
     good = write(folder / "good")
@@ -458,7 +485,7 @@ def main(kind: str, count: int, seed: int, folder: Path) -> None:
         path = good[number % len(good)]
         bad = folder / f"bad-{path.name}"
         if hostile is None:
-            bad.write_bytes(mutated(path.read_bytes(), random))
+            bad.write_bytes(mutated(path.read_bytes(), random, 1 if kind == "commands" else 3))
         else:
             (bad,) = hostile[1](folder)
         _limit_time()

@@ -13,12 +13,12 @@ from tvist_controller.api.line import (
     body,
     calibrations,
     central_differences,
-    default_calibration,
     drivetrain,
     load_calibration,
     paper_payload,
 )
 from tvist_controller.api.robot import Controller
+from tvist_controller.calibrations import default_for
 from tvist_lab.identification.modal_calibration import mode_range
 from tvist_lab.recordings import Floats
 from tvist_plant.description import Payload, RobotDescription
@@ -168,7 +168,7 @@ def own_calibration(arm: RobotDescription) -> Calibration:
     """Return the calibration that `tvist serve` uses, or if none is modal what a perfect identification would find."""
     model = arm.robot.model
     if any(one.robot == model and one.modal is not None for one in map(load_calibration, calibrations())):
-        return load_calibration(str(default_calibration(model)))
+        return load_calibration(str(default_for(model)))
     if model not in _made:
         _made[model] = _of_its_file(arm)
     return _made[model]

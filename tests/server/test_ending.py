@@ -1,11 +1,61 @@
-"""Signals wait where nothing may be half done."""
+"""Signals wait where nothing may be half done, and end the process whatever it does."""
 
 import signal
+import subprocess
+import sys
 import threading
 
 import pytest
+from tests.places import free_endpoint
 
 from tvist_server.ending import signals_held
+
+HANGING = """
+import atexit, signal, threading, time
+from tvist_server import ending
+def on_and_on():
+    while True: {what}
+ending.LONGEST = 0.2
+shutdown = ending.Ending()
+{where}
+"""
+
+
+@pytest.mark.parametrize("what", ["time.sleep(9)", "sum(range(10**12))"])
+@pytest.mark.parametrize("where", ["on_and_on()", "atexit.register(on_and_on)", "shutdown.hear(on_and_on)",
+                                   "threading.Thread(target=on_and_on).start()"])  # fmt: skip
+def test_a_shutdown_that_hangs_is_cut_off_and_says_where(what, where):
+    """Also in code that keeps the interpreter's lock once the signal was heard."""
+    code = HANGING.format(what=what, where=f"signal.raise_signal(signal.SIGTERM); {where}")
+    ended = subprocess.run([sys.executable, "-c", code], stderr=subprocess.PIPE, check=False)
+    assert (ended.returncode, b"in on_and_on" in ended.stderr) == (1, True)
+
+
+SERVING = """
+import sys
+from tvist_cli.main import main
+from {module} import {owner} as owner
+def on_and_on(*_):
+    while True: pass
+owner.{name} = on_and_on
+sys.argv = ["tvist", "serve", "--listen", "{endpoint}"]
+main()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    ("module", "owner", "name", "code", "why"),
+    [("tvist_controller.host", "Host", "tick", 0, "has not returned for 1.5 s"),
+     ("tvist_server.plan_ahead", "PlanAhead", "close", 1, "in on_and_on")],
+)  # fmt: skip
+def test_a_server_that_hangs_ends_at_a_signal_and_says_where(number, module, owner, name, code, why):
+    text = SERVING.format(module=module, owner=owner, name=name, endpoint=free_endpoint())
+    with subprocess.Popen([sys.executable, "-c", text], stderr=subprocess.PIPE, text=True) as serving:
+        assert any("ready after" in line for line in iter(serving.stderr.readline, ""))
+        serving.send_signal(number)
+        assert why in serving.stderr.read()
+    assert serving.returncode == code
 
 
 @pytest.fixture(autouse=True)

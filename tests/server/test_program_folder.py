@@ -16,7 +16,7 @@ from tvist_protocol.replies import Done, Refused
 from tvist_server.config import ConfigError
 from tvist_server.config_file import from_mapping
 from tvist_server.polyscope import program, with_external_control
-from tvist_server.polyscope_nodes import EXTERNAL_CONTROL
+from tvist_server.polyscope_nodes import EXTERNAL_CONTROL, Nodes
 from tvist_server.program_folder import ProgramFolder
 
 TEXT = "def pick():\n  sync()\nend\n"
@@ -212,6 +212,27 @@ def test_a_file_that_cannot_be_played_is_refused_with_the_reason(folder, content
     refused = folder.complete(admitted(ProgramLoad(name="bad.urp")))
     assert isinstance(refused, Refused)
     assert refused.where == "name"
+
+
+@pytest.mark.parametrize(
+    ("hops", "place", "why"),
+    [(90, "h[{}]", None), (200, "h[{}]", "a variable without a name"), (1, f"h[{'9' * 5000}]", "without a name"),
+     (1, "x/../" * 300 + "h[{}]", "without a name")],
+)  # fmt: skip
+def test_references_are_followed_once_each_however_many_lead_to_them(folder, monkeypatch, hops, place, why):
+    followed, whole = [], Nodes._referred
+    monkeypatch.setattr(Nodes, "_referred", lambda *given: (followed.append(given), whole(*given))[1])
+    chain = "".join(f"<h><v reference='../../{place.format(hop)}/v'/></h>" for hop in range(2, hops + 2))
+    users = "<ExpressionVariable><ProgramVariable reference='../../../../SuppressedNode/h/v'/></ExpressionVariable>"
+    node = f"<Assignment valueSource='Expression'><variable name='x'/><expression>{users * 500}</expression>"
+    text = polyscope(f"<SuppressedNode>{chain}<h><v name='a'/></h></SuppressedNode>", node + "</Assignment>")
+    (folder.path / "chain.urp").write_text(text)
+    if why is None:
+        assert "a" * 500 in folder.read("chain.urp")
+    else:
+        with pytest.raises(UserFileError, match=why):
+            folder.read("chain.urp")
+    assert len(followed) <= hops + 500
 
 
 def test_what_is_no_file_is_refused(folder):

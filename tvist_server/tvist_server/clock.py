@@ -17,7 +17,7 @@ from tvist_plant.plant import PlantError
 from tvist_server.jobs import Do, Jobs
 from tvist_server.lateness import Lateness, Punctuality
 from tvist_server.overload import Overload
-from tvist_server.punctual import PRIORITY, bind, take_priority
+from tvist_server.punctual import PRIORITY, take_priority
 from tvist_server.schedule import Followed, Schedule
 
 log = logging.getLogger(__name__)
@@ -28,7 +28,7 @@ HAND_ON_EVERY = 0.0009
 """Longest time for which robots that tick one after another keep their messages [s]. To hand them on costs two thread
 switches, about as much as a tick, so they are handed on together before the thread sleeps.
 """
-LONGEST_TICK = 10.0
+LONGEST_TICK = 1.5
 """Longest wait at the end for a tick in progress [s]: a call of somebody's own arm may never return."""
 REPEAT_EVERY = 1.0
 """Time after which a robot in lockstep publishes its last state again, if there was no step meanwhile [s]."""
@@ -74,7 +74,7 @@ class Mailbox:
         self.jobs.post(do, client)
 
     def guarded(self, do: Do) -> None:
-        """Do something of the robot; an exception that its host does not survive ends this robot alone."""
+        """Do something of the robot; an exception that its host does not survive ends the robot alone."""
         try:
             do()
         except Exception:
@@ -132,7 +132,7 @@ class Clock(ABC):
         if self._thread.is_alive():
             self._thread.join(LONGEST_TICK)
             if self._thread.is_alive():
-                log.error("a call of the arm has not returned for %g s", LONGEST_TICK)
+                log.error("a tick, or a call of the arm, has not returned for %g s", LONGEST_TICK)
 
     @abstractmethod
     def punctuality(self, robot: Mailbox) -> Punctuality | None:
@@ -187,7 +187,6 @@ class Realtime(Clock):
         period: Tick [s].
         speed: Simulation speed relative to real time [-].
         priority: Whether to ask the system for real-time priority.
-        processor: Processor to bind the thread to; None to run on any.
     """
 
     def __init__(
@@ -198,7 +197,6 @@ class Realtime(Clock):
         speed: float = 1.0,
         *,
         priority: bool = False,
-        processor: int | None = None,
     ) -> None:
         super().__init__(robots)
         self._hand_on = hand_on
@@ -206,7 +204,7 @@ class Realtime(Clock):
         self._overloads = [Overload(robot.interval or self._period) for robot in robots]
         for robot, overload in zip(robots, self._overloads, strict=True):
             robot.overload = overload
-        self._priority, self._processor = priority, processor
+        self._priority = priority
         self._asked = threading.Event()
         self.granted: list[str] = []
         """What the system has granted the thread, in words; complete after `start`."""
@@ -286,8 +284,6 @@ class Realtime(Clock):
         _wake_sharply()
         if self._priority and take_priority():
             self.granted.append(f"real-time priority {PRIORITY}")
-        if self._processor is not None and bind(self._processor):
-            self.granted.append(f"bound to processor {self._processor}")
 
 
 def _nothing() -> None:

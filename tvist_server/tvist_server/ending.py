@@ -1,11 +1,15 @@
 """Orderly shutdown on the signals SIGINT, SIGTERM, SIGHUP and SIGQUIT, and of processes whose parent has died."""
 
 import contextlib
+import faulthandler
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
+
+LONGEST = 4.5
+"""Longest time in which a shutdown may do its work in order [s]."""
 
 
 def ending_signals() -> list[signal.Signals]:
@@ -52,6 +56,11 @@ def signals_held() -> Iterator[None]:
         signal.raise_signal(one)
 
 
+def limit_shutdown() -> None:
+    """End this process in `LONGEST`, also if a thread keeps the interpreter's lock; stderr shows what hangs."""
+    faulthandler.dump_traceback_later(LONGEST, exit=True, file=2)
+
+
 def end_with_parent() -> None:
     """End this process, which `multiprocessing` has started, as soon as its parent has died, even of SIGKILL."""
     import multiprocessing.connection
@@ -75,7 +84,7 @@ class Ending:
 
     Once this is constructed, in the main thread, signals no longer end the process by themselves. The first signal
     requests a shutdown, which `at_once` or `hear` carries out; further signals are ignored, so that they cannot
-    interrupt it.
+    interrupt it. After `LONGEST` the process ends in any case.
     """
 
     def __init__(self) -> None:
@@ -137,6 +146,7 @@ class Ending:
         if self._wish is not None:
             return
         self._wish = number
+        limit_shutdown()
         if self._raises:
             self._raise(number)
         else:

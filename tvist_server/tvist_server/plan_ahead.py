@@ -155,13 +155,7 @@ class PlanAhead:
         if row.plan is not None:
             taken: SimpleQueue[bool] = SimpleQueue()
             for _ in range(TRIES):
-                basis = self._present()
-                try:
-                    plan = self._planner.plan(command, basis)
-                except Exception:
-                    log.exception("a plan failed, its command is refused")
-                    self._post(lambda: waiting.answer(_FAILED))
-                    return
+                plan = self._planner.plan(command, self._present())
                 self._post(lambda plan=plan: taken.put(self._take(waiting, plan)))  # type: ignore[misc]
                 if taken.get():
                     return
@@ -169,13 +163,7 @@ class PlanAhead:
 
     def _reply(self, question: Command, answer: Answer) -> None:
         """Answer a question, which anyone may ask: it does not reach the controller or its journal."""
-        basis = self._present()
-        try:
-            found = self._planner.plan(question, basis).found
-        except Exception:
-            log.exception("a question is refused, since looking for the answer failed")
-            self._post(lambda: answer(_FAILED))
-            return
+        found = self._planner.plan(question, self._present()).found
         assert isinstance(found, Posture | ToolPose | RefusalError)
         reply = found.reply if isinstance(found, RefusalError) else found
         self._post(lambda: answer(reply))

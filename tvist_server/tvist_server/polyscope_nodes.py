@@ -5,7 +5,7 @@ with a condition, Move with Waypoints, Popup, Halt, Folder, Comment, External Co
 """
 
 import re
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Iterator
 from xml.etree import ElementTree as ET
 
@@ -39,10 +39,15 @@ class Nodes:
 
     def __init__(self, root: ET.Element) -> None:
         self.missing: list[str] = []
-        self._parents = {child: parent for parent in root.iter() for child in parent}
-        self._children: dict[ET.Element, dict[str, list[ET.Element]]] = {}
+        self._parents: dict[ET.Element, ET.Element] = {}
+        self._places: dict[tuple[ET.Element, str, int], ET.Element] = {}
+        for parent in root.iter():
+            count = Counter[str]()
+            for child in parent:
+                count[child.tag] += 1
+                self._parents[child], self._places[parent, child.tag, count[child.tag]] = parent, child
         self._known: dict[ET.Element, str] = {}
-        """Names of the variables that were looked for: each reference is followed once, however many lead to it."""
+        """Names of variables: each reference is followed once, however many lead to it."""
         self._number = 0
 
     def lines(self, nodes: list[ET.Element]) -> Iterator[str]:
@@ -155,7 +160,7 @@ class Nodes:
             passed.append(node)
             name, reference = node.get("name") or "", node.get("reference")
             found = self._known.get(node) or (name if is_name(name) and _NAME.fullmatch(name) else "")
-            node = None if reference is None else self._referred(node, reference)
+            node = None if found or reference is None else self._referred(node, reference)
         if not found:
             self.missing.append("a variable without a name")
         self._known.update(dict.fromkeys(passed, found or "variable"))
@@ -170,18 +175,8 @@ class Nodes:
                 found = self._parents.get(found)
                 continue
             words = _STEP.fullmatch(step)
-            same = [] if words is None else self._named(found).get(words[1], [])
-            place = 0 if words is None else int(words[2] or 1) - 1
-            found = same[place] if 0 <= place < len(same) else None
+            found = None if words is None else self._places.get((found, words[1], int(words[2] or 1)))
         return found
-
-    def _named(self, node: ET.Element) -> dict[str, list[ET.Element]]:
-        """Children of an element by their tags."""
-        if node not in self._children:
-            self._children[node] = defaultdict(list)
-            for child in node:
-                self._children[node][child.tag].append(child)
-        return self._children[node]
 
     def _number_in(self, text: str | None, node: ET.Element) -> str:
         try:

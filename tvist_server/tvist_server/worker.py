@@ -3,7 +3,6 @@
 import asyncio
 import os
 import threading
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -15,7 +14,7 @@ from zenoh.handlers import Callback
 from tvist_plant.user_file import UserFileError
 from tvist_protocol import keys
 from tvist_server.config import ConfigError, ServeConfig
-from tvist_server.ending import Ending
+from tvist_server.ending import Ending, limit_shutdown
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.distant_metrics import DistantMetrics
 from tvist_server.gateways.metrics import Metrics
@@ -26,8 +25,10 @@ from tvist_server.server import Recording, Server
 from tvist_server.spread import Share
 from tvist_server.ur_ports import InterfaceName
 
-END = 15.0
+END = 3.5
 """Longest wait for a process to end its recordings and leave [s]; then it is killed."""
+REACHED = 15.0
+"""Longest wait until clients reach all robots [s]."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ def meet_clients(
             starting.note(*word)
             continue
         if not config.connect:  # else clients reach them through another router
-            reached.wait(END)
+            reached.wait(REACHED)
         network.forget()
         first.say(Ready())
     if metrics is not None:
@@ -180,9 +181,8 @@ def work(config: ServeConfig, share: Share, first: First) -> None:
 
     def end() -> None:
         first.told()
+        limit_shutdown()  # whoever would kill it by then may have died
         ending.request()
-        time.sleep(2.0 * END)  # whoever would kill it by then may have died
-        os._exit(1)
 
     asyncio.run(server.run(ready, ending))
     first.say(Ended(server.failure, server.recordings))

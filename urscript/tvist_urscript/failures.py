@@ -2,6 +2,7 @@
 
 import re
 from itertools import islice
+from traceback import walk_tb
 from types import CodeType, TracebackType
 from typing import Any
 
@@ -93,11 +94,9 @@ def _position(code: CodeType, instruction: int) -> tuple[int, int]:
 
 def _is_internal(error: Exception) -> bool:
     """Whether an exception comes out of what a built-in function has called, and is no answer to its arguments."""
-    traceback, own = error.__traceback__, __name__.partition(".")[0]
-    module = own
-    while traceback is not None:  # compiled code belongs to no module
-        module, traceback = traceback.tb_frame.f_globals.get("__name__", own), traceback.tb_next
-    return not (isinstance(error, Fault | RecursionError) or module.partition(".")[0] == own)
+    *_, frame = [frame for frame, _ in walk_tb(error.__traceback__)]
+    module = frame.f_globals.get("__name__", __name__)  # compiled code belongs to no module
+    return not (isinstance(error, Fault | RecursionError) or module.startswith("tvist_urscript"))
 
 
 def _words(error: Exception) -> str:  # noqa: PLR0911  one for each kind of exception

@@ -4,7 +4,6 @@ The modules behind it may change; a study of moves imports nothing else of this 
 """
 
 from tvist_controller.calibrations import available as calibrations
-from tvist_controller.calibrations import default_for as default_calibration
 from tvist_controller.calibrations import estimator_of
 from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.calibrations.modal import drivetrain, mass_matrix, modal_estimator
@@ -19,9 +18,6 @@ from tvist_controller.line.limits import REBOUND, TORQUE_SHARE, acceleration_on_
 from tvist_controller.line.whole_motion import Driven, DrivenLine, respond
 from tvist_controller.planning.choices import choose_filter, wanted_modes
 from tvist_controller.planning.keeping import keeping_motion
-from tvist_controller.quiet.elastic_arm import ElasticArm
-from tvist_controller.quiet.interior_point import Programme, inside, optimize
-from tvist_controller.quiet.quiet_motion import quiet_motion
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.sources.elastic_source import elastic_feed_forward
 from tvist_controller.sources.mode_source import ModeSource
@@ -37,7 +33,6 @@ __all__ = [
     "ControlCycle",
     "Driven",
     "DrivenLine",
-    "ElasticArm",
     "ElasticFeedForward",
     "InverseDynamics",
     "JointLine",
@@ -45,7 +40,6 @@ __all__ = [
     "MotionLimits",
     "OwnShaper",
     "PlannedMotion",
-    "Programme",
     "RecordedShaper",
     "RefusalError",
     "Setup",
@@ -55,19 +49,15 @@ __all__ = [
     "calibrations",
     "central_differences",
     "choose_filter",
-    "default_calibration",
     "drivetrain",
     "elastic_feed_forward",
     "estimator_of",
-    "inside",
     "keeping_motion",
     "load_calibration",
     "mass_matrix",
     "modal_estimator",
-    "optimize",
     "paper_payload",
     "quickest_motion",
-    "quiet_motion",
     "respond",
     "resting_after",
     "wanted_modes",

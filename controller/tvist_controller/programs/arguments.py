@@ -1,7 +1,6 @@
 """Checks of what a program passes to a function, and conversion to the controller's types.
 
-What a message of the protocol may hold as well has the bounds that it has there: a plan or a tick that gets numbers
-beyond them may take all memory, or fail.
+Bounds are those of the protocol: beyond them, a plan may take all memory.
 """
 
 import math
@@ -9,6 +8,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import get_args
 
+from tvist_protocol import values
 from tvist_protocol.values import Coordinate
 from tvist_urscript import Array, Fault, Pose
 
@@ -63,11 +63,7 @@ def integer(name: str, value: Value, least: int, most: int) -> int:
 def numbers(name: str, value: Value, count: int, kind: object = Coordinate) -> tuple[float, ...]:
     """Return the numbers of a list or a pose.
 
-    Args:
-        name: Name of the argument.
-        value: The list.
-        count: Number of its elements.
-        kind: The protocol's type of one of them, which bounds it: angles and speeds are bounded like coordinates.
+    The protocol's type of one of them bounds each; angles and speeds have the bounds of coordinates.
 
     Raises:
         Fault: It is no list of so many numbers.
@@ -81,9 +77,7 @@ def numbers(name: str, value: Value, count: int, kind: object = Coordinate) -> t
     return tuple([number(f"{name}[{k}]", item, least, most) for k, item in enumerate(items)])
 
 
-def pose(
-    name: str, value: Value, kind: object = Coordinate
-) -> tuple[float, float, float, float, float, float]:
+def pose(name: str, value: Value, kind: object = Coordinate) -> values.Pose:
     """Return the six numbers of a pose; a list of six numbers counts as one.
 
     Raises:

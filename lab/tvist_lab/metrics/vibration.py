@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.recordings import Floats, Recording
+from tvist_lab.recordings.checks import LONG_GAP
 from tvist_plant.plant import GRAVITY
 
 BAND = (3.0, 60.0)
@@ -18,8 +19,8 @@ TRUTH = "truth_tool_acceleration"
 TRUE_POSE = "truth_flange_pose"
 
 
-LONG_GAP = 1.0
-"""Time without rows on both sides of which a log is two [s]; shorter ones are filled with straight lines."""
+FILLED = 10
+"""A part of a log is filled to at most so many times its rows, so that a sparse one cannot take the memory."""
 ALL = slice(None)
 """All rows of a recording."""
 
@@ -77,7 +78,7 @@ def low_pass(signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
 def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
     """Low-pass filter samples of which some are missing: these are interpolated before, and left out after.
 
-    Parts of a log on both sides of a long gap are filtered each by itself: to fill a day would take the memory.
+    What stands before and after a long gap is filtered apart: to fill a day would take the memory.
 
     Args:
         time: Times of the samples, increasing, shape (T,) [s].
@@ -88,9 +89,10 @@ def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BA
     filtered = np.array(signal)
     for rows in parts(time):
         if len(own := time[rows]) > 1:
-            grid = np.arange(own[0], own[-1] + 0.5 * period, period)
+            step = max(period, float(own[-1] - own[0]) / (FILLED * len(own)))
+            grid = np.arange(own[0], own[-1] + 0.5 * step, step)
             below = low_pass(
-                np.column_stack([np.interp(grid, own, axis) for axis in signal[rows].T]), period, cut_off
+                np.column_stack([np.interp(grid, own, axis) for axis in signal[rows].T]), step, cut_off
             )
             filtered[rows] = np.column_stack([np.interp(own, grid, axis) for axis in below.T])
     return filtered

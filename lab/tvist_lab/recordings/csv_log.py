@@ -9,17 +9,14 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
+from tvist_lab.recordings.checks import TIME, LogError, check_names, is_measured
 from tvist_lab.recordings.log_columns import (
     ROBOT,
     STRANGE,
-    TIME,
-    LogError,
     Needs,
     Rows,
     check_known,
-    check_names,
     found_columns,
-    is_measured,
     recording_of,
 )
 from tvist_lab.recordings.named_columns import in_si, named

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import msgspec
 
-from tvist_lab.recordings.log_columns import GYROSCOPE
+from tvist_lab.recordings.checks import GYROSCOPE
 from tvist_lab.recordings.recording import TRUTH_PREFIX, Floats, Recording, RecordingError
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
@@ -144,16 +144,11 @@ def sidecar(path: Path) -> Path:
 
 
 def described(text: str) -> Description:
-    """Read a description from JSON.
-
-    Raises:
-        RecordingError: It is none, or of a later version.
-    """
+    """Read a description from JSON; see `checked_description`."""
     try:
-        content = parse_json(text.encode())
+        return checked_description(parse_json(text.encode()))
     except ProtocolError as error:
         raise RecordingError(f"has no valid description of its columns: {error.why}") from error
-    return checked_description(content)
 
 
 def checked_description(content: object) -> Description:

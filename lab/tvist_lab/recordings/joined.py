@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from tvist_lab.recordings.checks import ACCELEROMETER, GYROSCOPE, TIME
 from tvist_lab.recordings.flange_motion import RATE, Felt, at_flange, by_sensor
-from tvist_lab.recordings.log_columns import ACCELEROMETER, GYROSCOPE, SENSOR, TIME, ticks_of
+from tvist_lab.recordings.log_columns import SENSOR, ticks_of
 from tvist_lab.recordings.read import read
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_lab.recordings.two_clocks import Clocks, fits

@@ -9,27 +9,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tvist_lab.recordings.recording import Floats, Recording, RecordingError
+from tvist_lab.recordings import checks
+from tvist_lab.recordings.checks import ACCELEROMETER, TIME, WIDTHS, LogError, is_measured
+from tvist_lab.recordings.recording import Floats, Recording
 from tvist_lab.words import counted
 from tvist_plant.user_file import is_name
-from tvist_protocol.errors import quoted
 
-TIME = "timestamp"
-"""Name of the column of times, as in RTDE [s]."""
-ACCELEROMETER, GYROSCOPE = "actual_tool_accelerometer", "actual_tool_gyroscope"
-"""Names of what a sensor at the tool measures; RTDE has the first alone."""
-WIDTHS = {
-    "actual_TCP_pose": 6, "target_TCP_pose": 6, "actual_TCP_speed": 6, ACCELEROMETER: 3, GYROSCOPE: 3,
-}  # fmt: skip
-"""Number of entries that a vector needs to be of use; joint angles have as many as the arm has joints."""
 OURS = ("tick", "reference_q", "unshaped_q", "target_q", "actual_TCP_pose")
 """Columns that only recordings of this controller have, all together."""
 STRANGE = "is no log that tvist reads"
 """What is said first of a file that is something else."""
-LARGEST = 1e6
-"""Largest number that a column with a unit in radians, metres and seconds can hold; more is damage."""
-PERIODS = (1e-4, 0.1)
-"""Shortest and longest time between rows [s]; anything else is no time in seconds, or shows no vibration."""
 LONG_GAP = 0.02
 """Shortest time without rows that a note reports [s]."""
 
@@ -38,14 +27,7 @@ SWAPPED = 3
 SHOWN = 6
 """Largest number of missing entries of a vector that a note names."""
 
-_MEASURED = re.compile(
-    r"(actual|target|shaped)_(q|qd|qdd|TCP_pose|TCP_speed|tool_accelerometer|tool_gyroscope)_\d+"
-)
 _INDEXED = re.compile(r"(?P<name>.*\D)_(?P<index>\d{1,6})", re.ASCII)
-
-
-class LogError(RecordingError):
-    """A file is no log that can be measured; the message names the file and, where there is one, the line."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +79,7 @@ def recording_of(rows: Rows) -> Recording:
         LogError: A number is beyond 1e6; there is no time or nothing of what the log needs, fewer than two rows, or
             time goes back or is not in seconds.
     """
-    check_names(rows.path, rows.names)
-    _check_numbers(rows)
+    checks.check_names(rows.path, rows.names)
     columns, notes = _vectors(rows)
     if TIME not in columns or columns[TIME].ndim != 1:
         raise LogError(f"{rows.path} has no column {TIME}: {_remedy(rows)}")
@@ -112,48 +93,28 @@ def recording_of(rows: Rows) -> Recording:
         has = f"neither {' nor '.join(lacking)}" if len(lacking) > 1 else f"no {lacking[0]}"
         raise LogError(f"{rows.path} has {has}: {_remedy(rows)}")
     kept, more = _increasing(rows, columns[TIME])
-    _check_period(rows, columns[TIME][kept])
     notes += more
     columns = {name: column[kept] for name, column in columns.items()}
+    place = rows.unit, rows.lines[kept]
+    checks.check_period(rows.path, float(np.median(np.diff(columns[TIME]))))
+    checks.check_numbers(rows.path, {TIME: columns[TIME]}, place)
     ours = all(name in columns for name in OURS)
     if not ours:
         columns["tick"], gaps = ticks_of(columns[TIME])
         notes += gaps
         columns = _shaped(columns)
-    return Recording(columns, notes=(*rows.notes, *notes), foreign=not ours)
-
-
-def is_measured(name: str) -> bool:
-    """Return whether a column has one of RTDE's names for what a robot measures or wants."""
-    return _MEASURED.fullmatch(name) is not None
-
-
-def check_names(where: object, names: Sequence[str]) -> None:
-    """Refuse a column's name that cannot be shown, as of a damaged file."""
-    for name in names:
-        if not is_name(name):
-            raise LogError(f"{where}: {quoted(name)} is no column's name: it must be short and printable")
+    recording = Recording(columns, notes=(*rows.notes, *notes), foreign=not ours)
+    checks.check_recording(rows.path, recording, place)
+    return recording
 
 
 def check_known(path: Path, line: int, names: Sequence[str], needs: Needs) -> None:
     """Refuse a text none of whose columns has a name of a robot's log, which is some other text mostly."""
-    if not any(name == TIME or _MEASURED.fullmatch(name) for name in names):
+    if not any(name == TIME or is_measured(name) for name in names):
         found = f"; {found_columns(names)}" if all(map(is_name, names)) else ""
         raise LogError(
             f"{path} {STRANGE}: its line {line} has none of the names that are known, as in timestamp,actual_q_0. "
             f"If it is a log, name its columns with {needs.option}{found}"
-        )
-
-
-def _check_numbers(rows: Rows) -> None:
-    """Refuse a number that no robot has, with its line and column."""
-    measured = [place for place, name in enumerate(rows.names) if _MEASURED.fullmatch(name)]
-    strange = np.argwhere(np.abs(rows.values[:, measured]) > LARGEST)
-    if len(strange):
-        row, place = strange[0][0], measured[strange[0][1]]
-        raise LogError(
-            f"{rows.path}, {rows.unit} {int(rows.lines[row])}, column {rows.names[place]}: "
-            f"{rows.values[row, place]:g} is no number of a robot"
         )
 
 
@@ -164,7 +125,7 @@ def _remedy(rows: Rows) -> str:
 def found_columns(names: Sequence[str]) -> str:
     """Return the names of a file's columns as the part of a sentence."""
     there = [name for name in names if name]
-    return f"its columns are {', '.join(there[:12])}{', …' if len(there) > 12 else ''}"
+    return f"its columns are {', '.join(there[:24])}{', …' if len(there) > 24 else ''}"
 
 
 def _vectors(rows: Rows) -> tuple[dict[str, Floats], list[str]]:
@@ -228,15 +189,6 @@ def _increasing(rows: Rows, time: Floats) -> tuple[NDArray[np.intp], list[str]]:
             f"{rows.path} has {counted(kept.size, 'row')} with a {TIME} of its own; two are needed"
         )
     return kept, notes
-
-
-def _check_period(rows: Rows, time: Floats) -> None:
-    period = float(np.median(np.diff(time)))
-    if not PERIODS[0] <= period <= PERIODS[1]:
-        raise LogError(
-            f"{rows.path}: {TIME} grows by {period:.3g} from row to row; it must be in seconds, and a row come every "
-            f"{PERIODS[0]:g} to {PERIODS[1]:g} s"
-        )
 
 
 def _left_out(rows: Rows, count: int, what: str, first: int) -> str:

@@ -10,6 +10,7 @@ from typing import IO, Any, TypeVar
 
 from mcap.records import Channel, McapRecord, Message, Metadata
 
+from tvist_lab.recordings.checks import check_names, check_recording
 from tvist_lab.recordings.json_columns import Block, JsonColumns
 from tvist_lab.recordings.mcap_records import CUT, DAMAGE, MAGIC, TOPIC, opened, ring_records
 from tvist_lab.recordings.recorded_columns import recording_of_blocks
@@ -146,6 +147,13 @@ def read(path: str | os.PathLike[str]) -> RecordingFile:
     except OSError as error:
         raise RecordingFileError(f"{path} cannot be read: {error.strerror}") from error
     return content.file()
+
+
+def read_checked(path: str | os.PathLike[str]) -> RecordingFile:
+    """Read a recording as `read` does, and check it as logs of other controllers are checked."""
+    content = read(path)
+    check_recording(content.path, content.recording)
+    return content
 
 
 def _again(path: Path, kinds: Sequence[type[Published]]) -> Iterator[Published]:
@@ -290,6 +298,7 @@ class _Content:
         found = TOPIC.fullmatch(channel.topic)
         if found is None or found["kind"] not in self.readers or channel.message_encoding != "json":
             return
+        check_names(self.path, [found["robot"]])
         if self.robot not in (None, found["robot"]):
             raise self._error(f"contains several robots, {self.robot} and {found['robot']}")
         if found["kind"] == tag(State):

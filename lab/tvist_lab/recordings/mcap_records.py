@@ -29,6 +29,9 @@ MAGIC = b"\x89MCAP0\r\n"
 """First bytes of every MCAP file."""
 RECORD_LIMIT = 2**28
 """Longest accepted record, and unpacked chunk [bytes], so that a damaged length cannot exhaust the memory."""
+DENSEST, LEAST = 500, 1 << 16
+"""A chunk may unpack to so many times its size, and so many bytes more; a robot at rest reaches 90. It may hold as many
+records as it has bytes, and some more: else a small file takes minutes, and the memory."""
 CUT = (EndOfFile, struct.error)
 """Exceptions for a file that ends too early."""
 DAMAGE = (*CUT, McapError, ZstdError, ValueError, OverflowError, MemoryError)
@@ -74,8 +77,10 @@ def _records_of(chunk: Chunk) -> list[McapRecord]:
     """Messages, channels and schemas of a chunk; several times faster than the library's own function."""
     data = _unpacked(chunk)
     found: list[McapRecord] = []
-    place, length = 0, len(data)
+    place, length, most = 0, len(data), 100 + len(chunk.data)
     while place < length:
+        if (most := most - 1) < 0:
+            raise ValueError(f"a chunk of {len(chunk.data)} bytes holds more records than bytes")
         kind, size = _RECORD.unpack_from(data, place)
         place += _RECORD.size
         if (after := place + size) > length:
@@ -98,8 +103,8 @@ def _unpacked(chunk: Chunk) -> bytes:
         ZstdError: It is damaged.
     """
     size, data = chunk.uncompressed_size, chunk.data
-    if size > RECORD_LIMIT:
-        raise ValueError(f"a chunk claims {size} bytes")
+    if size > min(RECORD_LIMIT, LEAST + DENSEST * len(data)):
+        raise ValueError(f"a chunk of {len(data)} bytes claims {size}")
     if chunk.compression == "zstd":
         if frame_content_size(data) > size:
             raise ValueError("a chunk has more than it claims")

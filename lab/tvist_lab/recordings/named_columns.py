@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tvist_lab.recordings.log_columns import ACCELEROMETER, GYROSCOPE, PERIODS, TIME, LogError, found_columns
+from tvist_lab.recordings.checks import ACCELEROMETER, GYROSCOPE, PERIODS, TIME, LogError
+from tvist_lab.recordings.log_columns import found_columns
 from tvist_lab.recordings.recording import Floats
 from tvist_protocol.errors import quoted
 
@@ -130,6 +131,6 @@ def _unit_of_angles(q: Floats) -> tuple[float, str]:
 
 
 def _unit_of_gravity(force: Floats) -> tuple[float, str]:
-    with np.errstate(over="ignore"):  # numbers of no robot are refused later, by their line
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers of no robot are refused later, by their line
         length = float(np.median(np.linalg.norm(np.nan_to_num(force), axis=1)))
     return length, "g" if GRAVITY_IN_G[0] < length < GRAVITY_IN_G[1] else "m/s2"

@@ -3,7 +3,7 @@
 import zlib
 from pathlib import Path
 
-from tvist_lab.recordings.log_columns import LogError
+from tvist_lab.recordings.checks import LogError
 
 GZIP = b"\x1f\x8b"
 """First bytes of a file that gzip wrote."""

@@ -11,17 +11,20 @@ from tvist_plant.user_file import UserFileError, check_is_file
 
 SHOWN = 4096
 """Number of first bytes by which text is told from packets."""
+TABLES = (".parquet", ".npz")
+"""Endings of the names of files with named arrays."""
 
 
 def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs = ROBOT) -> Recording:
     """Read a recording of this controller, or a log of another one.
 
-    Recordings: MCAP, and what `tvist log export` writes (CSV, Parquet, npz, mat). Logs: CSV with RTDE's names, dumps of
+    Recordings: MCAP, and what `tvist log export` writes (CSV, Parquet). Logs: CSV with RTDE's names, dumps of
     UR's port 30003, rosbag2 in MCAP (a file, or its folder). CSV and dumps may be compressed by gzip.
 
     Args:
         path: The file.
-        columns: How a CSV names what is needed, as in `time=t:ms,q=joint_{}:deg`; see `named_columns.named`.
+        columns: How a CSV, or a table of another program, names what is needed, as in `time=t:ms,q=joint_{}:deg`; see
+            `named_columns.named`.
         needs: What a log must have.
 
     Returns:
@@ -43,16 +46,17 @@ def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs 
 def _read(path: Path, names: str | None, needs: Needs) -> Recording:
     if path.is_dir():
         return _read(_bag(path), names, needs)
-    named = _named(path, needs)
+    named = _named(path, needs, names)
     if named is not None:
-        return named if names is None else named.noted("its columns have names, so those given were not used")
+        used = names is None or path.suffix.lower() in TABLES
+        return named if used else named.noted("its columns have names, so those given were not used")
     from tvist_lab.recordings.csv_log import read_csv
     from tvist_lab.recordings.exported import with_sidecar
 
     return with_sidecar(read_csv(path, names, needs), path)
 
 
-def _named(path: Path, needs: Needs) -> Recording | None:
+def _named(path: Path, needs: Needs, names: str | None) -> Recording | None:
     """Read a file whose format says what its columns are; None for a CSV."""
     check_is_file(path, "recording")
     with path.open("rb") as stream:
@@ -65,10 +69,10 @@ def _named(path: Path, needs: Needs) -> Recording | None:
         raise RecordingError(f"{path} is no MCAP file")
     if head.startswith(MCAP):
         return _read_mcap(path, needs)
-    if path.suffix.lower() in (".parquet", ".npz", ".mat"):
+    if path.suffix.lower() in TABLES:
         from tvist_lab.recordings.exported import read_exported
 
-        return read_exported(path, needs)
+        return read_exported(path, needs, names)
     if b"\0" in head:
         from tvist_lab.recordings.realtime_dump import read_dump
 
@@ -88,7 +92,7 @@ def _read_mcap(path: Path, needs: Needs) -> Recording:
     from tvist_lab.recordings import mcap_file
 
     try:
-        content = mcap_file.read(path)
+        content = mcap_file.read_checked(path)
     except mcap_file.RecordingFileError as error:
         from tvist_lab.recordings.rosbag import has_ros, read_rosbag
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tvist_lab.recordings.log_columns import STRANGE, LogError, Rows, recording_of
+from tvist_lab.recordings.checks import LogError
+from tvist_lab.recordings.log_columns import STRANGE, Rows, recording_of
 from tvist_lab.recordings.packed import content
 from tvist_lab.recordings.recording import Recording
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tvist_protocol.errors import one_line
+
 Floats = NDArray[np.float64]
 
 STATE_COLUMNS = (
@@ -52,7 +54,10 @@ EPOCH = 1e8
 
 
 class RecordingError(ValueError):
-    """A recording lacks requested data, or its parts do not fit together."""
+    """A recording lacks requested data, or its parts do not fit together; the message is one line."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(one_line(why))
 
 
 class MissingColumnError(RecordingError):
@@ -98,6 +103,7 @@ class Recording:
         if np.any(np.diff(self.columns["tick"]) <= 0):
             raise RecordingError("tick must increase from row to row")
         object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
+        object.__setattr__(self, "notes", tuple(map(one_line, self.notes)))
 
     def __len__(self) -> int:
         return len(self.columns["tick"])

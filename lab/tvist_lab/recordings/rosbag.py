@@ -13,8 +13,9 @@ from mcap.records import Channel, Message, Schema
 from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
-from tvist_lab.recordings.log_columns import ACCELEROMETER as SENSOR
-from tvist_lab.recordings.log_columns import GYROSCOPE, ROBOT, LogError, Needs, Rows, recording_of
+from tvist_lab.recordings.checks import ACCELEROMETER as SENSOR
+from tvist_lab.recordings.checks import GYROSCOPE, LogError
+from tvist_lab.recordings.log_columns import ROBOT, Needs, Rows, recording_of
 from tvist_lab.recordings.mcap_records import DAMAGE, records
 from tvist_lab.recordings.recording import Floats, Recording
 from tvist_protocol.errors import quoted

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.controller.robots import UR5E
 
 from tvist_protocol import commands as c
-from tvist_protocol.programs import ProgramLoad, ProgramStop
+from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_server.gateways.ur.dashboard.commands import COMMANDS, find
 from tvist_server.gateways.ur.dashboard.lines import LONGEST
@@ -70,16 +70,6 @@ def client(desk, control):
 def test_it_greets(desk, control, sent):
     DashboardSession(desk, control, sent.append).opened()
     assert sent == [b"Connected: Universal Robots Dashboard Server\n"]
-
-
-def test_a_stop_waits_for_no_command_before_it_and_is_answered_in_its_turn(client, control):
-    control.wait()
-    assert client.send("load a.urp\nversion\nStop\n") == []
-    assert [type(command) for command in control.commands] == [ProgramLoad, ProgramStop]
-    control.answer(keep=True)
-    control.answer()
-    loading, _, stopped = client.heard()
-    assert (loading, stopped) == ("Loading program: a.urp", "Stopped")
 
 
 # What clients match whole lines against, or compare them with.

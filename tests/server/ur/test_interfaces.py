@@ -5,7 +5,9 @@ import contextlib
 import gc
 import socket
 import struct
+import threading
 import weakref
+from types import SimpleNamespace
 
 import pytest
 from tests.controller.robots import UR5E
@@ -13,6 +15,7 @@ from tests.controller.robots import UR5E
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
+from tvist_protocol.programs import ProgramStop
 from tvist_protocol.simulation import SimulationInject
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.ur.interfaces import UrInterfaces
@@ -89,6 +92,19 @@ async def test_a_port_in_use_is_said_with_what_to_do(desk):
         UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", ports)
     with pytest.raises(GatewayError, match="does not have this address"):
         UrInterfaces(desk, UR5E, "ur5e", "203.0.113.7", {"rtde": 0})
+
+
+async def test_a_file_that_is_never_read_to_its_end_keeps_nobody_waiting(desk):
+    """Neither those who ask or stop elsewhere, nor a stop behind it."""
+    read = threading.Event()
+    desk.interfaces.robot.programs._external._folder = SimpleNamespace(
+        read=lambda _: "sync()" if read.wait(PATIENCE) else None
+    )
+    (_, loads), other = await connect_and_greet(desk), await connect_and_greet(desk)
+    loads.write(b"load a.urp\nstop\n")
+    await until(lambda: isinstance(getattr(desk, "last", None), ProgramStop))
+    assert await lines(*other, "programState", "stop") == ["STOPPED <unnamed>", "Stopped"]
+    read.set()
 
 
 async def test_events_reach_the_clients_of_the_primary_interface(desk):

@@ -456,22 +456,13 @@ def test_everything_else_is_a_program_and_goes_to_the_controller_as_it_was_sent(
 def test_units_are_carried_out_in_their_order_each_when_the_one_before_was_answered(robot, control, sent):
     interface = session(robot, control, sent.append)
     control.wait()
-    interface.receive(b"def f():\nend\npower off\nsec g():\nend\npower off\n")
-    kinds = [ProgramRun, c.PowerOff, ProgramRun, c.PowerOff]
+    interface.receive(b"def f():\nend\nstop program\nsec g():\nend\npower off\n")
+    kinds = [ProgramRun, ProgramStop, ProgramStop, ProgramRun, c.PowerOff]  # a stop waits for nothing
     for number in range(1, 5):
         assert interface.waiting == 5 - number
-        assert [type(command) for command in control.commands] == kinds[:number]
+        assert [type(command) for command in control.commands] == kinds[: number + 1]
         control.answer(keep=True)
     assert interface.waiting == 0
-
-
-def test_a_stop_waits_for_no_unit_before_it_and_is_answered_in_its_turn(robot, control, sent):
-    interface = session(robot, control, sent.append)
-    control.wait()
-    interface.receive(b"def f():\nend\nstop program\n")
-    assert [type(command) for command in control.commands] == [ProgramRun, ProgramStop]
-    control.answer(keep=True)
-    assert [type(command) for command in control.commands][2:] == [ProgramStop]
 
 
 def test_what_is_complete_is_carried_out_even_if_the_connection_ends(robot, control, sent):

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from tvist_cli.failure import Failure
+from tvist_cli.failure import Failure, told
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import out, print_json, progress, say, table, typed, write_report
 
@@ -11,7 +11,6 @@ from tvist_cli.output import out, print_json, progress, say, table, typed, write
 def advise(
     *files: Path,
     output: Path | None = None,
-    force: bool = False,
     logs: LogOptions = AS_IT_IS,
     json: bool = False,
 ) -> None:
@@ -22,26 +21,24 @@ def advise(
 
     Args:
         files: Recordings or logs of one robot in any format that tvist log analyze reads.
-        output: Web page to write, in one file, with the two figures that show why.
-        force: Replace an existing page.
+        output: Web page to write or replace, in one file, with the two figures that show why.
         logs: How to read logs.
         json: Print one JSON object with all figures of each shaper and motion.
     """
     if not files:
         raise Failure("advise needs at least one recording or log: tvist log advise run.mcap", code=2)
-    if output is not None and output.exists() and not force:
-        raise Failure(f"{output} exists already: give --force to replace it, or another --output")
     from tvist_lab.advice import advise as advised
     from tvist_lab.advice import as_dict, command, verdict
     from tvist_lab.metrics import Measured
+    from tvist_lab.recordings import RecordingError
     from tvist_lab.report.of_advice import MODES, OPTIONS, advice_page, modes_rows, option_rows
 
     measured = []
-    with progress(len(files), "logs") as bar:
+    with told(RecordingError), progress(len(files), "logs") as bar:
         for recording in logs.read(*files):
             measured.append(Measured.of(recording))
             bar(1, None)
-    joints = sorted({log.recording["actual_q"].shape[1] for log in measured})
+    joints = sorted({log.recording.joints for log in measured})
     if len(joints) > 1:
         have = " and ".join(map(str, joints))
         raise Failure(f"advice is about one robot: these logs have {have} joints; give the logs of one")

@@ -1,11 +1,11 @@
-"""`tvist log export`: write a recording as CSV, Parquet, npz or mat, or with an arm that Foxglove draws."""
+"""`tvist log export`: write a recording as CSV or Parquet, or with an arm that Foxglove draws."""
 
 from pathlib import Path
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.misuse import lower
-from tvist_cli.output import print_json, say
+from tvist_cli.output import default_output, print_json, say
 
 
 def export(
@@ -13,20 +13,18 @@ def export(
     *,
     to: str,
     output: Path | None = None,
-    force: bool = False,
     logs: LogOptions = AS_IT_IS,
     json: bool = False,
 ) -> None:
-    """Write a recording or a log as CSV, Parquet, npz or mat, in full precision, or a recording for Foxglove.
+    """Write a recording or a log as CSV or Parquet, in full precision, or a recording for Foxglove.
 
     Args:
         file: A recording, or any log that tvist log analyze reads.
-        to: csv, parquet, npz, mat or foxglove. A vector becomes columns NAME_0, NAME_1, ... in CSV and Parquet, and one
-            array in npz and mat. Units, events and info go along; those of a CSV into FILE.csv-metadata.json. With
-            foxglove, the recording is written with channels for the 3D panel of Foxglove and Lichtblick, and beside it
-            a layout for both.
-        output: File to write [FILE with its ending replaced, such as run.csv or run.foxglove.mcap for run.mcap].
-        force: Replace an existing file.
+        to: csv, parquet or foxglove. A vector becomes columns NAME_0, NAME_1, ... Units, events and info go along;
+            those of a CSV into FILE.csv-metadata.json. With foxglove, the recording is written with channels for the
+            3D panel of Foxglove and Lichtblick, and beside it a layout for both.
+        output: File to write or replace [FILE with its ending replaced, such as run.csv or run.foxglove.mcap for
+            run.mcap, if there is none yet].
         logs: How to read logs.
         json: Print one JSON object.
     """
@@ -45,13 +43,13 @@ def export(
     for place in written:
         if place.exists() and file.exists() and place.samefile(file):
             raise Failure(f"{place} is the file to be exported: choose another one with --output", code=2)
-        if place.exists() and not force:
-            raise Failure(f"{place} exists already: give --force to replace it, or --output")
+        if output is None:
+            default_output(place)
     with told(RecordingError):
         if kind == FOXGLOVE:
             from tvist_lab.foxglove.export import export as draw
 
-            content = mcap_file.read(file)
+            content = mcap_file.read_checked(file)
             recording = content.recording.noted(*filter(None, [content.note]), *draw(content, path))
         else:
             (recording,) = logs.read(file)

@@ -70,7 +70,7 @@ def replay(
 def _run_again(file: Path, output: Path | None, shaper: list[str], plant: str | None, *, json: bool) -> None:
     from tvist_controller.sources.own_plants import OwnPlantError, load_plant
     from tvist_lab.recordings import RecordingError
-    from tvist_lab.recordings.mcap_file import read
+    from tvist_lab.recordings.mcap_file import read_checked
     from tvist_lab.replay import ReplayError, replay_file
     from tvist_server.recording import RecorderError
 
@@ -78,7 +78,7 @@ def _run_again(file: Path, output: Path | None, shaper: list[str], plant: str | 
     with told(OwnPlantError, code=2):
         arm = None if plant is None else load_plant(plant)
     with told(RecordingError, ReplayError, RecorderError, ValueError):
-        content = read(file)
+        content = read_checked(file)
         compile_if_new()
         again = replay_file(content, output, own, arm)
     for note in again.notes:
@@ -113,14 +113,14 @@ def _publish(
     if not 0.01 <= speed <= 100.0:
         raise Failure(f"speed is {speed:g}: must be 0.01 to 100", code=2)
     from tvist_lab.recordings import RecordingError
-    from tvist_lab.recordings.mcap_file import read
+    from tvist_lab.recordings.mcap_file import read_checked
     from tvist_lab.republish import Playback
     from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError
     from tvist_server.gateways.exposure import ExposureError
 
     with told(RecordingError):
-        content = read(file)
+        content = read_checked(file)
     if content.note:
         say(content.note)
     ending = Ending()

@@ -37,16 +37,13 @@ class ExternalControl:
 
     def find(self, name: str, then: Then) -> None:
         """Call back with the text of a program that has to be completed; with None if there is none of this name."""
-        if self._folder is None:
-            then(self._text(name, None))
-        else:
-            self._aside(partial(self._text, name, self._folder), then)
+        self._aside(partial(self._text, name), then)
 
-    @staticmethod
-    def _text(name: str, folder: ProgramFolder | None) -> str | None:
+    def _text(self, name: str) -> str | None:
         text = None
-        with suppress(UserFileError):  # loading it says what is wrong
-            text = None if folder is None else folder.read(name)
+        if self._folder is not None:
+            with suppress(UserFileError):  # loading it says what is wrong
+                text = self._folder.read(name)
         if text is None and name == FILE:
             return ALONE
         return text if text is not None and EXTERNAL_CONTROL in text else None

@@ -311,7 +311,7 @@ class UrInterfaces(Gateway):
                 loop.call_soon_threadsafe(action)
 
     def _aside(self, read: Callable[[], str | None], then: Callable[[str | None], None]) -> None:
-        """Read a file in a thread of its own, which nobody waits for, and call back in the interfaces' thread."""
+        """Read a file in a thread of its own, for which nobody waits, and call back in the interfaces' thread."""
 
         def reading() -> None:
             text = None

@@ -150,26 +150,20 @@ class Programs:
             control: Access of the client that plays it.
             heard: Called once, as soon as the program runs or has failed to start.
         """
-        name = self.name
+        name, state, asked = self.name, self.state, object()
         if name is None or control.held_by_other:
             heard(False)
-        elif self.state == "STOPPED":
-            self._complete(name, control, heard)
-        else:
-            self._play(control, heard)
-
-    def _complete(self, name: str, control: ControllerAccess, heard: Heard) -> None:
-        """Start the program of a name once it is known whether it has to be completed, and is."""
-        asked = self._asked = object()
+            return
+        self._asked = asked
 
         def wanted() -> bool:
             """Return False if it was stopped meanwhile, or another program was loaded or started."""
-            return self._asked is asked and (self.name, self.state) == (name, "STOPPED")
+            return self._asked is asked and (self.name, self.state) == (name, state)
 
         def found(text: str | None) -> None:
             if not wanted():
                 heard(False)
-            elif text is None:
+            elif text is None or state != "STOPPED":
                 self._play(control, heard)
             else:
                 self._external.complete(text, control.host, completed)
@@ -184,10 +178,8 @@ class Programs:
             if isinstance(reply, Refused):
                 self._except(reply)
                 heard(False)
-            elif wanted():
-                self._play(control, heard)
             else:
-                heard(False)
+                found(None)
 
         self._external.find(name, found)
 

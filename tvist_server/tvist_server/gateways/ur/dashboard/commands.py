@@ -261,7 +261,6 @@ def _bool(value: bool) -> str:
 
 
 QUIT: Final = "quit"
-STOP: Final = "stop"
 COMMANDS: Final = (
     Command("power on", _power_on),
     Command("power off", _power_off),
@@ -276,7 +275,7 @@ COMMANDS: Final = (
     Command("load", _load, argument=True),
     Command("play", _play),
     Command("pause", _pause),
-    Command(STOP, _stop),
+    Command("stop", _stop),
     Command("running", _running),
     Command("programState", _program_state),
     Command("get loaded program", _loaded_program),

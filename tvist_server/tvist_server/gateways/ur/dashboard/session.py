@@ -7,7 +7,7 @@ from typing import Final
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.modes import RuntimeState
 from tvist_server.gateways.ur.base import ControllerAccess, PortSession, Send
-from tvist_server.gateways.ur.dashboard.commands import QUIT, STOP, Request, find
+from tvist_server.gateways.ur.dashboard.commands import QUIT, Request, find
 from tvist_server.gateways.ur.dashboard.lines import Lines
 from tvist_server.gateways.ur.robot import UrRobot
 
@@ -54,15 +54,12 @@ class DashboardSession(PortSession):
         self._say(GREETING)
 
     def receive(self, data: bytes) -> None:
-        """Carry out the commands that are complete with these bytes; those beyond MAX_WAITING are declined.
-
-        One that stops the arm waits for no other: it is carried out at once, and answered in its turn.
-        """
+        """Carry out the commands that are complete with these bytes; those beyond MAX_WAITING are declined."""
         if self.over:
             return
         for line in self._lines.feed(data):
-            if line.lower() == STOP and (self._waiting or self._asked > self._answered):
-                self._robot.programs.stop(self._control, _ignored)
+            if line.lower() == "stop" and (self._waiting or self._asked > self._answered):
+                self._robot.programs.stop(self._control, lambda _: None)  # now, and again in its turn
             if self._declined or len(self._waiting) >= MAX_WAITING:
                 self._declined += 1
             else:
@@ -128,7 +125,3 @@ class DashboardSession(PortSession):
     def _say(self, text: str) -> None:
         plain = "".join([letter if letter.isprintable() else "?" for letter in text])
         self._send(plain.encode() + b"\n")
-
-
-def _ignored(well: bool) -> None:
-    """Say nothing: the command is carried out again in its turn, and then answered."""

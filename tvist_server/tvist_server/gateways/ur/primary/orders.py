@@ -12,9 +12,8 @@ from tvist_server.gateways.ur.primary.scripts import LONGEST, Unit
 from tvist_server.gateways.ur.robot import UrRobot
 
 TOO_LONG: Final = f"program_too_long: it has more than {LONGEST} bytes and was thrown away"
-STOP: Final = "stop program"
 SHORT: Final = 1000
-"""Length from which on a unit is none of the interface's own commands."""
+"""Length of none of the interface's own commands."""
 READ_ONLY: Final = (
     "this interface is read-only: somebody else controls the robot, or the port takes no commands"
 )
@@ -47,7 +46,7 @@ class Orders:
 
     def carry_out(self, unit: Unit) -> None:
         """Carry out a unit in its turn; one that stops the arm also at once."""
-        if self.waiting and len(unit.text) < SHORT and unit.words == STOP:
+        if self.waiting and len(unit.text) < SHORT and unit.words == "stop program":
             self._robot.programs.stop(self._control, lambda _: None)
         self._units.add(unit)
 
