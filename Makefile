@@ -69,7 +69,7 @@ search: setup
 	$(BESIDE) -m search --cases $(CASES) --seed $(SEED)
 
 # Those, and a search for an hour of what `.ci/run` searches for a minute.
-soak: CASES = 1200
+soak: CASES = 2000
 soak: nightly search
 
 # The clients of other projects, and what docs/reference/ur-clients.md says of them. SOURCES and BUILD of UR's C++ library: see

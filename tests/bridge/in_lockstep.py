@@ -5,7 +5,6 @@ ticks: the link between them is drawn from a seed, so that equal bridges make eq
 """
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,17 +12,13 @@ from msgspec import structs
 
 from tvist_controller.api.line import Setup, body, load_calibration
 from tvist_controller.api.robot import Controller, Host, Sink
-from tvist_lab.recordings import Floats
-from tvist_plant.description import RobotDescription
-from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, Measurement
 from tvist_plant.variants import hidden_variant
-from tvist_protocol.commands import Command, TakeControl
+from tvist_protocol.commands import TakeControl
 from tvist_protocol.io import Registers, SetRegisters
 from tvist_protocol.programs import ProgramRun
-from tvist_protocol.replies import Accepted, Refused, Reply
-from tvist_protocol.stream import Event, State
-from tvist_protocol.values import Payload
+from tvist_protocol.replies import Accepted, Refused
+from tvist_protocol.stream import Event
 from tvist_server.moving import registers as r
 from tvist_server.moving.program import MARGIN, program
 from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
@@ -61,10 +56,10 @@ IDEAL = Link(delay=0.5, jitter=0.0, loss=0.0)
 class Way:
     """One direction of a link: what is sent arrives in the order in which it was sent."""
 
-    def __init__(self, link: Link, seed: list[int]) -> None:
+    def __init__(self, link, seed):
         self._link, self._random, self._last = link, np.random.default_rng(seed), 0.0
 
-    def arrival(self, now: float) -> float:
+    def arrival(self, now):
         """Return when a package that leaves now arrives [ms]."""
         link, random = self._link, self._random
         took = link.delay + random.uniform(-link.jitter, link.jitter)
@@ -78,61 +73,46 @@ class Way:
 class Heard(Sink):
     """Keeps the events of a controller."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.events: list[Event] = []
 
-    def event(self, event: Event) -> None:
+    def event(self, event):
         self.events.append(event)
 
 
 class HiddenRobot:
-    """A hidden robot with our controller.
-
-    Args:
-        description: The robot file, which is all that its controller knows.
-        seed: Seed of the hidden robot, and of its gears' errors.
-        q: Joint angles at which it rests at first, shape (n,) [rad].
-        payload: Declared payload.
-        shaper: Its shaper.
-    """
+    """A hidden robot with our controller."""
 
     late = 0
     """Ticks by which its target is later than `wanted`."""
 
-    def __init__(
-        self,
-        description: RobotDescription,
-        seed: int,
-        q: Floats,
-        payload: Payload,
-        shaper: str = "none",
-    ) -> None:
+    def __init__(self, description, seed, q, payload, shaper="none"):
         self.plant = hidden_variant(seed).make(description, body(payload), seed)
         self.controller = Controller(setup_of(description, q, payload, shaper, seed), self.plant)
         self._token, heard = control(self.controller), Heard()
         self.events, self._host = heard.events, Host(self.controller, heard)
 
     @property
-    def robot(self) -> "HiddenRobot":
+    def robot(self):
         """The robot whose arm moves."""
         return self
 
     @property
-    def wanted(self) -> Floats:
+    def wanted(self):
         """Joint angles to which the line leads the arm, shape (n,) [rad]."""
         return self.controller.cycle.sample.target.q
 
-    def send(self, kind: Callable[..., Command], **fields: object) -> Reply:
+    def send(self, kind, **fields):
         return self.controller.receive(kind(token=self._token, **fields))
 
-    def follow(self, speed: float) -> None:
+    def follow(self, speed):
         """Run the program that follows set-points, up to a speed [rad/s]."""
         deceleration = min(self.controller.cycle.description.limits.acceleration)
         text = program(RUN, speed=speed, deceleration=deceleration, lookahead=LOOKAHEAD, gain=GAIN)
         reply = self.send(ProgramRun, text=text)
         assert not isinstance(reply, Refused), reply
 
-    def tick(self) -> State:
+    def tick(self):
         self._host.tick()
         return self.controller.latest
 
@@ -149,22 +129,15 @@ class Counts:
     """Largest step of a joint's own target between two ticks [rad]."""
 
     @property
-    def usual(self) -> int:
+    def usual(self):
         """Age that most of them have."""
         return max(self.played, key=lambda age: self.played[age])
 
 
 class Port:
-    """The plant of the controller in front: its commands become set-points, which the link carries to the robot.
+    """The plant of the controller in front: its commands become set-points, which the link carries to the robot."""
 
-    Args:
-        robot: The robot, in which the program runs from the first step on.
-        setpoints: Makes the set-points.
-        link: The link.
-        seed: Seed of the link.
-    """
-
-    def __init__(self, robot: HiddenRobot, setpoints: Setpoints, link: Link, seed: int) -> None:
+    def __init__(self, robot, setpoints, link, seed):
         self.robot, self.setpoints = robot, setpoints
         self.payload = robot.controller.cycle.line.plant.payload
         self.counts = Counts()
@@ -176,7 +149,7 @@ class Port:
         self._rows = deque[tuple[float, Measurement]]()
         self._measured = measured(robot.controller.latest)
 
-    def measure(self) -> Measurement:
+    def measure(self):
         """Return where the robot's target is."""
         state = self.robot.controller.latest
         found = measured(state)
@@ -184,7 +157,7 @@ class Port:
             np.array(state.target_q), np.zeros_like(found.q), found.moment, found.accelerometer
         )
 
-    def step(self, command: DriveCommand) -> Measurement:
+    def step(self, command):
         """Send the set-point, and let the robot tick; return its row with which this tick began."""
         counts, robot = self.counts, self.robot
         now = TICK * counts.ticks
@@ -207,11 +180,11 @@ class Port:
         counts.played[age] = counts.played.get(age, 0) + 1
         return self._measured
 
-    def output(self, place: int) -> int:
+    def output(self, place):
         """Return an integer that the program wrote."""
         return int(self.robot.controller.io(wrench=False).output_int_register[place])
 
-    def _deliver(self, now: float) -> None:
+    def _deliver(self, now):
         """Write the newest package that has arrived, which is all that the program can see."""
         values = None
         while self._packages and self._packages[0][0] <= now:
@@ -226,26 +199,9 @@ class Port:
 
 
 class Bridge:
-    """A controller with a shaper in front of a hidden robot without one.
+    """A controller with a shaper in front of a hidden robot without one."""
 
-    Args:
-        description: The robot file, which is all that the controllers know.
-        seed: Seed of the hidden robot and of the link.
-        q: Joint angles at which it rests at first, shape (n,) [rad].
-        payload: Declared payload.
-        shaper: The shaper in front.
-        link: The link.
-    """
-
-    def __init__(
-        self,
-        description: RobotDescription,
-        seed: int,
-        q: Floats,
-        payload: Payload,
-        shaper: str,
-        link: Link = IDEAL,
-    ) -> None:
+    def __init__(self, description, seed, q, payload, shaper, link=IDEAL):
         self.robot = HiddenRobot(description, seed, q, payload)
         speed = min(description.limits.velocity)
         self.robot.follow(speed)
@@ -264,24 +220,24 @@ class Bridge:
             self.tick()
 
     @property
-    def wanted(self) -> Floats:
+    def wanted(self):
         """Joint angles to which the line leads the arm, shape (n,) [rad]."""
         return self.port.wanted
 
     @property
-    def late(self) -> int:
+    def late(self):
         """Ticks by which the robot's target is later than `wanted`."""
         return self.port.counts.usual + 1  # for the robot's own differentiator
 
-    def send(self, kind: Callable[..., Command], **fields: object) -> Reply:
+    def send(self, kind, **fields):
         return self.controller.receive(kind(token=self._token, **fields))
 
-    def tick(self) -> State:
+    def tick(self):
         self._host.tick()
         return self.controller.latest
 
 
-def setup_of(description: RobotDescription, q: Floats, payload: Payload, shaper: str, seed: int) -> Setup:
+def setup_of(description, q, payload, shaper, seed):
     """Return the setup of a robot whose calibration is that of its model, and whose gear errors are a seed's."""
     return Setup(
         description=description, q=tuple(q.tolist()), payload=payload, shaper=shaper, clock="free", seed=seed,
@@ -289,13 +245,13 @@ def setup_of(description: RobotDescription, q: Floats, payload: Payload, shaper:
     )  # fmt: skip
 
 
-def control(controller: Controller) -> str:
+def control(controller):
     reply = controller.receive(TakeControl(client=CLIENT))
     assert isinstance(reply, Accepted), "nobody else has control"
     return str(reply.token)
 
 
-def measured(state: State) -> Measurement:
+def measured(state):
     """Return what a robot's row says."""
     return Measurement(
         np.array(state.actual_q), np.array(state.actual_qd), np.array(state.actual_moment),

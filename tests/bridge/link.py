@@ -8,9 +8,8 @@ import random
 import subprocess
 import sys
 from pathlib import Path
-from typing import Self
 
-from tests.system.relay import Address, Relay
+from tests.system.relay import Relay
 
 ROOT = Path(__file__).parents[2]
 PORTS = (29999, 30001, 30002, 30004)
@@ -20,52 +19,45 @@ DELAY = (0.5e-3, 1.5e-3)
 
 
 class Link:
-    """Listens at an address that stands for a robot's, and connects to the robot.
+    """Listens at an address that stands for a robot's, and connects to the robot."""
 
-    Args:
-        robot: Its IP address.
-        near: IP address that stands for it.
-        seed: Seed of the delays.
-        slower: Factor of the delays, beside a robot whose time passes more slowly.
-    """
-
-    def __init__(self, robot: str, near: str, seed: int, slower: float) -> None:
+    def __init__(self, robot, near, seed, slower):
         draw = random.Random(seed)
         self._ports = [_Uneven((robot, port), (near, port), draw, slower) for port in PORTS]
 
-    def do(self, what: str) -> None:
+    def do(self, what):
         """Do the same to all ports: `hold`, `flow`, `cut` or `restore` as a `Relay` does."""
         for port in self._ports:
             getattr(port, what)()
 
 
 class _Uneven(Relay):
-    def __init__(self, target: Address, near: Address, draw: random.Random, slower: float) -> None:
+    def __init__(self, target, near, draw, slower):
         self._draw, self._slower = draw, slower
         super().__init__(target, near)
 
-    def takes(self) -> float:
+    def takes(self):
         return self._slower * self._draw.uniform(*DELAY)
 
 
 class LinkProcess:
     """A `Link` in another process, which ends with this object's use as a context."""
 
-    def __init__(self, robot: str, near: str, seed: int, slower: float) -> None:
+    def __init__(self, robot, near, seed, slower):
         command = [sys.executable, "-m", "tests.bridge.link", robot, near, str(seed), str(slower)]
         self._process = subprocess.Popen(
             command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
 
-    def __enter__(self) -> Self:
+    def __enter__(self):
         self.do("flow")
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_):
         self._process.kill()
         self._process.communicate()
 
-    def do(self, what: str) -> None:
+    def do(self, what):
         """Let it do what `Link.do` says, and wait until it has."""
         print(what, file=self._process.stdin, flush=True)
         assert self._process.stdout.readline() == "done\n", what

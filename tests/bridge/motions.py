@@ -1,11 +1,9 @@
 """The paper's motions and random ones, by a robot that shapes them itself and through a bridge that does."""
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from tests.bridge.in_lockstep import Bridge, HiddenRobot
 
 from tvist_controller.api.line import (
     STILL,
@@ -23,7 +21,6 @@ from tvist_lab.recordings import Floats, Recording
 from tvist_lab.study.line import point_to_point
 from tvist_lab.study.moves import Move, is_free
 from tvist_lab.workspace import WORKSPACE
-from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
 from tvist_protocol.replies import Accepted
@@ -64,7 +61,7 @@ class Made:
     """What ended a motion before its target."""
 
 
-def asked(description: RobotDescription, count: int, seed: int) -> Iterator[Asked]:
+def asked(description, count, seed):
     """Yield the paper's motions and random ones, each from the end of the one before.
 
     They are free of collisions, and the random ones leave the torques that `servoj` wants, see `TORQUE`.
@@ -93,7 +90,7 @@ def asked(description: RobotDescription, count: int, seed: int) -> Iterator[Aske
             yield Asked(there, speed)
 
 
-def made(side: HiddenRobot | Bridge, motions: Sequence[Asked]) -> Made:
+def made(side, motions):
     """Let a robot make motions, one after the other from rest to rest, until one is stopped."""
     done = Made()
     for motion in motions:
@@ -115,7 +112,7 @@ def made(side: HiddenRobot | Bridge, motions: Sequence[Asked]) -> Made:
     return done
 
 
-def _made(side: HiddenRobot | Bridge) -> float:
+def _made(side):
     """Tick until the motion that begins has ended, and rest; return its peak [m/s²]."""
     ticks, stop, before = 0, 0, side.wanted
     rows: list[tuple[int, Floats, Floats]] = []

@@ -12,13 +12,10 @@ from tests.bridge.in_lockstep import HiddenRobot, Link, Port
 from tvist_controller.api.line import body, modal_estimator
 from tvist_controller.api.robot import OwnPlant
 from tvist_lab.identification.modal_plan import ModalPlan
-from tvist_lab.identification.positioned import JOG, Positioned, identify_moved, make_moves, plan_moves
+from tvist_lab.identification.positioned import JOG, identify_moved, make_moves, plan_moves
 from tvist_lab.in_process import free_setup, robot_in_process
-from tvist_lab.recordings import Floats
 from tvist_lab.workspace import identified, ranges
-from tvist_plant.description import RobotDescription, load
-from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import Measurement
+from tvist_plant.description import load
 from tvist_plant.variants import hidden_variant
 from tvist_server.moving.servo_lag import ServoLag, Setpoints
 
@@ -35,11 +32,11 @@ PLACES = 60
 class Rows(Port):
     """The same with rows at a lower rate: measurements are those of every so many periods."""
 
-    def __init__(self, every: int, *more: Any) -> None:
+    def __init__(self, every, *more):
         super().__init__(*more)
         self._every, self._seen = every, self.measure()
 
-    def step(self, command: DriveCommand) -> Measurement:
+    def step(self, command):
         """Send the set-point, and return the latest row."""
         row = super().step(command)
         if self.counts.ticks % self._every == 0:
@@ -47,14 +44,14 @@ class Rows(Port):
         return self._seen
 
 
-async def identified_in_lockstep(description: RobotDescription, hidden: int, every: int) -> Positioned:
+async def identified_in_lockstep(description, hidden, every):
     """Identify one hidden robot behind the program, a link and our control line, as fast as it computes."""
     name = description.robot.name
     setup = free_setup(robot=name, truth=False, shaper="none", calibration="none")
     q, payload = np.array(STANDS), setup.payload
     reach = np.array(description.limits.position)
 
-    def port(*_: object) -> Port:
+    def port(*_):
         robot = HiddenRobot(description, hidden, q, payload)
         robot.follow(SPEED)
         return Rows(every, robot, Setpoints(q, None, fastest=1.04 * SPEED, reach=reach), Link(), hidden)
@@ -70,9 +67,7 @@ async def identified_in_lockstep(description: RobotDescription, hidden: int, eve
     return identify_moved(moves, moved, name="found", command="tvist identify", progress=lambda _: None)
 
 
-def unseen(
-    description: RobotDescription, hidden: int, declared: Any, seed: int
-) -> list[tuple[Floats, float, float]]:
+def unseen(description, hidden, declared, seed):
     """Return configurations, and frequency and damping ratio of the lowest mode of the hidden robot there.
 
     It is linearised at rest. There a gear whose twist has turned back is as stiff as its hysteresis makes it.

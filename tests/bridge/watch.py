@@ -4,7 +4,6 @@ import selectors
 import socket
 import threading
 import time
-from typing import Any, Self
 
 import numpy as np
 
@@ -29,29 +28,25 @@ STILL = 1e-6
 
 
 class Watch:
-    """Reads a robot's rows, without a link in between, from a thread of its own.
+    """Reads a robot's rows, without a link in between, from a thread of its own."""
 
-    Args:
-        robot: Its IP address.
-    """
-
-    def __init__(self, robot: str) -> None:
+    def __init__(self, robot):
         self._client, self._socket = RtdeClient(_READ, {}), socket.create_connection((robot, 30004))
         self._rows: list[Row] = []
         self._ended = False
         self._thread = threading.Thread(target=self._read, daemon=True)
 
-    def __enter__(self) -> Self:
+    def __enter__(self):
         self._socket.sendall(self._client.begin())
         self._thread.start()
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_):
         self._ended = True
         self._thread.join()
         self._socket.close()
 
-    def _read(self) -> None:
+    def _read(self):
         with selectors.DefaultSelector() as ready:
             ready.register(self._socket, selectors.EVENT_READ)
             while not self._ended:
@@ -62,26 +57,26 @@ class Watch:
                         self._socket.sendall(received.send)
 
     @property
-    def count(self) -> int:
+    def count(self):
         """Number of rows so far."""
         return len(self._rows)
 
     @property
-    def state(self) -> State:
+    def state(self):
         """What the program does."""
         return State(int(self._rows[-1][_STATE][0]))
 
     @property
-    def plays(self) -> bool:
+    def plays(self):
         """Whether the robot plays a program."""
         return int(self._rows[-1]["runtime_state"][0]) == RuntimeState.PLAYING
 
     @property
-    def speed(self) -> float:
+    def speed(self):
         """Present speed of the fastest joint's target [rad/s]."""
         return max(map(abs, self._rows[-1]["target_qd"]))
 
-    def since(self, first: int) -> "Course":
+    def since(self, first):
         """Return the rows from one on."""
         return Course(self._rows[first:])
 
@@ -89,8 +84,8 @@ class Watch:
 class Course:
     """A piece of the robot's time, by its rows."""
 
-    def __init__(self, rows: list[Row]) -> None:
-        def column(name: str) -> Floats:
+    def __init__(self, rows):
+        def column(name):
             return np.array([row[name] for row in rows]).squeeze()
 
         self.time: Floats = column("timestamp")
@@ -99,13 +94,13 @@ class Course:
         self.state = column(_STATE)
 
     @property
-    def largest_step(self) -> float:
+    def largest_step(self):
         """Largest way of a joint's target in a period [rad]."""
         ways = np.abs(np.diff(self.q, axis=0)).max(axis=1) / np.round(np.diff(self.time) / PERIOD)
         return float(ways.max())
 
     @property
-    def silence(self) -> float:
+    def silence(self):
         """Time from the last new number before braking to the begin of braking [s].
 
         Braking has begun at the last row before rest at which the fastest joint was not slower than a row before, or
@@ -120,7 +115,7 @@ class Course:
         return float(self.time[begun] - self.time[came[-1] + 1 if len(came) else 0])
 
 
-def wait_for(true: Any, seconds: float, what: str) -> None:
+def wait_for(true, seconds, what):
     """Wait until something is so."""
     deadline = time.monotonic() + seconds
     while not true():

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.hidden import hidden, hidden_payload
@@ -32,15 +32,9 @@ class Change:
 
 
 class ChangingArm:
-    """A hidden robot with errors of its torque sensors, which can be changed while it rests; a `Placeable` plant.
+    """A hidden robot with errors of its torque sensors, which can be changed while it rests; a `Placeable` plant."""
 
-    Args:
-        description: The robot file.
-        said: Payload that it is said to carry.
-        seed: Seed of the hidden robot and of its sensors.
-    """
-
-    def __init__(self, description: RobotDescription, said: Payload, seed: int) -> None:
+    def __init__(self, description, said, seed):
         self._description, self._seed = hidden(description, seed), seed
         self._carried, self.payload = hidden_payload(said, seed), said
         random, limits = np.random.default_rng([seed, 67]), np.array(description.limits.torque)
@@ -54,7 +48,7 @@ class ChangingArm:
         self._last: DriveCommand | None = None
         self._arm = self._made(Change())
 
-    def _made(self, change: Change) -> FlexibleArm:
+    def _made(self, change):
         description = stiffer(self._description, change.springs)
         mass = self._carried.mass + change.mass
         carried = self._carried
@@ -64,13 +58,13 @@ class ChangingArm:
             carried = Payload(mass=mass, com=like.com, inertia=(xx, xy, xz, yy, yz, zz))
         return FlexibleArm(description, carried)
 
-    def change(self, change: Change) -> None:
+    def change(self, change):
         """Make another arm of it, which rests where it rested."""
         assert self._last is not None, "it has been placed"
         self._arm = self._made(change)
         self._arm.reset(self._last, seed=self._seed + self._ticks)
 
-    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
+    def reset(self, command, *, payload=None, seed=0):
         """Put the arm at rest."""
         if payload is not None:
             self.payload, self._carried = payload, hidden_payload(payload, self._seed)
@@ -78,13 +72,13 @@ class ChangingArm:
         self._last = command
         return self._read(self._arm.reset(command, seed=seed))
 
-    def step(self, command: DriveCommand) -> Measurement:
+    def step(self, command):
         """Move the arm by one period."""
         self._ticks += 1
         self._last = command
         return self._read(self._arm.step(command))
 
-    def _read(self, measured: Measurement) -> Measurement:
+    def _read(self, measured):
         """Return what its sensors show: a drive with more friction also needs more torque."""
         share, period = DRIFT
         drift = share * np.sin(2.0 * np.pi * self._ticks * PERIOD / period + self._friction_phase)

@@ -1,6 +1,5 @@
 """Everyday motions of hidden robots, and how these robots ring where nobody has listened."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.metrics import RingDown, fit_ring_down, tool_acceleration
 from tvist_lab.recordings import Floats
 from tvist_lab.study.line import RESTING, ControlLine, point_to_point
-from tvist_plant.description import RobotDescription, load
+from tvist_plant.description import load
 from tvist_plant.modes import Modes
 from tvist_plant.plant import PERIOD
 from tvist_plant.variants import hidden_variant
@@ -29,22 +28,17 @@ SKIPPED = 0.014
 """Time after a stop that is left out of a ring-down [s]."""
 
 
-def anywhere(random: np.random.Generator) -> Floats:
+def anywhere(random):
     """Return a posture as programs use them, shape (6,) [rad]."""
     low = (-np.pi, -np.pi, -2.6, -np.pi, -WRIST, -WRIST)
     high = (np.pi, 0.0, 2.6, 0.0, WRIST, WRIST)
     return random.uniform(low, high)
 
 
-async def everyday_logs(robot: str, hidden: int, seed: int) -> list[Log]:
+async def everyday_logs(robot, hidden, seed):
     """Record twenty motions as a user's program makes them: two of three by the joints, the third on a line.
 
     Only what a robot publishes is recorded; the robot is unshaped, and rests for 0.3 to 1.2 s after each motion.
-
-    Args:
-        robot: Name of the robot file.
-        hidden: Seed of the hidden robot.
-        seed: Seed of motions and noise.
     """
     rated = load(robot).limits.payload
     return [
@@ -53,7 +47,7 @@ async def everyday_logs(robot: str, hidden: int, seed: int) -> list[Log]:
     ]
 
 
-async def _log(robot: str, hidden: int, mass: float, count: int, seed: int) -> Log:
+async def _log(robot, hidden, mass, count, seed):
     setup = free_setup(
         robot=robot, payload=mass, hidden=hidden, truth=False, shaper="none", calibration="none", seed=seed
     )
@@ -98,7 +92,7 @@ class Unseen:
     """Modes of the arm linearised at rest, in which gears have no hysteresis."""
 
 
-def unseen(description: RobotDescription, hidden: int, count: int, seed: int) -> Iterator[Unseen]:
+def unseen(description, hidden, count, seed):
     """Return postures with the declared payloads in turn, where the robot rings loud enough to be judged."""
     random = np.random.default_rng([seed, 71])
     found = 0

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from tests.lab.matrix_pencil import WINDOW, Found
 
-from tvist_lab.recordings import Floats, Recording
+from tvist_lab.recordings import Recording
 
 RATES = (125.0, 266.0, 500.0)
 """Rates of the accelerometer [Hz]."""
@@ -60,7 +60,7 @@ class MadeUp:
     """
 
 
-def made_up(speed: Speed, seed: int) -> MadeUp:
+def made_up(speed, seed):
     """Make up a log of one stop: one to four modes, 2 to 4 Hz apart and of like size.
 
     An oscillation of amplitude a has f_d (1 - .03 a/a_0) and the damping ratio ζ_1 + (ζ_0 - ζ_1) a/a_0, with ζ_0 of .03
@@ -96,7 +96,7 @@ def made_up(speed: Speed, seed: int) -> MadeUp:
     return MadeUp(Recording(columns, foreign=True), BEFORE, modes)
 
 
-def _ring(random: np.random.Generator, speed: Speed, late: Floats) -> tuple[Floats, tuple[Found, ...]]:
+def _ring(random, speed, late):
     """Sum of the modes at some times after the stop, and what is true of them."""
     count = int(random.integers(1, 5))
     f_d = random.uniform(7.0, 15.0) + np.append(0.0, np.cumsum(random.uniform(2.0, 4.0, count - 1)))
@@ -124,19 +124,19 @@ def _ring(random: np.random.Generator, speed: Speed, late: Floats) -> tuple[Floa
     return alpha, tuple(sorted(modes, key=lambda one: -one.amplitude))
 
 
-def _joint(speed: Speed, late: Floats) -> Floats:
+def _joint(speed, late):
     """Angle of a joint that stops at 0 s [rad]."""
     ramp = min(speed.velocity / speed.acceleration, 0.5 * MOVES)
     rate = speed.acceleration * np.clip(np.minimum(late + MOVES, -late), 0.0, ramp)
     return np.asarray(np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(late))) - 1.0)
 
 
-def _overshoot(late: Floats, tail: float) -> Floats:
+def _overshoot(late, tail):
     """Overshoot that is largest after .08 s and swings back within .3 s [rad]."""
     since = np.clip(late, 0.0, None) / 0.08
     return np.asarray(tail * since**2 * np.exp(2.0 * (1.0 - since)))
 
 
-def _direction(random: np.random.Generator) -> Floats:
+def _direction(random):
     axis = random.normal(size=3)
     return np.asarray(axis / np.linalg.norm(axis))

@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_lab.recordings import Floats
-
 WINDOW = (0.12, 0.72)
 """Time after the target's stop that is fitted [s]; the arm is still driven before."""
 SHORTEST = 0.35
@@ -42,13 +40,8 @@ class Found(NamedTuple):
     """Largest |α| where the window begins [m/s²]."""
 
 
-def matrix_pencil(time: Floats, alpha: Floats) -> list[Found]:
-    """Modes of which at least two of three orders tell, the strongest first.
-
-    Args:
-        time: Time of each sample after the target's stop, shape (T,) [s].
-        alpha: Acceleration of the tool without gravity, shape (T, 3) [m/s²].
-    """
+def matrix_pencil(time, alpha):
+    """Modes of which at least two of three orders tell, the strongest first."""
     period = float(np.median(np.diff(time)))
     grid = np.arange(WINDOW[0], min(WINDOW[1], time[-1]), period)
     if len(grid) * period < SHORTEST:
@@ -71,7 +64,7 @@ def matrix_pencil(time: Floats, alpha: Floats) -> list[Found]:
     return [mode for mode in found if mode.amplitude >= max(LOUD * found[0].amplitude, LEAST)]
 
 
-def _modes(even: Floats, period: float, order: int) -> list[Found]:
+def _modes(even, period, order):
     """Modes of one order, with amplitudes by least squares."""
     length = len(even) // 2
     rows = np.lib.stride_tricks.sliding_window_view(even, length + 1, axis=0).reshape(-1, length + 1)

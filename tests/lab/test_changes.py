@@ -44,6 +44,11 @@ def test_a_payload_that_was_picked_up_is_told_with_its_mass():
     assert float(more) == pytest.approx(2.0, abs=0.6)
 
 
+def test_springs_that_have_become_softer_are_told():
+    said = changes(recorded(Change(springs=0.7)))
+    assert any(re.search(r"softer|stiff|ring", one) for one in said), said
+
+
 def test_of_an_arm_that_stays_as_it_was_nothing_is_told():
     assert changes(recorded(Change(), after=2)) == []
 

@@ -9,7 +9,6 @@ from tests.search.subject import Subject, speeds
 
 from tvist_controller.api.line import CLEARANCE, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetTcp
@@ -33,12 +32,12 @@ class ChangeOutcome:
     """Largest velocity and acceleration of a joint, relative to its limits; must be `WITHIN` or less [-]."""
 
     @property
-    def kept(self) -> bool:
+    def kept(self):
         """Whether clearance and limits were kept."""
         return self.near <= 0.0 and max(self.speeds) <= WITHIN
 
 
-def judge(description: RobotDescription, seed: int) -> ChangeOutcome:
+def judge(description, seed):
     """Change something at a random moment of a motion, sometimes stop it afterwards, and check the result."""
     random = np.random.default_rng([seed, 14])
     robot = _under_way(description, seed, random)
@@ -68,7 +67,7 @@ def judge(description: RobotDescription, seed: int) -> ChangeOutcome:
     )
 
 
-def far_payload(random: np.random.Generator, rated: float) -> Payload:
+def far_payload(random, rated):
     """Return a payload within the rating, with its centre of mass up to 0.3 m out."""
     mass = float(random.uniform(0.1, rated))
     direction = random.normal(size=3)
@@ -77,7 +76,7 @@ def far_payload(random: np.random.Generator, rated: float) -> Payload:
     return Payload(mass=mass, com=(com[0], com[1], com[2]), inertia=(moment, 0.0, 0.0, moment, 0.0, moment))
 
 
-def _draw(description: RobotDescription, random: np.random.Generator) -> Change:
+def _draw(description, random):
     payload = far_payload(random, description.limits.payload)
     one: Change = (c.SetPayload, {"mass": payload.mass, "com": payload.com, "inertia": payload.inertia})
     others: list[Change] = [
@@ -91,7 +90,7 @@ def _draw(description: RobotDescription, random: np.random.Generator) -> Change:
     return one if random.random() < 0.6 else others[int(random.integers(len(others)))]
 
 
-def _under_way(description: RobotDescription, seed: int, random: np.random.Generator) -> Subject:
+def _under_way(description, seed, random):
     """Return a robot during a move, during a stream, or shortly after one of them."""
     if random.random() < 0.6:
         case = stops.draw(description, seed)

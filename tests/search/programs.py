@@ -1,8 +1,7 @@
 """Random sequences of commands with programs among them, and guarantees that hold for programs besides."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 from tests.search import space
 from tests.search.scripts import Author
@@ -11,7 +10,6 @@ from tests.search.sequences import SENT, Sequence
 from tvist_protocol import programs as p
 from tvist_protocol.io import SetRegisters
 from tvist_protocol.replies import Refused
-from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
 
 DRIVEN = frozenset({Activity.MOVING, Activity.PAUSED, Activity.GUIDED})
@@ -38,17 +36,17 @@ class ProgramSequence(Sequence):
     """Number of the motion that began last."""
 
     @property
-    def sent(self) -> Mapping[str, tuple[float, Callable[[Any], object]]]:
+    def sent(self):
         """Commands and their relative frequencies."""
         return _SENT
 
-    def note(self, name: str, reply: object) -> None:
+    def note(self, name, reply):
         """Take note of a command's reply."""
         if not isinstance(reply, Refused) and name in STOPPERS | STARTERS:
             self._still = name in STOPPERS
             self._earlier = frozenset(self.robot.numbers)
 
-    def text(self, *, secondary: bool = False) -> str:
+    def text(self, *, secondary=False):
         """Return another program, and keep it for the story."""
         self._texts += 1
         author = Author(self.description, self.robot.references[-1], self._random)
@@ -57,34 +55,34 @@ class ProgramSequence(Sequence):
         self.done.append(text)
         return text
 
-    def run_program(self) -> object:
+    def run_program(self):
         """Start a program."""
         return self.robot.send(p.ProgramRun, text=self.text())
 
-    def run_beside(self) -> object:
+    def run_beside(self):
         """Start a secondary program."""
         return self.robot.send(p.ProgramRun, text=self.text(secondary=True))
 
-    def load_program(self) -> object:
+    def load_program(self):
         """Load a program, and play it."""
         text = self.text()
         self.robot.send(p.ProgramLoad, name=f"p{self._texts}", text=text)
         return self.robot.send(p.ProgramPlay)
 
-    def write(self) -> object:
+    def write(self):
         """Write a register."""
         return self.robot.send(
             SetRegisters, bank="input_int", first=0, values=(int(self._random.integers(9)),)
         )
 
-    def _tick(self, count: int) -> None:
+    def _tick(self, count):
         controller = self.robot.controller
         for _ in range(count):
             self._playing = controller.programs.state == "PLAYING"
             self._rested, self._declared = controller.cycle.mode.at_rest, controller.declared
             super()._tick(1)
 
-    def _watch(self) -> None:
+    def _watch(self):
         controller = self.robot.controller
         for event in self.robot.events[self._seen :]:
             self._hear(event)
@@ -97,7 +95,7 @@ class ProgramSequence(Sequence):
         if orphan and controller.programs.state == "STOPPED" and controller.motion.activity in DRIVEN:
             raise self._broken("a program has ended, and its motion goes on")
 
-    def _hear(self, event: Event) -> None:
+    def _hear(self, event):
         if event.kind != "motion_started":
             return
         self._number, self._ahead = event.id, None
@@ -106,7 +104,7 @@ class ProgramSequence(Sequence):
         if event.id not in self.robot.numbers and not self._playing:
             raise self._broken("a motion began while no program was playing")
 
-    def _come_back(self) -> None:
+    def _come_back(self):
         self._ahead = None
         self.note("program_stop", self.robot.send(p.ProgramStop))
         self._tick(1)
@@ -121,8 +119,8 @@ class ProgramSequence(Sequence):
             raise self._broken(f"programs {dict(started)} ended as {dict(stopped)}")
 
 
-def _noted(name: str, send: Callable[[Any], object]) -> Callable[[Any], object]:
-    def noted(it: ProgramSequence) -> object:
+def _noted(name, send):
+    def noted(it):
         reply = send(it)
         it.note(name, reply)
         return reply

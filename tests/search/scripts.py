@@ -1,13 +1,11 @@
 """Random programs in URScript, for sequences of commands."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from tests.search import space
 
 from tvist_controller.api.planning import ToolKinematics
-from tvist_lab.recordings import Floats
-from tvist_plant.description import RobotDescription
 
 Random = np.random.Generator
 MOST_STATEMENTS = 7
@@ -17,20 +15,14 @@ HEAVY = 1.0
 
 
 class Author:
-    """Writes programs whose moves begin near a posture.
+    """Writes programs whose moves begin near a posture."""
 
-    Args:
-        description: The robot.
-        q: The posture [rad].
-        random: Draws everything.
-    """
-
-    def __init__(self, description: RobotDescription, q: Floats, random: Random) -> None:
+    def __init__(self, description, q, random):
         self._limit, self._q, self._random = np.array(description.limits.position), q, random
         self._fastest, self._hardest = min(description.limits.velocity), min(description.limits.acceleration)
         self._kinematics = ToolKinematics(description)
 
-    def program(self, name: str) -> str:
+    def program(self, name):
         """A program; in some, threads move the arm before it does, or run beside it, and are killed sooner or later."""
         random, lines, body = self._random, ["global count = 0"], list[str]()
         for number in range(int(random.choice([0, 0, 1, 2]))):
@@ -48,16 +40,16 @@ class Author:
             body = _endlessly(body)
         return self._whole("def", name, lines + body)
 
-    def secondary(self, name: str) -> str:
+    def secondary(self, name):
         """A secondary program, which does not move the arm."""
         body = self._statements(int(self._random.integers(1, 4)), moving=False)
         return self._whole("sec", name, ["global count = 0", *body])
 
     @staticmethod
-    def _whole(keyword: str, name: str, lines: Sequence[str]) -> str:
+    def _whole(keyword, name, lines):
         return "\n".join((f"{keyword} {name}():", *_indented(lines), "end", ""))
 
-    def _statements(self, count: int, *, moving: bool) -> list[str]:
+    def _statements(self, count, *, moving):
         kinds = _MOVING + _STILL if moving else _STILL
         weights = np.array([weight for weight, _ in kinds], dtype=float)
         lines: list[str] = []
@@ -65,24 +57,24 @@ class Author:
             lines += kinds[number][1](self)
         return lines
 
-    def movej(self) -> list[str]:
+    def movej(self):
         random = self._random
         goal = self._posture(1.0) if random.random() < 0.7 else self._pose()
         v, a = random.choice([1.0, 1.05, *random.uniform(0.07, 1.0, 6)]) * self._fastest, self._acceleration()
         return [f"movej({goal}, a={a:.3f}, v={v:.3f}{self._blend()})"]
 
-    def movel(self) -> list[str]:
+    def movel(self):
         goal = "p[2, 0, 0, 0, 0, 0]" if self._random.random() < 0.03 else self._pose()
         return [f"movel({goal}, {self._pace()}{self._blend()})"]
 
-    def movep(self) -> list[str]:
+    def movep(self):
         return [f"movep({self._pose()}, {self._pace()}{self._blend()})"]
 
-    def movec(self) -> list[str]:
+    def movec(self):
         mode = int(self._random.integers(2))
         return [f"movec({self._pose(0.4)}, {self._pose()}, {self._pace()}{self._blend()}, mode={mode})"]
 
-    def path(self) -> list[str]:
+    def path(self):
         moves = (self.movel, self.movep, self.movec, self.movej)
         lines = []
         for _ in range(int(self._random.integers(2, 5))):
@@ -90,7 +82,7 @@ class Author:
             lines += [move.replace(", r=0)", ", r=0.03)").replace(", r=0,", ", r=0.03,"), *self.write()]
         return lines
 
-    def servoj(self) -> list[str]:
+    def servoj(self):
         random, goal = self._random, self._posture(0.4)
         call = (
             f"servoj({goal}, t={random.choice([0.002, 0.008])}, lookahead_time={random.uniform(0.03, 0.2):.3f}, "
@@ -98,10 +90,10 @@ class Author:
         )
         return ["i = 0", f"while i < {random.integers(1, 200)}:", *_indented([call, "i = i + 1"]), "end"]
 
-    def servoc(self) -> list[str]:
+    def servoc(self):
         return [f"servoc({self._pose(0.3)}, {self._pace()}, r={self._random.choice([0, 0.02])})"]
 
-    def speedj(self) -> list[str]:
+    def speedj(self):
         random = self._random
         qd = (
             random.choice([0.6, 1.0])
@@ -111,17 +103,17 @@ class Author:
         )
         return [f"speedj({qd.round(3).tolist()}, {self._acceleration():.3f}{self._time()})"]
 
-    def speedl(self) -> list[str]:
+    def speedl(self):
         xd = self._random.uniform(-0.4, 0.4, 6) * (self._random.random() > 0.15)
         return [f"speedl({xd.round(3).tolist()}, {self._random.uniform(0.3, 4.0):.3f}{self._time()})"]
 
-    def stopj(self) -> list[str]:
+    def stopj(self):
         return [f"stopj({10 ** self._random.uniform(-1, 1.6):.3f})"]
 
-    def stopl(self) -> list[str]:
+    def stopl(self):
         return [f"stopl({10 ** self._random.uniform(-1, 1.0):.3f})"]
 
-    def write(self) -> list[str]:
+    def write(self):
         number = int(self._random.integers(4))
         return [
             (f"write_output_integer_register({number}, count)", f"set_standard_digital_out({number}, True)",
@@ -129,56 +121,56 @@ class Author:
             "count = count + 1",
         ]  # fmt: skip
 
-    def sleep(self) -> list[str]:
+    def sleep(self):
         return [f"sleep({self._random.choice([0.0, 0.002, 0.1, 0.5]):g})"]
 
-    def payload(self) -> list[str]:
+    def payload(self):
         mass, com = self._random.uniform(0.0, HEAVY), self._random.uniform(-0.05, 0.05, 3).round(3).tolist()
         return [f"set_target_payload({mass:.3f}, {com}, transition_time={self._random.choice([0, 0.2])})"]
 
-    def tool(self) -> list[str]:
+    def tool(self):
         return [f"set_tcp(p[0, 0, {self._random.uniform(0.0, 0.2):.3f}, 0, 0, 0])"]
 
-    def protective_stop(self) -> list[str]:
+    def protective_stop(self):
         return ["protective_stop()"]
 
-    def endless(self) -> list[str]:
+    def endless(self):
         return ["while True:", "  count = count + 1", "end"]
 
-    def halt(self) -> list[str]:
+    def halt(self):
         return ["halt"]
 
-    def critical(self) -> list[str]:
+    def critical(self):
         return ["enter_critical", *self.write(), *self.sleep(), "exit_critical"]
 
-    def _posture(self, share: float) -> str:
+    def _posture(self, share):
         moved = self._q + share * self._random.uniform(-1.0, 1.0, len(self._q))
         return f"{np.clip(moved, -self._limit, self._limit).round(4).tolist()}"
 
-    def _pose(self, share: float = 1.0) -> str:
+    def _pose(self, share=1.0):
         if self._random.random() < 0.2:
             return f"pose_add(get_target_tcp_pose(), p[0, 0, {self._random.uniform(-0.1, 0.1):.3f}, 0, 0, 0])"
         return f"p{np.round(space.pose_near(self._kinematics, self._q, self._random, share), 4).tolist()}"
 
-    def _acceleration(self) -> float:
+    def _acceleration(self):
         random, most = self._random, self._hardest
         return float(random.choice([random.uniform(0.5, 8.0), random.uniform(8.0, most), most]))
 
-    def _pace(self) -> str:
+    def _pace(self):
         return f"a={self._random.uniform(0.3, 4.0):.3f}, v={self._random.uniform(0.05, 0.8):.3f}"
 
-    def _blend(self) -> str:
+    def _blend(self):
         return f", r={self._random.choice(['0', '0', '0.02', '0.05'])}"
 
-    def _time(self) -> str:
+    def _time(self):
         return "" if self._random.random() < 0.3 else f", {self._random.choice([0.002, 0.1, 0.5])}"
 
 
-def _endlessly(lines: Sequence[str]) -> list[str]:
+def _endlessly(lines):
     return ["while True:", *_indented([*lines, "sync()"]), "end"]
 
 
-def _indented(lines: Sequence[str]) -> list[str]:
+def _indented(lines):
     return [f"  {line}" for line in lines]
 
 

@@ -1,8 +1,7 @@
 """Random sequences of arbitrary commands, and guarantees that must hold throughout."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 from tests.search import draws, space
@@ -13,7 +12,6 @@ from tests.search.undisturbed import ROUNDING, Undisturbed
 
 from tvist_controller.api.line import CLEARANCE, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_plant.description import RobotDescription
 from tvist_protocol import commands as c
 from tvist_protocol.faults import FAULTS as FAULT_FIELDS
 from tvist_protocol.replies import Accepted, Refused
@@ -49,14 +47,9 @@ class BrokenError(AssertionError):
 
 
 class Sequence:
-    """One sequence with its checks.
+    """One sequence with its checks."""
 
-    Args:
-        description: The robot.
-        seed: Number of the sequence.
-    """
-
-    def __init__(self, description: RobotDescription, seed: int) -> None:
+    def __init__(self, description, seed):
         self.seed, self.description = seed, description
         self._random = np.random.default_rng([seed, 15])
         self._free = CollisionModel(description, body(paper_payload(description, 0.0)))
@@ -77,7 +70,7 @@ class Sequence:
         self._braked = False
         self._injected = ""
 
-    def run(self, count: int = COMMANDS) -> None:
+    def run(self, count=COMMANDS):
         """Send the commands, and check that the arm can be moved again afterwards.
 
         Raises:
@@ -98,17 +91,17 @@ class Sequence:
         self._come_back()
 
     @property
-    def sent(self) -> Mapping[str, tuple[float, Callable[[Any], object]]]:
+    def sent(self):
         """Commands and their relative frequencies."""
         return SENT
 
-    def _posture(self) -> Floats:
+    def _posture(self):
         while True:
             q: Floats = draws.postures(self.description, self._random, 1)[0]
             if self._free.meeting(q) is None:
                 return q
 
-    def _foresee(self) -> Undisturbed | None:
+    def _foresee(self):
         """Return the future references if no command comes, provided that the motion follows a line of the joints."""
         motion, cycle = self.robot.controller.motion, self.robot.controller.cycle
         path = cycle.trajectory.path
@@ -117,7 +110,7 @@ class Sequence:
         ahead = motion.outlook.foresee()
         return None if ahead is None else Undisturbed(ahead[1:], self.robot.controller.tick_number)
 
-    def _tick(self, count: int) -> None:
+    def _tick(self, count):
         robot = self.robot
         for _ in range(count):
             if robot.controller.motion.streaming:
@@ -128,7 +121,7 @@ class Sequence:
                 raise self._broken("ticks are not consecutive")
             self._watch()
 
-    def _stream(self) -> None:
+    def _stream(self):
         """Send a set-point on the way to a random target."""
         way = self._towards - self._at
         step = self._pace * np.clip(way, -1.0, 1.0)
@@ -138,7 +131,7 @@ class Sequence:
         self.robot.setpoint(self._sequence, self._at)
         self._sequence += 1
 
-    def _watch(self) -> None:
+    def _watch(self):
         robot, limits = self.robot, self.description.limits
         q = np.array(robot.references[-3:])
         activity = robot.controller.motion.activity
@@ -163,7 +156,7 @@ class Sequence:
             if breach is not None:
                 raise self._broken(breach)
 
-    def _watch_clearance(self, q: Floats) -> None:
+    def _watch_clearance(self, q):
         collisions = self.robot.controller.motion.collisions
         meeting = collisions.meeting(q[-1])
         if meeting is None:
@@ -171,7 +164,7 @@ class Sequence:
         elif not self._excused and meeting.distance < CLEARANCE - DIP:
             raise self._broken(f"by the reference {meeting}, nearer than {CLEARANCE} m")
 
-    def _come_back(self) -> None:
+    def _come_back(self):
         """Check that the robot can be moved again from its present state."""
         robot = self.robot
         self._ahead = None
@@ -198,19 +191,19 @@ class Sequence:
         if started != ended:
             raise self._broken(f"motions {dict(started)} ended as {dict(ended)}")
 
-    def _tick_until_rest(self) -> None:
+    def _tick_until_rest(self):
         for _ in range(200):
             if not self.robot.controller.motion.activity.moving:
                 return
             self._tick(100)
         raise self._broken("it does not come to rest")
 
-    def _broken(self, what: str) -> BrokenError:
+    def _broken(self, what):
         story = "\n  ".join(self.done[-12:])
         tick = self.robot.controller.tick_number
         return BrokenError(f"sequence {self.seed}, tick {tick}: {what}, after\n  {story}")
 
-    def _limited(self, kind: type[Any], **fields: object) -> object:
+    def _limited(self, kind, **fields):
         """Send a command for a motion with random limits, after one with a limit above the arm's own, now and then."""
         if self._random.random() < 0.1:
             name, value = draws.above(self.description, self._random)
@@ -228,7 +221,7 @@ class Sequence:
                 raise self._broken(f"{kind.__name__} with {name} {value} is not refused: {reply}")
         return self.robot.send(kind, **fields, **draws.limits(self.description, self._random))
 
-    def move(self) -> object:
+    def move(self):
         target, random = self._posture(), self._random
         if random.random() < 0.3:
             here = self.robot.references[-1]
@@ -242,18 +235,18 @@ class Sequence:
             raise self._broken(f"a move past the end of a joint's range is not refused: {reply}")
         return reply
 
-    def stream(self) -> object:
+    def stream(self):
         self._sequence, self._at = 0, self.robot.controller.cycle.sample.reference
         self._towards = self._random.uniform(-3, 3, self.description.joints)
         self._pace = float(self._random.choice([0.004, 0.02]))
         return self._limited(c.ServoStart)
 
-    def halt(self) -> object:
+    def halt(self):
         token = self.robot.token if self._random.random() < 0.5 else None
         wanted = None if self._random.random() < 0.4 else float(10 ** self._random.uniform(-2, 1.6))
         return self.robot.send(c.Stop, token=token, deceleration=wanted)
 
-    def payload(self) -> object:
+    def payload(self):
         payload = far_payload(self._random, self.description.limits.payload)
         resting = self.robot.controller.cycle.mode.at_rest
         reply = self.robot.send(c.SetPayload, mass=payload.mass, com=payload.com, inertia=payload.inertia)
@@ -262,19 +255,19 @@ class Sequence:
             self._excused = collisions.meeting(self.robot.references[-1]) is not None
         return reply
 
-    def speed(self) -> object:
+    def speed(self):
         return self.robot.send(c.SetSpeed, fraction=float(self._random.uniform(0.05, 1.0)))
 
-    def shaper(self) -> object:
+    def shaper(self):
         return self.robot.send(c.SetShaper, name=draws.shaper(self.description, self._random))
 
-    def estimator(self) -> object:
+    def estimator(self):
         if self._random.random() < 0.2:
             return self.robot.send(c.SetEstimator, name="modal")
         f_d, zeta = self._random.uniform(4, 20), self._random.uniform(0.0, 0.3)
         return self.robot.send(c.SetEstimator, name="fixed", f_d=(float(f_d),), zeta=(float(zeta),))
 
-    def reset(self) -> object:
+    def reset(self):
         collisions = self.robot.controller.motion.collisions
         for _ in range(100):
             q = self._posture()
@@ -288,7 +281,7 @@ class Sequence:
             self._excused = collisions.meeting(q) is not None
         return reply
 
-    def inject(self) -> object:
+    def inject(self):
         fault = str(self._random.choice(FAULTS))
         self.done.append(f"  fault {fault}")
         self._injected = fault
@@ -302,18 +295,18 @@ class Sequence:
             raise self._broken(f"{activity} under {system}")
         return reply
 
-    def lose(self) -> object:
+    def lose(self):
         self.robot.controller.client_gone(CLIENT, SESSION)
         self.robot.token = self.robot.take_control()
         return "gone"
 
-    def release(self) -> object:
+    def release(self):
         reply = self.robot.send(c.ReleaseControl)
         self.robot.token = self.robot.take_control()
         return reply
 
 
-def _in_space(send: Callable[[Subject, np.random.Generator], object]) -> Callable[[Sequence], object]:
+def _in_space(send):
     return lambda it: send(it.robot, it._random)
 
 

@@ -6,7 +6,6 @@ import numpy as np
 from tests.search.subject import Subject
 
 from tvist_controller.api.planning import ToolKinematics, placement_vector, turned
-from tvist_lab.recordings import Floats
 from tvist_protocol import motions as m
 from tvist_protocol.replies import Reply
 
@@ -17,34 +16,34 @@ NEAR, TURN = 0.2, 0.6
 """Largest distance [m] and turn [rad] of a random pose from the present one, along and about each axis."""
 
 
-def _pose(robot: Subject, random: Random, share: float = 1.0) -> Pose:
+def _pose(robot, random, share=1.0):
     """A pose of the flange near the present one."""
     return pose_near(ToolKinematics(robot.description), robot.references[-1], random, share)
 
 
-def pose_near(kinematics: ToolKinematics, q: Floats, random: Random, share: float = 1.0) -> Pose:
+def pose_near(kinematics, q, random, share=1.0):
     """Return a random pose near that of the tool at a posture."""
     rotation, position = kinematics.pose(q)
     moved = position + share * random.uniform(-NEAR, NEAR, 3)
     return placement_vector(turned(rotation, share * random.uniform(-TURN, TURN, 3)), moved)
 
 
-def _pace(random: Random) -> dict[str, float]:
+def _pace(random):
     return {"velocity": float(random.uniform(0.05, 0.8)), "acceleration": float(random.uniform(0.3, 4.0))}
 
 
-def line(robot: Subject, random: Random) -> Reply:
+def line(robot, random):
     duration = float(random.uniform(0.3, 4.0)) if random.random() < 0.2 else None
     return robot.send(m.MoveL, pose=_pose(robot, random), duration=duration, **_pace(random))
 
 
-def arc(robot: Subject, random: Random) -> Reply:
+def arc(robot, random):
     orientation = str(random.choice(["interpolated", "tangent"]))
     via, pose = _pose(robot, random, 0.4), _pose(robot, random)
     return robot.send(m.MoveC, via=via, pose=pose, orientation=orientation, **_pace(random))
 
 
-def path(robot: Subject, random: Random) -> Reply:
+def path(robot, random):
     segments: list[m.Segment] = []
     for _ in range(int(random.integers(2, 5))):
         blend = float(random.choice([0.0, 0.02, 0.05]))
@@ -57,7 +56,7 @@ def path(robot: Subject, random: Random) -> Reply:
     return robot.send(m.MovePath, segments=tuple(segments))
 
 
-def servo(robot: Subject, random: Random) -> Reply:
+def servo(robot, random):
     q = robot.references[-1] + random.uniform(-0.4, 0.4, robot.description.joints)
     limit = np.array(robot.description.limits.position)
     return robot.send(
@@ -69,7 +68,7 @@ def servo(robot: Subject, random: Random) -> Reply:
     )
 
 
-def joint_speed(robot: Subject, random: Random) -> Reply:
+def joint_speed(robot, random):
     limits = robot.description.limits
     shares = random.uniform(-0.6, 0.6, robot.description.joints)
     if random.random() < 0.3:
@@ -82,7 +81,7 @@ def joint_speed(robot: Subject, random: Random) -> Reply:
     return robot.send(m.SpeedJ, qd=tuple(qd.tolist()), acceleration=acceleration, shaped=shaped)
 
 
-def tool_speed(robot: Subject, random: Random) -> Reply:
+def tool_speed(robot, random):
     xd = random.uniform(-0.4, 0.4, 6) * (random.random() > 0.15)
     shaped = bool(random.random() < 0.2)
     return robot.send(
@@ -90,11 +89,11 @@ def tool_speed(robot: Subject, random: Random) -> Reply:
     )
 
 
-def joint_stop(robot: Subject, random: Random) -> Reply:
+def joint_stop(robot, random):
     return robot.send(m.StopJ, acceleration=float(10 ** random.uniform(-1, 1.6)))
 
 
-def tool_stop(robot: Subject, random: Random) -> Reply:
+def tool_stop(robot, random):
     return robot.send(m.StopL, acceleration=float(10 ** random.uniform(-1, 1.0)))
 
 

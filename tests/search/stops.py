@@ -18,7 +18,6 @@ from tvist_controller.api.line import (
     resting_after,
 )
 from tvist_lab.recordings import Floats
-from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.simulation import SimulationInject
@@ -98,7 +97,7 @@ class Outcome:
     """Velocity of the leading joint at the stop [rad/s]."""
 
     @property
-    def kept(self) -> bool:
+    def kept(self):
         """Whether every figure is within its bound."""
         return (
             self.ahead <= ROUNDING
@@ -111,7 +110,7 @@ class Outcome:
         )
 
 
-def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tuple(KINDS)) -> Case:
+def draw(description, seed, kinds=tuple(KINDS)):
     """Return a case by its number; its move is one that the robot accepts."""
     random = np.random.default_rng([seed, 11])
     collisions = CollisionModel(description, body(paper_payload(description, 0.0)))
@@ -139,7 +138,7 @@ def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tupl
     return Case(**{**vars(case), "moment": int(random.integers(1, last))})
 
 
-def judge(description: RobotDescription, case: Case) -> Outcome:
+def judge(description, case):
     """Stop the move, and compare it with the uninterrupted one."""
     payload = paper_payload(description, case.mass)
     alone = _left_alone(description, case)
@@ -179,7 +178,7 @@ def judge(description: RobotDescription, case: Case) -> Outcome:
     )
 
 
-def moving(description: RobotDescription, case: Case) -> Subject:
+def moving(description, case):
     """Return a robot that has just accepted the case's move."""
     robot = Subject(description, case.start, paper_payload(description, case.mass), shaper=case.shaper)
     robot.send(c.SetSpeed, fraction=case.speed)
@@ -191,7 +190,7 @@ def moving(description: RobotDescription, case: Case) -> Subject:
     return robot
 
 
-def _left_alone(description: RobotDescription, case: Case) -> Floats:
+def _left_alone(description, case):
     robot = moving(description, case)
     robot.until_rest()
     robot.tick(200)  # changes below 1e-7 rad per tick count as rest, so the filter's tail still creeps

@@ -10,7 +10,6 @@ from tests.search.subject import CLIENT, SESSION, Subject, refused, speeds
 
 from tvist_controller.api.line import CLEARANCE, CollisionModel, JointLine, body, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.simulation import SimulationInject
@@ -71,12 +70,12 @@ class StreamOutcome:
     """Whether set-points were counted as limited if many were faster than the stream's limit."""
 
     @property
-    def kept(self) -> bool:
+    def kept(self):
         """Whether every figure is within its bound."""
         return self.near <= 0.0 and self.beyond <= BEYOND and max(self.speeds) <= WITHIN and self.counted
 
 
-def draw(description: RobotDescription, seed: int) -> StreamCase:
+def draw(description, seed):
     """Return a case by its number; most cases lead to a meeting."""
     random = np.random.default_rng([seed, 12])
     collisions = CollisionModel(description, body(paper_payload(description, 0.0)))
@@ -105,13 +104,13 @@ def draw(description: RobotDescription, seed: int) -> StreamCase:
     )
 
 
-def eased(share: float) -> float:
+def eased(share):
     """Share of a way from rest to rest that is covered after a share of its time [-]."""
     share = min(share, 1.0)
     return share * share * (3.0 - 2.0 * share)
 
 
-def judge(description: RobotDescription, case: StreamCase) -> StreamOutcome:
+def judge(description, case):
     """Send the stream, and check the result."""
     random = np.random.default_rng([case.seed, 13])
     robot = Subject(

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -21,14 +20,13 @@ from tvist_controller.api.robot import Controller
 from tvist_controller.calibrations import default_for
 from tvist_lab.identification.modal_calibration import mode_range
 from tvist_lab.recordings import Floats
-from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.drives import DriveCommand
+from tvist_plant.description import RobotDescription
 from tvist_plant.model import flexible_model
 from tvist_plant.plant import PERIOD, Measurement
 from tvist_protocol import commands as c
 from tvist_protocol.calibration import Calibration, ModalParameter, Quantity
 from tvist_protocol.info import Clock
-from tvist_protocol.replies import Accepted, Refused, Reply
+from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload as Declared
@@ -42,36 +40,27 @@ _made: dict[str, Calibration] = {}
 class RigidArm:
     """A plant for tests of references only: it is always exactly at its target, and measures no forces."""
 
-    def __init__(self, payload: Payload) -> None:
+    def __init__(self, payload):
         self._payload = payload
 
     @property
-    def payload(self) -> Payload:
+    def payload(self):
         return self._payload
 
-    def step(self, command: DriveCommand) -> Measurement:
+    def step(self, command):
         return Measurement(command.q, command.qd, np.zeros_like(command.q), np.zeros(3))
 
-    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:  # noqa: ARG002
+    def reset(self, command, *, payload=None, seed=0):  # noqa: ARG002
         self._payload = self._payload if payload is None else payload
         return self.step(command)
 
-    def truth(self) -> None:
+    def truth(self):
         return None
 
 
 @dataclass
 class Subject:
-    """A robot under test.
-
-    Args:
-        description: The robot.
-        q: Joint angles at which it is at rest initially [rad].
-        payload: Payload, both declared and carried.
-        shaper: Name of its shaper.
-        clock: Clock of the robot: leases expire only in real time.
-        lease_s: Length of the lease [s].
-    """
+    """A robot under test."""
 
     description: RobotDescription
     q: Floats
@@ -85,7 +74,7 @@ class Subject:
     numbers: set[int] = field(default_factory=set)
     """Numbers of the motions that its client has asked for."""
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         setup = Setup(
             description=self.description,
             q=tuple(self.q.tolist()),
@@ -106,12 +95,12 @@ class Subject:
             reply = self.send(c.SetShaper, name=self.shaper)
             assert not refused(reply), reply
 
-    def take_control(self) -> str:
+    def take_control(self):
         reply = self.controller.receive(c.TakeControl(client=CLIENT, lease_s=self.lease_s), session=SESSION)
         assert isinstance(reply, Accepted), reply
         return str(reply.token)
 
-    def send(self, kind: type[Any], **fields: Any) -> Reply:
+    def send(self, kind, **fields):
         """Send a command with the token of the lease, unless another one is given."""
         if "token" in kind.__struct_fields__:
             fields.setdefault("token", self.token)
@@ -120,16 +109,16 @@ class Subject:
             self.numbers.add(reply.id)
         return reply
 
-    def setpoint(self, sequence: int, q: Floats) -> None:
+    def setpoint(self, sequence, q):
         self.controller.receive_setpoint(c.Setpoint(token=self.token, sequence=sequence, q=tuple(q.tolist())))
 
-    def tick(self, count: int = 1) -> None:
+    def tick(self, count=1):
         for _ in range(count):
             _, events = self.controller.tick()
             self.references.append(self.controller.cycle.line.shaped.position)
             self.events += events
 
-    def until_rest(self, most: int = 20_000) -> bool:
+    def until_rest(self, most=20_000):
         """Advance time until the shaped reference has rested for a tick; return whether it did."""
         for _ in range(most):
             if self.resting:
@@ -138,7 +127,7 @@ class Subject:
         return False
 
     @property
-    def resting(self) -> bool:
+    def resting(self):
         """Whether the shaped reference stands still, at rest or paused, and no part of its motion will follow."""
         cycle, motion = self.controller.cycle, self.controller.motion
         if motion.activity is Activity.MOVING and motion.motions.coming:
@@ -146,25 +135,25 @@ class Subject:
         return cycle.mode.at_rest or (not cycle.trajectory.finished and cycle.stands_still)
 
 
-def torques(description: RobotDescription, payload: Declared, references: Floats) -> Floats:
+def torques(description, payload, references):
     """Torques of the rigid arm along references, one per tick, by central differences, shape (k - 2, n) [N m]."""
     dynamics = InverseDynamics(description, body(payload))
     states = zip(*central_differences(references, PERIOD), strict=True)
     return np.array([dynamics.torque(*state) for state in states])
 
 
-def speeds(description: RobotDescription, references: Floats) -> tuple[float, float]:
+def speeds(description, references):
     """Largest velocity and acceleration of any joint along references, shape (k, n), as shares of its limits [-]."""
     limits = description.limits
     velocity, acceleration = (np.abs(np.diff(references, order, axis=0)) / PERIOD**order for order in (1, 2))
     return float((velocity / limits.velocity).max()), float((acceleration / limits.acceleration).max())
 
 
-def refused(reply: Reply) -> bool:
+def refused(reply):
     return isinstance(reply, Refused)
 
 
-def own_calibration(arm: RobotDescription) -> Calibration:
+def own_calibration(arm):
     """Return the calibration that `tvist serve` uses, or if none is modal what a perfect identification would find."""
     model = arm.robot.model
     if any(one.robot == model and one.modal is not None for one in map(load_calibration, calibrations())):
@@ -174,7 +163,7 @@ def own_calibration(arm: RobotDescription) -> Calibration:
     return _made[model]
 
 
-def _of_its_file(arm: RobotDescription) -> Calibration:
+def _of_its_file(arm):
     drives, joints, replace = arm.drives, range(arm.joints), msgspec.structs.replace
     rows: list[tuple[Quantity, Sequence[float], Sequence[int]]] = [
         *((name, getattr(drives, name), joints) for name in _OF_DRIVES),

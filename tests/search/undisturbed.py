@@ -20,14 +20,8 @@ class Undisturbed:
     since: int
     """Tick of that moment."""
 
-    def breach(self, tick: int, q: Floats, *, resting: bool) -> str | None:
-        """Return in which way a stop is off the line, ahead of the motion, or later at rest; None if it is not.
-
-        Args:
-            tick: Ticks since that moment.
-            q: Present reference [rad].
-            resting: Whether it stands still.
-        """
+    def breach(self, tick, q, *, resting):
+        """Return in which way a stop is off the line, ahead of the motion, or later at rest; None if it is not."""
         references = self.references
         way = references[-1] - references[0]
         length = float(np.linalg.norm(way))

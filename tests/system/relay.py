@@ -5,7 +5,6 @@ import socket
 import threading
 import time
 from queue import SimpleQueue
-from typing import Self
 
 CHUNK = 4096
 """Bytes that are passed on at once."""
@@ -16,14 +15,9 @@ Address = tuple[str, int]
 
 
 class Relay:
-    """Passes bytes on between its own address and a server's, both ways and in their order.
+    """Passes bytes on between its own address and a server's, both ways and in their order."""
 
-    Args:
-        target: The server.
-        near: Where it listens.
-    """
-
-    def __init__(self, target: Address, near: Address) -> None:
+    def __init__(self, target, near):
         self._target, self._near = target, near
         self._flowing, self._lock = threading.Event(), threading.Lock()
         self._listening: socket.socket | None = None
@@ -38,27 +32,27 @@ class Relay:
         self.restore()
 
     @property
-    def endpoint(self) -> str:
+    def endpoint(self):
         """Its address in Zenoh's notation."""
         return "tcp/{}:{}".format(*self._near)
 
-    def __enter__(self) -> Self:
+    def __enter__(self):
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_):
         self.cut()
 
     # ---------------------------------------------------------------- what can happen to it
 
-    def hold(self) -> None:
+    def hold(self):
         """Let nothing pass, as with a cable that is pulled: connections stay, and what comes waits."""
         self._flowing.clear()
 
-    def flow(self) -> None:
+    def flow(self):
         """Let pass what has waited and what comes."""
         self._flowing.set()
 
-    def cut(self) -> None:
+    def cut(self):
         """Break all connections, and refuse new ones."""
         with self._lock:
             listening, self._listening = self._listening, None
@@ -69,18 +63,18 @@ class Relay:
             one.close()
         self.flow()
 
-    def restore(self) -> None:
+    def restore(self):
         """Take connections again, at the same place."""
         self._listening = listening = socket.create_server(self._near)
         threading.Thread(target=self._accept, args=(listening,), daemon=True).start()
 
-    def takes(self) -> float:
+    def takes(self):
         """Return the time that the next bytes take [s]."""
         return self.delay
 
     # ---------------------------------------------------------------- threads
 
-    def _accept(self, listening: socket.socket) -> None:
+    def _accept(self, listening):
         while True:
             try:
                 near, _ = listening.accept()
@@ -105,7 +99,7 @@ class Relay:
                 for work, one in ((self._take, source), (self._give, sink)):
                     threading.Thread(target=work, args=(one, under_way), daemon=True).start()
 
-    def _take(self, source: socket.socket, under_way: "SimpleQueue[tuple[float, bytes]]") -> None:
+    def _take(self, source, under_way):
         data = b"x"
         while data:
             self._flowing.wait()
@@ -117,7 +111,7 @@ class Relay:
                 time.sleep(len(data) / self.rate)
             under_way.put((time.monotonic(), data))
 
-    def _give(self, sink: socket.socket, under_way: "SimpleQueue[tuple[float, bytes]]") -> None:
+    def _give(self, sink, under_way):
         while True:
             came, data = under_way.get()
             time.sleep(max(0.0, came + self.takes() - time.monotonic()))

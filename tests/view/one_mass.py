@@ -31,22 +31,17 @@ class Swing:
     """Angle by which the spring is bent, shape (T,) [rad]."""
 
     @property
-    def left(self) -> float:
+    def left(self):
         """Largest deflection after the reference has stopped [rad]."""
         moving = np.flatnonzero(np.abs(self.reference - self.reference[-1]) > 1e-9)
         return float(np.abs(self.deflection[moving[-1] + 1 :]).max())
 
 
-def swing(f_d: float, zeta: float, believed: tuple[float, float] | None) -> Swing:
+def swing(f_d, zeta, believed):
     """Turn the mass by `TURN`.
 
     δ'' + 2 ζ ω δ' + ω² δ = -q̈, with ω = 2π f_d/√(1-ζ²), solved exactly for an acceleration that is constant between
     samples.
-
-    Args:
-        f_d: Damped frequency of the mass [Hz].
-        zeta: Its damping ratio [-].
-        believed: Frequency [Hz] and damping ratio [-] that ZV is designed for; None: no shaper.
     """
     time = np.arange(0.0, LENGTH_S, STEP)
     acceleration = _profile(time)
@@ -71,11 +66,11 @@ def swing(f_d: float, zeta: float, believed: tuple[float, float] | None) -> Swin
     return Swing(time, np.cumsum(velocity) * STEP, deflection)
 
 
-def _profile(time: Floats) -> Floats:
+def _profile(time):
     """Acceleration of the motion: up, then down, each with finite jerk."""
     half = MOTION_S / 2.0
 
-    def pulse(t: Floats) -> Floats:
+    def pulse(t):
         return np.asarray(np.clip(np.minimum(t, half - t) / JERK_S, 0.0, 1.0))
 
     shape = pulse(time) - pulse(time - half)
