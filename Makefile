@@ -15,7 +15,7 @@ DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 # The folders of what they install.
 SOURCES := cli clients controller lab protocol shaping sim_plant testing tvist_server urscript view
 
-.PHONY: acceptance checksums page docs docs-serve rehearse release setup demo notebooks test test-all lint elsewhere bench nightly soak dist format lock schemas clean
+.PHONY: acceptance checksums page docs docs-serve release setup demo notebooks test test-all lint elsewhere bench nightly soak dist format lock schemas clean
 
 setup: $(READY)
 
@@ -62,8 +62,8 @@ bench: setup
 nightly: setup elsewhere
 	$(BESIDE) -m nightly --durations 20
 
-# Those, a release rehearsed, and a search for an hour of what `.ci/run` searches for a minute.
-soak: nightly rehearse
+# Those, and a search for an hour of what `.ci/run` searches for a minute.
+soak: nightly
 	$(BIN)/python -m proof search --stops 2000 --streams 500 --changes 500 --sequences 3000 --flexible --robot ur3e ur5e ur16e ur30 tests/plant/urdf/seven.urdf
 
 # The clients of other projects, and what docs/reference/ur-clients.md says of them. SOURCES and BUILD of UR's C++ library: see
@@ -121,20 +121,17 @@ dist: setup
 	done
 
 checksums: dist
-	$(BIN)/python -m tools.release checksums dist
+	cd dist && sha256sum * > SHA256SUMS
 
-# `make release VERSION=X.Y.Z` writes versions and the changelog's date, and says what to do next.
+# `make release VERSION=X.Y.Z` writes versions and dates, as .bumpversion.toml says, commits and tags them.
 release:
-	$(PYTHON) -m tools.release prepare $(VERSION)
-
-# All of a release but publishing: packages, clean environments, the first command of each page, image, site.
-rehearse: setup
-	$(BIN)/python -m tools.release rehearse
+	$(PYTHON) -m venv .venv-release
+	.venv-release/bin/pip install --quiet --disable-pip-version-check bump-my-version==1.8.1
+	.venv-release/bin/bump-my-version bump --new-version $(VERSION)
 
 schemas: setup
 	$(BIN)/python -m tools.blocking
 	$(BIN)/python -m tvist_protocol.generate
-	$(BIN)/python -m tvist_shaping.reference
 
 clean:
-	rm -rf .venv .venv-docs build dist .mypy_cache .ruff_cache .pytest_cache
+	rm -rf .venv .venv-docs .venv-release build dist .mypy_cache .ruff_cache .pytest_cache

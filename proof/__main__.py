@@ -77,14 +77,6 @@ def _parser() -> argparse.ArgumentParser:
     search.add_argument(
         "--flexible", action="store_true", help="Simulate the flexible arm in stops and streams, too."
     )
-    bound = part(
-        _bound, "bound", "Compute the least time in which moves end without vibration, beside shapers."
-    )
-    bound.add_argument("--random", type=_up_to(100_000), default=30, help="Number of random moves [30].")
-    bound.add_argument("--seed", type=_up_to(2**63 - 1), default=0, help="Seed of the random moves.")
-    bound.add_argument(
-        "--shapers", nargs="+", help="Shapers to compare [zv auto auto-target planned elastic elastic-16]."
-    )
     watch = part(
         _monitor, "monitor", "Count which changes of hidden robots are noticed within three motions."
     )
@@ -176,12 +168,6 @@ def _add_bridge(parts: Any, part: Callable[..., argparse.ArgumentParser]) -> Non
     motions.add_argument(
         "--random", type=_up_to(100_000), default=100, help="Random moves after the paper's motions [100]."
     )
-    learn = part(_learn, "learn", "Let hidden robots learn motions, inside them and in front of them.", among)
-    learn.add_argument(
-        "--robots", type=_up_to(1000), default=2, help="Hidden robots, of two arms in turn [2]."
-    )
-    learn.add_argument("--seed", type=_up_to(2**31 - 1), default=0, help="Seed of the first one [0].")
-    learn.add_argument("--repetitions", type=_up_to(1000), default=7, help="How often each is made [7].")
     figure = part(_figure, "figure", "Draw the end of a motion that is shaped in front of a robot.", among)
     figure.add_argument("--seed", type=_up_to(2**31 - 1), default=1, help="Seed of the robot [1].")
     figure.add_argument("--output", type=Path, default=Path("bridge.png"), help="File to write [bridge.png].")
@@ -306,15 +292,6 @@ def _check_built_in(given: argparse.Namespace) -> None:
         given.refuse(f"there is no shaper {min(unknown)}")
 
 
-def _bound(given: argparse.Namespace) -> int:
-    from proof.bound.report import SHAPERS, compare, report, tables
-
-    _check_built_in(given)
-    result = report(compare(given.random, given.seed, given.shapers or SHAPERS))
-    _print(result, given.json, tables(result))
-    return 0
-
-
 def _monitor(given: argparse.Namespace) -> int:
     from proof.monitor.measure import CHANGES, measure
 
@@ -434,14 +411,6 @@ def _identify(given: argparse.Namespace) -> int:
     from proof.bridge.identify import report, tables
 
     result = report(max(given.robots, 1), given.seed, [500 // rate for rate in given.rates], _tell)
-    _print(result, given.json, tables(result))
-    return 0
-
-
-def _learn(given: argparse.Namespace) -> int:
-    from proof.bridge.learning import report, tables
-
-    result = report(max(given.robots, 1), given.seed, max(given.repetitions, 1), _tell)
     _print(result, given.json, tables(result))
     return 0
 

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
 
     from tvist_lab.figures import FigureFiles
 
-LEAST_DPI, MOST_DPI = 30, 2400
-"""Range of resolutions [dots per inch]."""
-
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
@@ -26,23 +23,18 @@ class FigureOptions:
 
     format: Literal["png", "pdf", "svg"] | None = None
     """Format of figures: png, pdf or svg [png]."""
-    dpi: int | None = None
-    """Resolution of figures in dots per inch; in pdf and svg, of the bitmaps within them [150]."""
-    width: Literal[1, 2] | None = None
-    """Width of figures in columns of a journal: 1 for 89 mm, 2 for 183 mm [2]."""
-    style: str | None = None
-    """Style of figures: paper, with headings and explanations in a text beside each; slides, with larger type; or a
-    style file of matplotlib, FILE.mplstyle."""
+    style: list[str] | None = None
+    """Style of figures, repeatable: paper, with headings and explanations in a text beside each; slides, with larger
+    type; or a style file of matplotlib, FILE.mplstyle, which may also set width and resolution."""
 
     def into(self, folder: Path) -> "FigureFiles":
         """Return the folder together with what was asked for."""
         from tvist_lab.figures import FigureFiles
         from tvist_lab.figures.files import STYLES
-        from tvist_lab.figures.style import DPI
 
         self.check(folder)
-        style = self.style if self.style in STYLES else None
-        return FigureFiles(folder, self.format or "png", self.dpi or DPI, self.width or 2, style or "")
+        style = next((one for one in self.style or () if one in STYLES), "")
+        return FigureFiles(folder, self.format or "png", style)
 
     def check(self, folder: Path | None, *files: Path | None) -> None:
         """Refuse what cannot be done, before anything is computed.
@@ -52,19 +44,19 @@ class FigureOptions:
             files: Other files that will be written at the end; None for those that were not given.
 
         Raises:
-            Failure: The resolution is out of range, there is no such style, there are no figures to which an option
-                could apply, or a file's folder does not exist.
+            Failure: There is no such style, there are no figures to which an option could apply, or a file's folder
+                does not exist.
         """
         for file in files:
             if file is not None and not file.parent.is_dir():
                 raise Failure(f"{file} cannot be written: there is no folder {file.parent}")
-        for name in ("format", "dpi", "width", "style"):
+        for name in ("format", "style"):
             if folder is None and getattr(self, name) is not None:
                 raise Failure(f"--{name} is about figures: give --figures DIR too, or leave it out", code=2)
-        if self.dpi is not None and not LEAST_DPI <= self.dpi <= MOST_DPI:
-            raise Failure(f"dpi is {self.dpi}: must be {LEAST_DPI} to {MOST_DPI}", code=2)
-        if self.style is not None:
-            _check_style(self.style)
+        if {"paper", "slides"} <= set(self.style or ()):
+            raise Failure("style is paper and slides: give one of them", code=2)
+        for style in self.style or ():
+            _check_style(style)
         if folder is not None and folder.exists() and not folder.is_dir():
             raise Failure(f"{folder} exists already and is no folder: choose another name")
 

@@ -1,4 +1,4 @@
-"""How much less a motion shakes with a shaper, by the same measure as `tvist log compare`."""
+"""How much less a motion shakes with a shaper, by the same measure as `tvist log analyze A B`."""
 
 from itertools import pairwise
 from typing import TYPE_CHECKING

@@ -20,20 +20,6 @@ from tvist_protocol.errors import quoted, short
 if TYPE_CHECKING:
     from cyclopts.argument import ArgumentCollection
 
-_LOG = ("record", "info", "analyze", "compare", "report", "export", "fit", "replay")
-_STUDIES = ("robustness", "match", "paths", "tracking", "map")
-
-INSTEAD = {
-    **{name: f"tvist log {name}" for name in _LOG},
-    **{name: f"tvist study {name}" for name in _STUDIES},
-    "sweep": "tvist study sweep FILE",
-    "check-script": "tvist run --check",
-    "kernels": "tvist serve --compile",
-    "sensitivity": "tvist shapers --sensitivity",
-    "search": "python -m proof search, in a checkout",
-    "bound": "python -m proof bound, in a checkout",
-}
-"""What does the work of a removed command, by its old name. No entry hides a command that exists."""
 _ANGLES = re.compile(r"-[\d.][^=/]*,.*")
 _WHOLE = re.compile(r"[+-]?\d+")
 _KINDS: dict[object, str] = {int: "a whole number", float: "a number", bool: "true or false"}
@@ -88,10 +74,7 @@ def sentence(error: CycloptsError, commands: Sequence[str]) -> str:
     match error:
         case UnknownCommandError():
             name = (error.unused_tokens or [""])[0]
-            removed = None if error.command_chain else INSTEAD.get(name)
-            said = f"there is no command {quoted(name)}: " + (
-                f"{_near(name, commands)}{seek}" if removed is None else f"it is now {removed}"
-            )
+            said = f"there is no command {quoted(name)}: {_near(name, commands)}{seek}"
         case UnknownOptionError():
             name = error.token.keyword or error.token.value
             known = [known for argument in error.argument_collection for known in argument.names]

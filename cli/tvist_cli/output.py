@@ -15,7 +15,7 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-from tvist_cli.failure import interrupted
+from tvist_cli.failure import Failure, interrupted
 from tvist_protocol.errors import HARMFUL, harmless
 
 if TYPE_CHECKING:
@@ -183,6 +183,17 @@ def write_json(path: Path, result: dict[str, Any]) -> None:
         OSError: The file cannot be written.
     """
     path.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
+
+
+def default_output(path: Path) -> Path:
+    """Return the default path of a file, which must not exist: only a file that was named is replaced.
+
+    Raises:
+        Failure: It exists.
+    """
+    if path.exists():
+        raise Failure(f"{path} exists already: choose the file with --output, which replaces what is there")
+    return path
 
 
 def write_report(path: Path, page: "Page") -> None:

@@ -162,7 +162,6 @@ class Job:
                     self.text,
                     self.inputs,
                     record=None if config.record is None else Path(config.record),
-                    learn=None if config.learn is None else Path(config.learn),
                     timeout=self.timeout,
                     attend=self.tell,
                     on_record_error=errors.append,

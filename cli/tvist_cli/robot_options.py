@@ -18,11 +18,11 @@ Command = TypeVar("Command", bound=Callable[..., object])
 _BOXES = {
     "Robot": "name robot robots workers profile start state programs",
     "Arm and shaper": (
-        "plant world hidden cell payload overload adapt learn calibration shaper shape_servo quiet floor "
+        "plant world hidden cell payload overload adapt calibration shaper shape_servo quiet floor "
         "compensate_sag seed truth"
     ),
     "Real arm": "enable_motion speed_cap tcp servo_lag",
-    "Clock": "clock speed realtime_priority processor lock_memory",
+    "Clock": "clock speed realtime_priority",
     "Recording": "record keep dump",
     "Network": "listen connect namespace metrics security insecure",
     "UR's interfaces": "ur ur_address ur_ports ur_allow reserve_inputs",

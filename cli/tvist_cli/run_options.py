@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import say, typed, write_report
+from tvist_cli.output import say
 
 if TYPE_CHECKING:
     from tvist_lab.programs.baseline import Run
@@ -85,8 +85,6 @@ class RunFiles:
 
     junit: Path | None = None
     """File to write the results to as JUnit XML, with a test case for each program."""
-    report: Path | None = None
-    """File to write a web page about the results to."""
     baseline: Path | None = None
     """What an earlier --json of the same programs printed in lockstep: fail if times, stops, shake, speeds or warnings
     differ beyond rounding, and say which."""
@@ -94,7 +92,7 @@ class RunFiles:
     @property
     def given(self) -> list[Path]:
         """Those that were given."""
-        return [file for file in (self.junit, self.report, self.baseline) if file is not None]
+        return [file for file in (self.junit, self.baseline) if file is not None]
 
     def checked(self, programs: list[str], *, lockstep: bool) -> "Mapping[str, Run] | None":
         """Refuse what cannot be written, before anything runs.
@@ -109,20 +107,14 @@ class RunFiles:
         Raises:
             Failure: A file cannot be written, or the baseline is none.
         """
-        for name, file in (("junit", self.junit), ("report", self.report)):
-            if file is not None and (file.is_dir() or not file.parent.is_dir()):
-                why = "that is a folder" if file.is_dir() else f"there is no folder {file.parent}"
-                raise Failure(f"{name} is {file}: {why}", code=2)
-        if len({file.absolute() for file in self.given}) < len(self.given):
-            raise Failure("junit, report and baseline are the same file: give each its own", code=2)
-        if self.report is not None:
-            try:
-                import tvist_lab.report  # noqa: F401  whether what draws the page is installed
-            except ImportError as error:
-                why = f"report needs more than a run does: pip install 'tvist[lab]' ({error})"
-                raise Failure(why, code=2) from error
+        file = self.junit
+        if file is not None and (file.is_dir() or not file.parent.is_dir()):
+            why = "that is a folder" if file.is_dir() else f"there is no folder {file.parent}"
+            raise Failure(f"junit is {file}: {why}", code=2)
         if self.baseline is None:
             return None
+        if file is not None and file.absolute() == self.baseline.absolute():
+            raise Failure("junit and baseline are the same file: give each its own", code=2)
         if not lockstep:
             raise Failure(
                 "--baseline needs --lockstep, in which equal programs run alike to the last bit", code=2
@@ -132,26 +124,22 @@ class RunFiles:
         with told(BaselineError, OSError, code=2):
             return read_baseline(self.baseline, programs)
 
-    def write(self, results: Sequence[Mapping[str, Any]], limits: Mapping[str, float]) -> None:
+    def write(self, results: Sequence[Mapping[str, Any]]) -> None:
         """Write the results.
 
         Args:
             results: What --json prints of each program.
-            limits: Limits that were given, by their names.
 
         Raises:
-            Failure: A file cannot be written.
+            Failure: The file cannot be written.
         """
+        if self.junit is None:
+            return
+        from tvist_lab.programs.junit import junit
+
         with told(OSError):
-            if self.junit is not None:
-                from tvist_lab.programs.junit import junit
-
-                self.junit.write_bytes(junit(results))
-                say(f"the results are in {self.junit}")
-            if self.report is not None:
-                from tvist_lab.report import programs_page
-
-                write_report(self.report, programs_page(results, limits, typed()))
+            self.junit.write_bytes(junit(results))
+        say(f"the results are in {self.junit}")
 
 
 NO_LIMITS, NO_FILES = RunLimits(), RunFiles()

@@ -4,9 +4,5 @@ STUDY = {
     "sweep": "Compare shapers over payloads, errors, moves and robots, on all cores or a cluster.",
     "robustness": "Compare shapers on arms that are softer, loaded otherwise or worse than they are told.",
     "match": "Compare two shapers on the same moves and plants, with intervals, and say which is better where.",
-    "learning": "Make each move several times, and see what a robot that learns its motions leaves each time.",
-    "paths": "Compare paths shaped along the path with the same paths shaped joint by joint.",
-    "tracking": "Measure how closely the arm follows positions sent to servoj, with every shaper.",
-    "map": "Map frequency, damping and a shaper's delay over the workspace, identified against true.",
 }
 """Names with their one-line help."""

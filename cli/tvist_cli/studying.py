@@ -84,8 +84,6 @@ class Places:
 
     output: Path | None = None
     """JSON file."""
-    markdown: Path | None = None
-    """Page of the documentation."""
     figures: Path | None = None
     """Folder of the figures."""
     look: FigureOptions = AS_USUAL
@@ -95,13 +93,12 @@ class Places:
 
     def check(self, *others: Path | None) -> None:
         """Refuse what cannot be written, before anything is computed; `others` are further files."""
-        self.look.check(self.figures, self.output, self.markdown, self.report, *others)
+        self.look.check(self.figures, self.output, self.report, *others)
 
     def write(
         self,
         result: dict[str, Any],
         *,
-        page: Callable[[], str] | None = None,
         draw: Callable[[], Figures] | None = None,
         web_page: "Callable[[Figures], Page] | None" = None,
     ) -> None:
@@ -109,7 +106,6 @@ class Places:
 
         Args:
             result: What --json prints.
-            page: Makes the page of the documentation.
             draw: Draws the figures.
             web_page: Makes the web page around the figures.
 
@@ -119,8 +115,6 @@ class Places:
         with told(OSError):
             if self.output is not None:
                 write_json(self.output, result)
-            if self.markdown is not None and page is not None:
-                self.markdown.write_text(page(), encoding="utf-8")
             if draw is None or self.figures is self.report is None:
                 return
             drawn = draw()

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncIterator, Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from tvist_client.errors import (
     AnswerTimeoutError,
@@ -256,14 +256,12 @@ class Arm(Moves, Guiding, Forces, Terminals, Simulation):
             SetPayload(token=self.token, mass=believed.mass, com=believed.com, inertia=believed.inertia)
         )
 
-    async def forget(self, what: Literal["payload", "motions"]) -> None:
-        """Undo what the robot has learnt from its motions.
+    async def forget(self) -> None:
+        """Undo what the robot has learnt of its payload: it assumes the declared one again.
 
-        Args:
-            what: The payload that it assumes instead of the declared one, or the corrections of its motions. A robot
-                served with `--adapt payload` or `--learn` learns them anew.
+        A robot served with `--adapt payload` learns it anew.
         """
-        await self.robot.request(Forget(token=self.token, what=what))
+        await self.robot.request(Forget(token=self.token, what="payload"))
 
     async def set_tcp(self, offset: Iterable[float]) -> None:
         """Set the tool centre point.

@@ -286,14 +286,12 @@ class Arm:
         """
         self._portal.call(lambda: self._arm.set_payload(mass, com, inertia))
 
-    def forget(self, what: Literal["payload", "motions"]) -> None:
-        """Undo what the robot has learnt from its motions.
+    def forget(self) -> None:
+        """Undo what the robot has learnt of its payload: it assumes the declared one again.
 
-        Args:
-            what: The payload that it assumes instead of the declared one, or the corrections of its motions. A robot
-                served with `--adapt payload` or `--learn` learns them anew.
+        A robot served with `--adapt payload` learns it anew.
         """
-        self._portal.call(lambda: self._arm.forget(what))
+        self._portal.call(self._arm.forget)
 
     def set_tcp(self, offset: Iterable[float]) -> None:
         """Set the tool centre point.

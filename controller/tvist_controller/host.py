@@ -4,7 +4,7 @@ It has no clock, thread or socket: time advances when `tick` is called. With the
 does this through `simulation.step`.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 
 import msgspec
 
@@ -26,7 +26,7 @@ from tvist_plant.user_file import named
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command, Forget, Setpoint
 from tvist_protocol.journal import Entry, entry_of
-from tvist_protocol.lessons import Lesson
+from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event
@@ -56,8 +56,6 @@ class Host:
         survives: bool = False,
     ) -> None:
         self.controller, self._experience, self._survives = controller, experience, survives
-        if experience is not None:
-            controller.lessons.know_motions()
         self._ports = ports or NoPorts()
         self.failure: str | None = None
         """Why the controller has stopped ticking; None if it ticks."""
@@ -162,7 +160,6 @@ class Host:
             experience.watch(
                 report.sample,
                 controller.lessons.beliefs,
-                controller.cycle.corrections.repetition,
                 held=controller.lessons.held,
                 placements=controller.cycle.placements,
             )
@@ -177,12 +174,7 @@ class Host:
             self.socket(one)
         self.tell_raised()
 
-    def recall(self, lessons: Iterable[Lesson]) -> None:
-        """Take lessons of earlier runs, before the first tick."""
-        for lesson in lessons:
-            self._take(lesson)
-
-    def _take(self, lesson: Lesson, plan: Plan | None = None) -> None:
+    def _take(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
         self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
         self.controller.lessons.learn(lesson, plan)
 

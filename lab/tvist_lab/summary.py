@@ -2,37 +2,30 @@
 
 import os
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from tvist_lab.metrics import motions
-from tvist_lab.recordings import Recording, RecordingError, mcap_file, read
+from tvist_lab.recordings import Recording, mcap_file
 from tvist_lab.recordings.description import meaning_of, ordered
-from tvist_lab.recordings.log_columns import ROBOT_OR_SENSOR
 
 
-def summary(path: str | os.PathLike[str], read_as: Recording | None = None) -> dict[str, Any]:
+def summary(path: str | os.PathLike[str], recording: Recording) -> dict[str, Any]:
     """Describe a file that `tvist_lab.recordings.read` reads.
 
     Args:
         path: The file.
-        read_as: What was read from it, if it was not read as it is.
+        recording: What was read from it.
 
     Returns:
         Times in s on the recording's own clock. `complete`, `dropped`, `replayable`, `from_tick` and `messages` are
-        null for other files than recordings of a served robot, `motions` if the columns do not show them. `from_tick`
-        is the first tick of a recording that has forgotten those before.
-
-    Raises:
-        RecordingError: The file cannot be read; the message names it.
+        null for other files than recordings of a served robot. `from_tick` is the first tick of a recording that has
+        forgotten those before.
     """
     path = Path(path)
     content: mcap_file.RecordingFile | None = None
-    try:
+    with suppress(mcap_file.RecordingFileError):
         content = mcap_file.read_checked(path)
-        recording = read_as or content.recording
-    except mcap_file.RecordingFileError:
-        recording = read_as or read(path, needs=ROBOT_OR_SENSOR)
     info = recording.info
     return {
         "file": str(path),
@@ -54,7 +47,6 @@ def summary(path: str | os.PathLike[str], read_as: Recording | None = None) -> d
         "messages": content
         and {**content.counts, "event": len(content.events), "journal": len(content.journal)},
         "events": dict(Counter(str(event.kind) for event in recording.events)),
-        "motions": _motions(recording),
         "columns": [
             {
                 "name": name,
@@ -64,17 +56,5 @@ def summary(path: str | os.PathLike[str], read_as: Recording | None = None) -> d
             }
             for name, values in ordered(recording).items()
         ],
-        "notes": list(recording.notes) + _note(content),
+        "notes": list(recording.notes),
     }
-
-
-def _motions(recording: Recording) -> int | None:
-    try:
-        return len(motions(recording))
-    except RecordingError:
-        return None
-
-
-def _note(content: mcap_file.RecordingFile | None) -> list[str]:
-    """Return the note about what is missing in a recording, without the name of its file."""
-    return [] if content is None or content.note is None else [content.note.removeprefix(f"{content.path} ")]

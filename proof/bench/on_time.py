@@ -24,7 +24,7 @@ robot which is halted for one segment loses no client.
 SETTLE_TICKS = 200
 """Ticks after a halt that are not counted, as the robot makes up for some of the time."""
 CLIENTS = 10
-PUNCTUAL = ("--realtime-priority", "--lock-memory")
+PUNCTUAL = ("--realtime-priority",)
 """What a robot can ask of the system; if it is refused, it runs without."""
 STUDIES: Mapping[str, tuple[int, Sequence[str]]] = {
     "alone": (0, ()),

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import structs
 
 from tvist_controller.api.line import Setup, body, load_calibration
-from tvist_controller.api.robot import Controller, Experience, Host, MotionStudent, Sink
+from tvist_controller.api.robot import Controller, Host, Sink
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
@@ -95,7 +95,6 @@ class HiddenRobot:
         q: Joint angles at which it rests at first, shape (n,) [rad].
         payload: Declared payload.
         shaper: Its shaper.
-        learns: Whether it corrects motions that it makes again.
     """
 
     late = 0
@@ -108,13 +107,11 @@ class HiddenRobot:
         q: Floats,
         payload: Payload,
         shaper: str = "none",
-        *,
-        learns: bool = False,
     ) -> None:
         self.plant = hidden_variant(seed).make(description, body(payload), seed)
         self.controller = Controller(setup_of(description, q, payload, shaper, seed), self.plant)
         self._token, heard = control(self.controller), Heard()
-        self.events, self._host = heard.events, host_of(self.controller, heard, learns=learns)
+        self.events, self._host = heard.events, Host(self.controller, heard)
 
     @property
     def robot(self) -> "HiddenRobot":
@@ -247,7 +244,6 @@ class Bridge:
         lag: Lag to compensate; None to send positions as they are. The robot's own if it is not given.
         lookahead: `lookahead_time` of `servoj` [s].
         gain: `gain` of `servoj`.
-        learns: Whether the controller in front corrects motions that it makes again.
     """
 
     def __init__(
@@ -261,8 +257,6 @@ class Bridge:
         lag: ServoLag | str | None = "own",
         lookahead: float = LOOKAHEAD,
         gain: float = GAIN,
-        *,
-        learns: bool = False,
     ) -> None:
         self.robot = HiddenRobot(description, seed, q, payload)
         speed = min(description.limits.velocity)
@@ -278,7 +272,7 @@ class Bridge:
         )
         self.controller = Controller(setup_of(plain, q, payload, shaper, seed), self.port)
         self._token, heard = control(self.controller), Heard()
-        self.events, self._host = heard.events, host_of(self.controller, heard, learns=learns)
+        self.events, self._host = heard.events, Host(self.controller, heard)
         while self.port.output(r.STATE) != r.State.FOLLOWING:
             self.tick()
 
@@ -308,12 +302,6 @@ def setup_of(description: RobotDescription, q: Floats, payload: Payload, shaper:
         description=description, q=tuple(q.tolist()), payload=payload, shaper=shaper, clock="free", seed=seed,
         calibration=load_calibration(f"{description.robot.name}_modal"),
     )  # fmt: skip
-
-
-def host_of(controller: Controller, sink: Sink, *, learns: bool) -> Host:
-    """Return what lets a controller tick, and learn from its motions if it is to."""
-    student = MotionStudent(controller.cycle.description)
-    return Host(controller, sink, experience=Experience([student]) if learns else None)
 
 
 def control(controller: Controller) -> str:

@@ -17,7 +17,6 @@ class Channel:
     """One key.
 
     Attributes:
-        name: Short name.
         key: The key, with `{robot}` and `{client}` where names go.
         kind: `put`, a queryable, or a liveliness token.
         by: Side that puts, asks or declares.
@@ -26,7 +25,6 @@ class Channel:
         meaning: Description for the documents.
     """
 
-    name: str
     key: str
     kind: Literal["put", "queryable", "liveliness"]
     by: Literal["server", "client"]
@@ -43,7 +41,6 @@ MESSAGES: tuple[type[Struct], ...] = (*COMMANDS, Setpoint, *REPLIES, *STREAMS, I
 
 CHANNELS = (
     Channel(
-        name="state",
         key="tvist/{robot}/state",
         kind="put",
         by="server",
@@ -51,7 +48,6 @@ CHANNELS = (
         meaning="state of controller and arm, 500 Hz; dropped rather than sent late in real time, never in lockstep",
     ),
     Channel(
-        name="truth",
         key="tvist/{robot}/truth",
         kind="put",
         by="server",
@@ -59,7 +55,6 @@ CHANNELS = (
         meaning="values that a real robot cannot measure, 500 Hz; only with `serve --truth`",
     ),
     Channel(
-        name="event",
         key="tvist/{robot}/event",
         kind="put",
         by="server",
@@ -67,7 +62,6 @@ CHANNELS = (
         meaning="an event, with its tick",
     ),
     Channel(
-        name="telemetry",
         key="tvist/{robot}/telemetry",
         kind="put",
         by="server",
@@ -75,7 +69,6 @@ CHANNELS = (
         meaning="timing and counters of the server, 1 Hz",
     ),
     Channel(
-        name="io",
         key="tvist/{robot}/io",
         kind="put",
         by="server",
@@ -83,7 +76,6 @@ CHANNELS = (
         meaning="inputs, outputs, registers and tool; sent before the state of a tick with a change, and at 1 Hz",
     ),
     Channel(
-        name="command",
         key="tvist/{robot}/command",
         kind="queryable",
         by="client",
@@ -92,7 +84,6 @@ CHANNELS = (
         meaning="a command as the query's payload; always answered",
     ),
     Channel(
-        name="setpoint",
         key="tvist/{robot}/setpoint",
         kind="put",
         by="client",
@@ -100,7 +91,6 @@ CHANNELS = (
         meaning="a stream of set-points; errors are counted, not answered",
     ),
     Channel(
-        name="info",
         key="tvist/{robot}/info",
         kind="queryable",
         by="client",
@@ -108,14 +98,12 @@ CHANNELS = (
         meaning="description and current settings of the robot, `refused` while it starts; the query has no payload",
     ),
     Channel(
-        name="alive",
         key="tvist/{robot}/alive",
         kind="liveliness",
         by="server",
         meaning="exists from when the robot is ready until its server ends",
     ),
     Channel(
-        name="client",
         key="tvist/{robot}/client/{client}",
         kind="liveliness",
         by="client",

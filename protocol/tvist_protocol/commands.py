@@ -216,12 +216,12 @@ class SetPayload(ClientMessage, frozen=True, kw_only=True, tag="set_payload", om
 
 
 class Forget(ClientMessage, frozen=True, kw_only=True, tag="forget"):
-    """Undo what the robot has learnt from its motions."""
+    """Undo what the robot has learnt of its payload."""
 
     token: Token
     """Token of the lease."""
-    what: Literal["payload", "motions"]
-    """What to forget: the payload that it assumes instead of the declared one, or the corrections of its motions."""
+    what: Literal["payload"]
+    """What to forget: the payload that it assumes instead of the declared one."""
 
 
 class SetSpeed(ClientMessage, frozen=True, kw_only=True, tag="set_speed"):

@@ -1,6 +1,6 @@
 """`python -m tvist_protocol.generate`: everything in `protocol/` that is made from the message types.
 
-The tables of README.md and messages.md, `schemas/`, `asyncapi.json`, and the MessagePack beside each golden message.
+The tables of README.md and messages.md, `schemas/`, and the MessagePack beside each golden message.
 Runs in a checkout, and needs the `msgpack` package: golden bytes must not come from the codec they are to test.
 """
 
@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from tvist_protocol.asyncapi import asyncapi
 from tvist_protocol.channels import MESSAGES, tag
 from tvist_protocol.schema import json_schema
 from tvist_protocol.tables import tables
@@ -30,8 +29,7 @@ def generated(folder: Path) -> dict[Path, bytes]:
     Raises:
         ValueError: A page and its tables do not have the same names.
     """
-    files = {folder / "asyncapi.json": _json(asyncapi())}
-    files |= {folder / "schemas" / f"{tag(kind)}.json": _json(json_schema(kind)) for kind in MESSAGES}
+    files = {folder / "schemas" / f"{tag(kind)}.json": _json(json_schema(kind)) for kind in MESSAGES}
     files |= {source.with_suffix(".msgpack"): _msgpack(source) for source in golden(folder)}
     parts = tables()
     for page, names in {"messages.md": SENT, "README.md": parts.keys() - SENT}.items():

@@ -11,7 +11,7 @@ from msgspec import Meta, Struct
 from tvist_protocol.commands import Command, Setpoint
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import explain_content
-from tvist_protocol.lessons import Lesson
+from tvist_protocol.lessons import PayloadLesson
 
 EntryKind = Literal[
     "command",
@@ -71,14 +71,14 @@ def entry_of(tick: int, message: Command | Setpoint, client: str | None = None) 
     return Entry(tick=tick, kind=kind, client=client, message=msgspec.to_builtins(message))
 
 
-def lesson_of(entry: Entry) -> Lesson:
+def lesson_of(entry: Entry) -> PayloadLesson:
     """Return the lesson of an entry.
 
     Raises:
         ProtocolError: The entry contains none, or an invalid one.
     """
     try:
-        lesson: Lesson = msgspec.convert(entry.message, Lesson)
+        lesson: PayloadLesson = msgspec.convert(entry.message, PayloadLesson)
     except msgspec.ValidationError as error:
         where = f"the journal's lesson before tick {entry.tick}"
         raise ProtocolError("malformed", "message", f"{where} is invalid: {error}") from error

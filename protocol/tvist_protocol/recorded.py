@@ -42,7 +42,7 @@ THIS_BEHAVIOUR = 6
 
 1: recordings without this number.
 2: the arm, the line and the shapers are computed by compiled functions, which add in another order.
-5: `auto-target` uses zero-vibration shapers at a known end, and `planned` expects larger errors of the frequencies.
+5: `auto-target` uses zero-vibration shapers at a known end.
 """
 FROM_TICK = "from_tick"
 """Entry of that metadata in a recording that has forgotten its beginning: its first tick."""

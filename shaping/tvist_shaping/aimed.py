@@ -80,7 +80,7 @@ class AimedFilter(SteadyFilter):
     spared = 0.0
     _aimed = False
 
-    def aim(self, q: npt.ArrayLike | None, *, quiet: bool = False) -> None:  # noqa: ARG002  see `PlannedFilter`
+    def aim(self, q: npt.ArrayLike | None) -> None:
         """Use the weights for the end of a motion; the reference must be at rest. See `Filter.aim`."""
         if q is None:
             self._start()
@@ -100,18 +100,3 @@ class AimedFilter(SteadyFilter):
             self._line.gather(self._taps, self._delays, self._q_star)
         else:
             super()._weigh()
-
-
-class PlannedFilter(AimedFilter):
-    """Filter for motions that are planned to leave no vibration: it leaves these unchanged.
-
-    It shapes all other motions like an `AimedFilter`.
-    """
-
-    def aim(self, q: npt.ArrayLike | None, *, quiet: bool = False) -> None:
-        """Use the weights for the end of a motion, or leave a quiet one unchanged; see `Filter.aim`."""
-        super().aim(q)
-        if quiet:
-            self._taps[:] = 0.0
-            self._taps[0] = 1.0
-            self._length = 0

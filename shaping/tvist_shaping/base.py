@@ -148,12 +148,11 @@ class Filter(ABC):
         self._q_star[:] = sample
         self._start()
 
-    def aim(self, q: npt.ArrayLike | None, *, quiet: bool = False) -> None:  # noqa: B027  most filters ignore this
+    def aim(self, q: npt.ArrayLike | None) -> None:  # noqa: B027  most filters ignore this
         """Set where the motion that begins now will end; the reference must be at rest.
 
         Args:
             q: Sample at the end, shape (width,); None if it is not known, as in a stream.
-            quiet: Whether the motion is planned so that it leaves no vibration without a filter.
         """
 
     def filter(self, q_ref: npt.ArrayLike) -> Floats:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from tvist_shaping._types import Floats
-from tvist_shaping.aimed import AimedFilter, PlannedFilter, TargetDesign
+from tvist_shaping.aimed import AimedFilter, TargetDesign
 from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.catalogue import SHAPERS
 from tvist_shaping.errors import DesignError, UnknownShaperError
@@ -64,25 +64,19 @@ def _elastic_auto(slower: float) -> Design:
     return SmoothedDesign(_auto(slower), running_means(8, 8), ELASTIC_AUTO)
 
 
-def _planned(slower: float) -> Design:
-    return TargetDesign(_brief(0.026, 0.035, 0.06, PLANNED, slower), slower)
-
-
-AIMED, PLANNED, ELASTIC_AUTO = "auto-target", "planned", "elastic-auto"
+AIMED, ELASTIC_AUTO = "auto-target", "elastic-auto"
 DESIGNS: Mapping[str, Callable[[float], Design]] = MappingProxyType(
     {
         "auto": _auto,
         "short": _short,
         AIMED: _auto_target,
-        PLANNED: _planned,
         ELASTIC_AUTO: _elastic_auto,
     }
 )
 """Designs with constant mean delay against an arm's four lowest modes: one with a smaller residual, one that is
-shorter, one that knows where a motion will end, one that leaves motions unchanged if they are planned to leave no
-vibration, and one for what feed-forward of the arm's elasticity leaves. The argument is the factor of their times.
+shorter, one that knows where a motion will end, and one for what feed-forward of the arm's elasticity leaves. The
+argument is the factor of their times.
 """
-_KINDS = {AIMED: AimedFilter, PLANNED: PlannedFilter}
 SMOOTHED: Mapping[str, FeedForward] = MappingProxyType(
     {"elastic": "elastic", "elastic-position": "elastic-position"}
 )
@@ -101,7 +95,6 @@ OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
         "auto": "four modes with any payload, at a constant mean delay: keeps the limits",
         "short": "like auto: shorter, leaves slightly more",
         AIMED: "zv for the three lowest modes at a motion's known end; like auto for other motions",
-        PLANNED: "moves to a known target are planned to leave no vibration; like auto-target for other motions",
         "elastic": "smoothing alone, and feed-forward of the arm's elasticity: half the delay of auto; elastic-16 "
         "smooths over 16 ms, from 8 to 60, instead of 40",
         "elastic-position": "like elastic, for drives that take positions and velocities, but no torques",
@@ -210,7 +203,7 @@ class Registry:
             weights = running_means(*means_of(smoothing[1]))
             return SmoothingFilter(name, weights, estimator, joints=joints, feed_forward=feed_forward)
         if name in DESIGNS:
-            kind = _KINDS.get(name, SteadyFilter)
+            kind = AimedFilter if name == AIMED else SteadyFilter
             slower = max(
                 1.0, SLOW / estimator.f_d_min, _mean_delay(*estimator.settle(np.zeros(joints))) / LIGHT
             )

@@ -19,7 +19,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.simulation import SimulationReset
 from tvist_shaping.catalogue import SHAPERS
-from tvist_shaping.named import BUILT_IN, PLANNED
+from tvist_shaping.named import BUILT_IN
 
 SEVEN = Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf"
 ARMS = {
@@ -33,7 +33,7 @@ ARMS = {
     "seven joints": (SEVEN, None),
 }
 """Arms with their own calibrations; the last one is yet to be identified."""
-SHAPES = tuple(name for name in BUILT_IN.names() if name != PLANNED)
+SHAPES = BUILT_IN.names()
 KEPT = 1.003
 """Largest ratio of a shaped reference to a limit of velocity or acceleration [-]."""
 TORQUE = 1.001

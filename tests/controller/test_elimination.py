@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_controller.quiet.elimination import eliminate
+from tvist_controller.kinematics.elimination import eliminate
 
 
 @pytest.mark.parametrize("solve", [eliminate, eliminate.py_func], ids=["compiled", "python"])

@@ -17,7 +17,6 @@ from tvist_controller.safety import payload_monitor
 from tvist_controller.setup import Setup, paper_payload
 from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay
-from tvist_plant.drives import DriveCommand
 from tvist_protocol.codec import decode_event
 from tvist_protocol.commands import Forget, SetPayload
 from tvist_protocol.simulation import SimulationReset
@@ -204,10 +203,7 @@ def test_a_motion_that_tells_nothing_teaches_nothing(motion, what):
 def test_no_record_makes_a_payload_that_is_none(seed, ticks, size):
     random = np.random.default_rng(seed)
     q, moments = random.standard_normal((ticks, 6)), size * random.standard_normal((ticks, 6))
-    still, beliefs = DriveCommand(*np.zeros((3, 6))), Beliefs(disc(2.0), None, "none")
-    record = MotionRecord(
-        still, np.zeros((ticks, 3, 6)), q, moments, np.zeros((ticks, 3)), min(ticks, 5), True, beliefs
-    )
+    record = MotionRecord(q, moments, min(ticks, 5), True, Beliefs(disc(2.0)))
     lesson = PayloadStudent(ROBOT).study(record)
     if lesson is not None:
         assert 0.0 <= lesson.payload.mass <= 5.0

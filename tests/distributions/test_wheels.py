@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 from pathspec import PathSpec
 from tests.conformance.served import PATIENCE, Served
+from tests.fences import fences
 from tools.release import environments
 from tools.release.environments import clean
-from tools.release.first_commands import fences
 
 
 def runs(program):

@@ -18,8 +18,8 @@ from urllib.parse import urlsplit
 import pytest
 from tests.acceptance import report
 from tests.conformance.served import Served, finished
+from tests.fences import FENCE
 from tests.places import own_address
-from tools.release.first_commands import FENCE
 
 from tvist_client.blocking import Robot
 

@@ -23,7 +23,7 @@ EXAMPLES = examples()
 COMPARED = (DOCS / "how-to" / "change-a-shaper.md").read_text("utf-8")
 WAVE = ROOT / "clients" / "examples" / "wave.script"
 SWEEP = 'shapers = ["zv"]\npayloads = [2.5]\nmoves = 2\n'
-SERVED = ("check", "move", "watch", "log record", "fleet", "stop", "unlock", "forget", "view")
+SERVED = ("check", "move", "watch", "log record", "stop", "unlock", "forget", "view")
 """Commands whose examples are about the robot of `serve`'s example."""
 
 

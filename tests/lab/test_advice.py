@@ -254,10 +254,6 @@ def test_every_option_is_plain_values(rings, advice):
     )  # fmt: skip
 
 
-def test_the_command_needs_a_file_and_keeps_existing_pages(tmp_path):
+def test_the_command_needs_a_file():
     with pytest.raises(Failure, match="at least one recording"):
         command_line()
-    page = tmp_path / "page.html"
-    page.write_text("mine")
-    with pytest.raises(Failure, match="exists already"):
-        command_line(tmp_path / "run.csv", output=page)

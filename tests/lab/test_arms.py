@@ -5,10 +5,11 @@ import json
 import numpy as np
 import pytest
 from tests.conformance.served import finished
+from tools.tables.pages import page_of
 
 from tvist_controller.calibrations import available
 from tvist_controller.calibrations import load as load_calibration
-from tvist_lab.studies.arms.about import about, robots_page
+from tvist_lab.studies.arms.about import about
 from tvist_lab.studies.arms.measure import sag_error
 from tvist_plant.description import load, robots
 from tvist_plant.fingerprint import fingerprint
@@ -36,21 +37,21 @@ def test_every_table_of_numbers_has_an_origin():
         assert {"kinematics", "links", "limits", "drives"} <= told, name
 
 
-def test_three_arms_are_stilled_by_auto_out_of_the_box(tmp_path):
+def test_three_arms_are_stilled_by_auto_out_of_the_box():
     """By the command that the reference page names, with fewer moves."""
-    page = tmp_path / "robots.md"
-    command = ("robots", "ur3e", "ur10e", "ur20", "--measure", "--random", "4", "--json", "--markdown", page)
+    command = ("robots", "ur3e", "ur10e", "ur20", "--measure", "--random", "4", "--json")
     ended = finished("-m", "tvist_cli", *command)
     assert ended.returncode == 0, ended.stderr
-    for one in json.loads(ended.stdout)["robots"]:
+    result = json.loads(ended.stdout)
+    page = page_of("robots", result)
+    for one in result["robots"]:
         (found,) = one["measured"]
         assert found["reduction_percent"]["median"] >= 95.0, one["name"]
         assert np.max(found["f_d_error_percent"]) < 3.0
         assert found["sag_error_percent"] < 1.0
-        assert f"| `{one['name']}` | +0 % |" in page.read_text(encoding="utf-8")
+        assert f"| `{one['name']}` | +0 % |" in page
 
 
 def test_the_page_has_a_row_for_each_arm():
-    listed = [about(name, load(name)) for name in robots()]
-    page = robots_page(listed, "tvist robots")
+    page = page_of("robots", {"robots": [about(name, load(name)) for name in robots()]})
     assert all(f"| `{name}` |" in page for name in robots())

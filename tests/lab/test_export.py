@@ -10,8 +10,8 @@ import polars as pl
 import pytest
 from tests.lab.synthetic_logs import SyntheticLog
 
+from tvist_cli.commands.log.analyze import analyze
 from tvist_cli.commands.log.export import export as export_command
-from tvist_cli.commands.log.info import info as info_command
 from tvist_cli.failure import Failure
 from tvist_lab.recordings import Recording, RecordingError, read
 from tvist_lab.recordings.description import KEY, meaning_of, sidecar
@@ -205,24 +205,24 @@ class TestCommands:
             writer.finish({})
         return path
 
-    def test_export_names_the_file_after_the_recording_and_replaces_none(self, path, capsys):
+    def test_export_names_the_file_after_the_recording_and_replaces_only_a_named_one(self, path, capsys):
         export_command(path, to="CSV", json=True)
         written = json.loads(capsys.readouterr().out)["written"]
         assert written == [str(path.with_name(name)) for name in ("run.csv", "run.csv-metadata.json")]
-        with pytest.raises(Failure, match=r"run\.csv exists already: give --force"):
+        with pytest.raises(Failure, match=r"run\.csv exists already: choose .* with --output"):
             export_command(path, to="csv")
-        export_command(path, to="csv", force=True)
+        export_command(path, to="csv", output=path.with_name("run.csv"))
         with pytest.raises(Failure, match="is the file to be exported"):
-            export_command(path.with_name("run.csv"), to="csv", force=True)
+            export_command(path.with_name("run.csv"), to="csv")
         with pytest.raises(Failure, match="to is 'xls': must be one of csv"):
             export_command(path, to="xls")
 
     @pytest.mark.parametrize("kind", [None, *FORMATS])
-    def test_info_tells_what_every_kind_of_file_holds(self, kind, path, capsys):
+    def test_analyze_tells_what_every_kind_of_file_holds(self, kind, path, capsys):
         if kind is not None:
             export(read(path), path.with_suffix(f".{kind}"), kind)
             path = path.with_suffix(f".{kind}")
-        info_command(path, json=True)
+        analyze(path, json=True)
         found = json.loads(capsys.readouterr().out)
         assert (found["robot"], found["model"], found["version"]) == (INFO.name, INFO.model, INFO.version)
         assert (found["start_s"], found["duration_s"]) == (0.008, 0.008)
@@ -231,12 +231,14 @@ class TestCommands:
         assert found["complete"] is (True if kind is None else None)
         (q,) = (column for column in found["columns"] if column["name"] == "actual_q")
         assert (q["shape"], q["unit"]) == ([3, 6], "rad")
-        info_command(path)
-        assert "actual_TCP_pose" in capsys.readouterr().out
-
-    def test_info_says_that_a_file_was_cut_off(self, path, capsys):
-        path.write_bytes(path.read_bytes()[:-20])
-        info_command(path)
+        analyze(path)
         said = capsys.readouterr().out
-        assert "no: cut off or damaged" in said
-        assert "was not closed" in said
+        assert "actual_TCP_pose 6 [m, rad]" in " ".join(said.split())
+        assert "It contains no motion." in said
+
+    def test_analyze_says_that_a_file_was_cut_off(self, path, capsys):
+        path.write_bytes(path.read_bytes()[:-20])
+        analyze(path)
+        out, err = capsys.readouterr()
+        assert "no: cut off or damaged" in out
+        assert "was not closed" in err

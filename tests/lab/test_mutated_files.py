@@ -295,12 +295,12 @@ def _run_commands(path):
     import contextlib
     import io
 
-    from tvist_cli.commands.log import analyze, export, info, replay
+    from tvist_cli.commands.log import analyze, export, replay
     from tvist_cli.failure import Failure
 
     def run(path):
-        to = {"to": "csv", "force": True, "output": path.with_name("written.csv")}
-        commands = {info.info: {}, analyze.analyze: {"json": True}, export.export: to, replay.replay: {}}
+        to = {"to": "csv", "output": path.with_name("written.csv")}
+        commands = {analyze.analyze: {"json": True}, export.export: to, replay.replay: {}}
         refused = []
         for command, options in commands.items():
             _limit_time()

@@ -8,13 +8,11 @@ import pytest
 from tests.controller.robots import NoArm
 from tests.lab.test_programs import MOVES, run
 
-from tvist_cli.output import write_report
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.programs.account import as_dict
 from tvist_lab.programs.baseline import BaselineError, changes, read_baseline
 from tvist_lab.programs.junit import junit
 from tvist_lab.programs.limits import Limits
-from tvist_lab.report import programs_page, render
 
 UNCOMPILED = {
     "file": "wrong.script",
@@ -159,21 +157,3 @@ def test_junit_has_a_case_for_each_program_with_measures_and_sentences(result):
     assert good.find("failure") is None
     assert "<b>" in good.find("system-out").text
     assert good.find("system-err").text == "a.script:4: slow\N{REPLACEMENT CHARACTER}"
-
-
-def test_the_page_has_programs_stops_and_what_failed(result):
-    result |= {"ok": False, "failures": [{"kind": "max_shake", "line": 3, "text": "it <shook>"}]}
-    text = render(programs_page([result, UNCOMPILED], {"max_shake": 0.3}, "tvist run a.script"))
-    for words in ("2 of 2 programs failed.", "a.script, line 3: it &lt;shook&gt;", "wrong.script, line 2: no x",
-                  "max shake", "tvist run a.script", "next after s"):  # fmt: skip
-        assert words in text
-    result |= {"ok": True, "failures": [], "moves": []}
-    text = render(programs_page([result], {}, "tvist run a.script"))
-    assert "1 program ran as it should." in text
-
-
-def test_a_page_is_written_although_a_file_has_a_name_that_is_no_text(tmp_path):
-    write_report(
-        tmp_path / "r.html", programs_page([{**UNCOMPILED, "file": "bad\udcff.script"}], {}, "tvist run")
-    )
-    assert "bad?.script" in (tmp_path / "r.html").read_text(encoding="utf-8")

@@ -8,9 +8,10 @@ import html5lib
 import pytest
 from tests.lab.synthetic_logs import SyntheticLog
 
+from tvist_cli.output import write_report
 from tvist_lab.metrics import MotionResult
 from tvist_lab.recordings import RecordingError
-from tvist_lab.report import of_recordings, recordings_page, render
+from tvist_lab.report import Page, of_recordings, recordings_page, render
 from tvist_lab.report.verdict import shaping_of, verdict_on_one
 
 LOUD, QUIET = ((9.0, 0.12, 1.0),), ((9.0, 0.12, 0.2),)
@@ -148,3 +149,8 @@ def test_a_file_that_is_no_recording_is_refused(tmp_path):
     (tmp_path / "notes.txt").write_text("nothing\n")
     with pytest.raises(RecordingError, match=r"notes.txt"):
         recordings_page([tmp_path / "notes.txt"], "")
+
+
+def test_a_page_is_written_although_a_file_has_a_name_that_is_no_text(tmp_path):
+    write_report(tmp_path / "r.html", Page("bad\udcff.mcap", ["It shook."], []))
+    assert "bad?.mcap" in (tmp_path / "r.html").read_text(encoding="utf-8")

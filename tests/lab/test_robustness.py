@@ -1,14 +1,12 @@
 """Reduction on arms that differ from the calibration: right where nothing is wrong, and less where much is."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from tools.tables.pages import page_of
 
 from tvist_controller.calibrations import load as load_calibration
 from tvist_lab.figures import robustness_figure
-from tvist_lab.studies.pages import page
-from tvist_lab.studies.robustness import ERRORS, PLANT, columns, jobs, report, tables
+from tvist_lab.studies.robustness import ERRORS, PLANT, columns, jobs, report
 from tvist_lab.study.arms import PERTURBED, stiffer
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import bench
@@ -59,11 +57,8 @@ def test_the_report_is_ordered_by_delay_and_names_what_does_not_count(done):
         "reduction_percent_interval": {"median": None, "p5": None},
         "beyond_waiting_percent": {"median": None, "p5": None},
     }
-    about = {"moves": 1, "seed": 0, "robot": "UR5e", "shapers": entries}
-    more = {
-        "plants": [(one.name, one.label) for one, _ in columns()[PLANT].values()],
-    }
-    written = page("robustness", about, "a command", tables=tables(), **more)
+    result = {"moves": 1, "seed": 0, "robot": "UR5e", "hidden": [], "shapers": entries}
+    written = page_of("robustness", result)
     assert all(f"{100 * error:+.0f} %" in written for errors in ERRORS.values() for error in errors)
     assert all(f"| {name} |" in written for name in PERTURBED)
     assert "these moves are not held out" in written
@@ -88,13 +83,9 @@ def test_few_moves_have_no_5th_percentile_and_no_published_seed_is_for_tuning():
 def test_the_smoothing_of_elastic_alone_is_its_reference_without_its_feed_forward(ur5e):
     start = np.array(ur5e.poses["Q1"])
     move = Move(tuple(start), tuple(start + np.array([0.3, 0.2, 0.3, 0.0, 0.0, 0.0])), 4.0)
-    names = ["smoothing", "elastic", "planned"]
-    alone, elastic, planned = bench(ur5e, load_calibration("ur5e_modal"), None, names)[1:]
+    names = ["smoothing", "elastic"]
+    alone, elastic = bench(ur5e, load_calibration("ur5e_modal"), None, names)[1:]
     task = Task(ur5e, move, Case(ur5e, move).reference())
     np.testing.assert_array_equal(alone.shaped(task).q, elastic.shaped(task).q)
     assert alone.shaped(task).elastic is None
     assert elastic.shaped(task).elastic is not None
-    # planned is a motion of its own, and no filter of the reference, where others are given that.
-    own = planned.shaped(task)
-    assert len(own.q) > len(task.reference)
-    np.testing.assert_array_equal(own.q, planned.shaped(replace(task, as_served=True)).q)

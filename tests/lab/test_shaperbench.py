@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools.tables.pages import page_of
 
 from tvist_lab.metrics import best_tool_acceleration
-from tvist_lab.studies.leaderboard import ON_PAGE, best_in_bold, leaderboard, ranked
-from tvist_lab.studies.pages import page
+from tvist_lab.studies.leaderboard import leaderboard
 from tvist_lab.studies.shaperbench import WANTED, bends, check_causal, draw, inspect, jobs, path_error
 from tvist_lab.study.arms import ARMS
 from tvist_lab.study.case import Case
@@ -248,7 +248,7 @@ class TestDishonesty:
     def test_who_is_told_the_target_is_said_and_may_know_nothing_else(self, ur5e, modal, task):
         told = {one.name for one in bench(ur5e, modal, None, None) if one.told_target}
         frozen = {"zv_frozen_at_end", "zv_3_modes_frozen_at_end"}
-        assert told == {"auto-target", "planned", *frozen, "double_s_as_zv", "double_s_as_auto"}
+        assert told == {"auto-target", *frozen, "double_s_as_zv", "double_s_as_auto"}
 
         class Untold(Named):
             told_target = False
@@ -300,9 +300,10 @@ class TestOwn:
 
     def test_a_shaper_of_the_library_without_a_row_stands_in_the_menus_of_shapers(self, monkeypatch):
         monkeypatch.setattr("tvist_lab.study.menus.ROWS", tuple(row for row in ROWS if row.name != "zvd"))
-        assert [menu for menu in ("bench", "paths", "lesson", "baselines") if "zvd" in names(menu)] == [
-            "bench", "paths", "lesson"
-        ]  # fmt: skip
+        assert [menu for menu in ("bench", "lesson", "baselines") if "zvd" in names(menu)] == [
+            "bench",
+            "lesson",
+        ]
         assert len({row.name for row in ROWS}) == len(ROWS)
 
 
@@ -418,8 +419,7 @@ class TestScores:
             "calibration": "",
             "arms": {ARMS[0].name: ARMS[0].label},
         }
-        more = {"ranked": ranked(board), "columns": ON_PAGE, "best_in_bold": best_in_bold}
-        written = page("shaperbench", about | board, "a command", **more)
+        written = page_of("shaperbench", about | board)
         assert all(row["name"] in written for row in board["shapers"])
         assert "Measured on 2026-11-23" in written
 

@@ -22,7 +22,7 @@ from tvist_shaping.named import BUILT_IN
 
 RESTING = 4
 """Ticks at rest before the motion."""
-LEFT_OUT = {"auto-target", "planned", "ei2_exact", "ei3_exact"}
+LEFT_OUT = {"auto-target", "ei2_exact", "ei3_exact"}
 """Filters that are told where a motion ends, and shapers for less damping than that of the arm."""
 
 

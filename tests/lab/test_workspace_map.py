@@ -1,20 +1,17 @@
 """Maps tell what the calibration and the plant tell, each at its place."""
 
-import json
-
 import numpy as np
 import pytest
 
 from tvist_controller.api.line import body, estimator_of, load_calibration, paper_payload
-from tvist_lab.studies.workspace_map import QUANTITIES, MapError, workspace_map
+from tvist_lab.identification.workspace_map import workspace_map
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_shaping import SHAPERS
 
 
 @pytest.fixture(scope="module")
 def found(ur5e):
-    return workspace_map(ur5e, load_calibration("ur5e_5kg"), SHAPERS["zv"], 5.0, 5)
+    return workspace_map(ur5e, load_calibration("ur5e_5kg"), 5.0, 5)
 
 
 def test_each_value_is_that_of_its_configuration(ur5e, found):
@@ -30,34 +27,21 @@ def test_each_value_is_that_of_its_configuration(ur5e, found):
         assert found.true["f_d_hz"][row, column] == pytest.approx(true.f_d[0])
         assert found.identified["f_d_hz"][row, column] == pytest.approx(f_d[0])
         assert found.identified["zeta"][row, column] == pytest.approx(zeta[0])
-        assert found.true["delay_ms"][row, column] == pytest.approx(500.0 / true.f_d[0])
+        assert found.true["zeta"][row, column] == pytest.approx(true.zeta[0])
 
 
 def test_the_calibration_of_the_package_is_near_the_truth_all_over_the_map(found):
-    about = json.loads(json.dumps(found.as_dict(), allow_nan=False))
-    assert set(about["maps"]) == set(QUANTITIES)
-    assert about["errors"]["f_d_hz"]["max_percent"] < 10.0
-    assert about["errors"]["f_d_hz"]["median_percent"] == pytest.approx(
-        np.nanmedian(np.abs(found.error("f_d_hz")))
-    )
-    assert about["left_out"] == np.count_nonzero(np.isnan(found.true["zeta"]))
+    assert np.nanmax(np.abs(found.error("f_d_hz"))) < 10.0
 
 
 def test_a_modal_calibration_knows_another_payload(ur5e):
-    heavy, light = (
-        workspace_map(ur5e, load_calibration("ur5e_modal"), SHAPERS["zv"], mass, 3) for mass in (5.0, 1.0)
-    )
+    heavy, light = (workspace_map(ur5e, load_calibration("ur5e_modal"), mass, 3) for mass in (5.0, 1.0))
     assert np.nanmin(light.identified["f_d_hz"]) > np.nanmin(heavy.identified["f_d_hz"]) + 1.0
     assert np.nanmax(np.abs(light.error("f_d_hz"))) < 5.0
 
 
-def test_a_calibration_of_another_arm_is_refused(ur5e):
-    with pytest.raises(MapError, match="one-joint"):
-        workspace_map(ur5e, load_calibration("one-joint_1kg"), SHAPERS["zv"], 5.0, 3)
-
-
 def test_an_arm_of_two_joints_is_mapped_over_both():
-    found = workspace_map(load("one-joint"), load_calibration("one-joint_1kg"), SHAPERS["zv"], 1.0, 5)
+    found = workspace_map(load("one-joint"), load_calibration("one-joint_1kg"), 1.0, 5)
     assert found.joints == (0, 1)
     spread = np.nanmax(found.true["f_d_hz"], axis=0) - np.nanmin(found.true["f_d_hz"], axis=0)
     assert np.nanmax(spread) < 1e-6, "turning the base changes no mode"

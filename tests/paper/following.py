@@ -95,9 +95,8 @@ class Driven:
         kept, measured = slice(self.first, self.stop + AFTER), response.measured
         noise = 0.5 * np.random.default_rng([seed, 99]).standard_normal(measured.moment.shape)
         return MotionRecord(
-            self.driven.rest, self.driven.commands[kept], measured.q[kept],
-            (sensors * measured.moment + noise)[kept], measured.accelerometer[kept],
-            self.stop - self.first, True, Beliefs(self.believed, MODAL, "elastic"),
+            measured.q[kept], (sensors * measured.moment + noise)[kept], self.stop - self.first, True,
+            Beliefs(self.believed),
         )  # fmt: skip
 
     def peak(self, arm, carried, seed):
@@ -119,7 +118,7 @@ def followed(seed, *, friction=True, masses=0.0, motions=2):
     payload = paper_payload(ROBOT, believed)
     for number, move in enumerate(moves[:motions]):
         record = Driven.of(arm.known, move, payload.mass).record(arm, mass, 10 * seed + number)
-        lesson = student.study(replace(record, beliefs=Beliefs(payload, MODAL, "elastic")))
+        lesson = student.study(replace(record, beliefs=Beliefs(payload)))
         payload = payload if lesson is None else lesson.payload
         masses_believed.append(payload.mass)
     last = moves[-1]

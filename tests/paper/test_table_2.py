@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from tools.tables.pages import page_of
 
 from tvist_lab.metrics import motions
 from tvist_lab.studies.paper.published import MOTIONS, published
 from tvist_lab.studies.paper.report import as_dict
-from tvist_lab.studies.paper.tables import page_of
 
 LEAST_REDUCTION = {"Q1-Q2": 83.0, "Q1-Q3": 76.0, "Q3-Q1": 78.0}
 
@@ -88,6 +88,6 @@ def test_a_double_s_of_equal_duration_is_as_long_as_the_shaped_motion(with_basel
 
 
 def test_the_page_says_of_every_figure_where_it_comes_from(with_baselines):
-    text = page_of(as_dict(with_baselines), "tvist paper")
+    text = page_of("paper", as_dict(with_baselines))
     for word in ("fitted", "tuned", "predicted", "not matched"):
         assert f"| {word} |" in text

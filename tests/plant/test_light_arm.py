@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tvist_controller.api.line import paper_payload, respond
-from tvist_controller.experience.motion_record import Beliefs
-from tvist_controller.experience.twin import Twin
+from tvist_controller.api.line import respond
 from tvist_lab.metrics.ring_down import Ring
 from tvist_lab.study.line import RESTING, ControlLine
 from tvist_plant.description import DescriptionError, Payload, load
@@ -132,12 +130,6 @@ def test_a_wrong_imperfection_is_refused_by_its_name(tmp_path, line, said):
     (tmp_path / "wrong.toml").write_text(f"{text}\n[imperfections]\n{line}\n", encoding="utf-8")
     with pytest.raises(DescriptionError, match=said):
         load(tmp_path / "wrong.toml")
-
-
-def test_no_controller_knows_the_file_s_imperfections():
-    """The twin by which a robot learns is a controller's, too."""
-    twin = Twin(ARM, Beliefs(paper_payload(ARM, 2.0), None, "elastic"))
-    assert twin.arm._imperfections == Imperfections()
 
 
 def test_a_robot_file_without_imperfections_is_read_without_pinocchio_which_is_slow_to_import():

@@ -11,7 +11,6 @@ import msgspec
 import pytest
 
 from tvist_protocol import CODE_MEANINGS, EVENT_MEANINGS, Code, EventKind
-from tvist_protocol.asyncapi import asyncapi
 from tvist_protocol.channels import COMMANDS, MESSAGES, tag
 from tvist_protocol.commands import Setpoint
 from tvist_protocol.generate import FOLDER, filled, generated, golden, stray
@@ -107,30 +106,6 @@ def test_a_schema_is_valid_and_its_golden_messages_fit(kind):
     assert fitting
     for value in fitting:
         validator.validate(value)
-
-
-def test_every_reference_in_the_asyncapi_document_leads_somewhere():
-    document = asyncapi()
-    for reference in references(document):
-        place = document
-        for step in reference.removeprefix("#/").split("/"):
-            place = place[step]
-        assert place
-    messages = document["components"]["messages"]
-    assert {tag(kind) for kind in MESSAGES} <= messages.keys()
-    used = {name for channel in document["channels"].values() for name in channel["messages"]}
-    assert used == messages.keys()
-
-
-def references(part):
-    if isinstance(part, dict):
-        if "$ref" in part:
-            yield part["$ref"]
-        for inner in part.values():
-            yield from references(inner)
-    elif isinstance(part, list):
-        for inner in part:
-            yield from references(inner)
 
 
 def test_the_readmes_examples_run():

@@ -80,14 +80,30 @@ def test_check_moves_and_the_rest_reach_a_robot_in_a_namespace(router, robots):
     assert report.robots == ["ur5e-1"]
 
 
-def test_stop_reaches_all_and_a_robot_that_is_not_there_fails_the_command(router, robots):
-    code, out, _ = tvist("fleet", "stop", "--all", "--endpoint", router.endpoint, "--json")
+def test_stop_reaches_all_and_a_robot_that_is_not_there_is_no_success(router, robots):
+    code, out, _ = tvist("stop", "--all", "--endpoint", router.endpoint, "--json")
     assert code == 0
     assert [report["ok"] for report in json.loads(out)["robots"]] == [True] * 3
-    code, out, err = tvist("fleet", "stop", "hall-3/line-1/ur5e-1", "ur5e-9", "--endpoint", router.endpoint)
-    assert code == 1
-    assert out.splitlines() == ["ur5e-9: it does not answer", "hall-3/line-1/ur5e-1: stopped"]
-    assert err == "tvist: 1 of 2 robots may still be moving: ur5e-9 first\n"
+    code, out, _ = tvist("stop", "--all", "--namespace", "hall-3", "--endpoint", router.endpoint)
+    assert (code, out.splitlines()) == (0, ["hall-3/line-1/ur5e-1: stopped"])
+    code, _, err = tvist("stop", "--all", "--namespace", "hall-4", "--endpoint", router.endpoint)
+    assert (code, err) == (1, "tvist: there are no robots, so none was stopped\n")
+
+    async def stop():
+        async with Fleet(router.endpoint) as fleet:
+            return await fleet.stop([ALL[2], Place("", "ur5e-9")])
+
+    reports = [(report.name, report.ok, report.said) for report in asyncio.run(stop())]
+    assert reports == [("ur5e-9", False, "it does not answer"), ("ur5e-1", True, "stopped")]
+
+
+def test_watch_shows_all_robots_and_of_one_its_states(router, robots):
+    code, out, _ = tvist("watch", router.endpoint, "--seconds", "4", "--json")
+    first = json.loads(out.splitlines()[0])["robots"]
+    assert (code, [Place(one["namespace"], one["name"]) for one in first]) == (0, ALL)
+    assert {one["safety_mode"] for one in first} == {"NORMAL"}
+    code, out, _ = tvist("watch", router.endpoint, "--namespace", "hall-3", "--seconds", "4", "--json")
+    assert (code, json.loads(out.splitlines()[0])["type"]) == (0, "state")
 
 
 def test_states_of_many_come_by_one_key(router, robots):

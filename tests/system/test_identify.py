@@ -45,11 +45,11 @@ def test_a_few_ring_downs_make_a_calibration(tmp_path):
 
 @pytest.mark.nightly
 def test_people_get_tables_of_springs_and_of_errors(tmp_path):
-    ended = tvist(
-        "identify", "--model", "modal", "--ring-downs", 4, "--payloads", "5", cwd=tmp_path
-    ).assert_done()
+    options = ("--model", "modal", "--ring-downs", 4, "--payloads", "5", "--figures", "maps")
+    ended = tvist("identify", *options, cwd=tmp_path).assert_done()
     for words in ("gear stiffness", "breakaway", "95 %", "true modes", "calibration.json"):
         assert words in ended.out
+    assert {path.name for path in (tmp_path / "maps").iterdir()} == {"map_f_d.png", "map_zeta.png"}
 
 
 @pytest.mark.nightly
@@ -98,16 +98,17 @@ def test_a_recording_alone_makes_a_calibration_and_proposes_moves(day, tmp_path)
     assert {one.status for one in calibration.modal.parameters} == {"identified", "not identifiable"}
 
 
-def test_a_twin_of_a_recording_can_be_served(day, tmp_path):
+def test_a_twin_of_a_recording_can_be_served(day, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     path = tmp_path / "robot.toml"
-    said = tvist("log", "fit", day, "--output", path, "--json").assert_done().json
+    said = tvist("log", "fit", day, "--json").assert_done().json
     assert said["motions"] >= 4
     assert said["residual_error_percent"] < 25.0
     assert said["payloads"][0]["carried_kg"] == pytest.approx(2.0, abs=0.1)
     assert load(path).payload.mass == pytest.approx(said["payloads"][0]["carried_kg"])
     with Served("--robot", path, "--clock", "lockstep") as robot:
         assert robot.endpoint
-    tvist("log", "fit", day, "--output", path).assert_failed(1, "--force")
+    tvist("log", "fit", day).assert_failed(1, "robot.toml exists already", "--output")
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ def test_a_recording_is_read_in_a_folder_with_modules_of_others(tmp_path):
     for name in ("polars", "numpy", "tvist_lab"):
         (tmp_path / f"{name}.py").write_text(SHADOW)
     ended = subprocess.run(
-        [sys.executable, "-P", "-m", "tvist_cli", "log", "info", "run.parquet"],  # as the program does
+        [sys.executable, "-P", "-m", "tvist_cli", "log", "analyze", "run.parquet"],  # as the program does
         cwd=tmp_path,
         env={name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"},
         capture_output=True,

@@ -44,41 +44,6 @@ def made_again(told, folder):
     assert not any(word in web_page for word in ("p5", "median", "one of twenty"))
 
 
-def in_three_ways(told, _):
-    """A path has the keys that are promised."""
-    (path,) = told["paths"]
-    assert (path["kind"], path["payload_kg"], told["plant"]) == ("arc", 5.0, "clean")
-    assert list(path["shaped"]) == ["zv", "auto"]
-    for ways in path["shaped"].values():
-        assert list(ways) == ["along", "joints", "joints_unslowed"]
-        assert ways["along"]["off_mm"] < ways["joints"]["off_mm"]
-        for one in ways.values():
-            assert one["peak_m_s2"] < path["unshaped_peak_m_s2"]
-            assert one["delay_ms"] > 0.0
-    assert set(told["summary"]) == {"all", "arc"}
-    assert {"refused", "stopping", "circle", "seed", "calibration"} <= set(told)
-
-
-def at_each_speed(told, folder):
-    """Each shaper has errors at each speed, and the page the same."""
-    assert told["speeds_rad_s"] == [0.5, 1.0]
-    assert [(one["name"], one["shaped"]) for one in told["shapers"]] == [("none", False), ("auto", True)]
-    page = (folder / "page.md").read_text(encoding="utf-8")
-    for one in told["shapers"]:
-        assert {"error_rad", "within", "speed_at_tolerance_rad_s", "lag_ms"} <= set(one["ramp"])
-        assert one["ramp"]["within"] == one["jump"]["within"] == [True, True]
-        assert one["ramp"]["error_rad"][1] > one["ramp"]["error_rad"][0] > 0.0
-        assert all(f"{error:.3f}" in page for error in one["jump"]["error_rad"])
-
-
-def over_two_joints(told, _):
-    """A map is of one arm, with errors of each quantity."""
-    assert (told["robot"], told["payload_kg"], told["shaper"]) == ("ur5e", 1.0, "zvd")
-    for key, maps in told["maps"].items():
-        assert [len(maps[kind]) for kind in ("identified", "true", "error_percent")] == [5, 5, 5]
-        assert told["errors"][key]["median_percent"] < 10.0
-
-
 def as_they_are(told, _):
     """Every shaper is listed as it is."""
     assert (told["f_d_hz"], told["zeta"]) == (6.7, 0.34)
@@ -126,22 +91,11 @@ def pair_by_pair(told, _):
     assert "not held out" in told["held_out"]
 
 
-def ever_less(told, _):
-    """Each plant has a figure of each repetition."""
-    (plant,) = told["plants"]
-    assert (plant["plant"], plant["moves"], len(plant["repetitions"])) == ("springs-30", 1, 3)
-    assert plant["repetitions"][2]["median"] > plant["repetitions"][0]["median"]
-
-
 RANDOM = "evaluate --random 2 --seed 5 --payload uniform --clean --shaper auto --no-baselines --save-moves drawn.json"
-MAP = (
-    "study map --points 5 --payload 1 --calibration ur5e_modal --shaper zvd --figures . --format svg --width 1 "
-    "--output out.json"
-)
 RUNS = {
     "evaluate": (f"{RANDOM} --figures . --report report.html", {"moves.png", "one_move.png"}, made_again),
     "robustness": (
-        "study robustness --moves 1 --against zv --output out.json --markdown page.md --figures .",
+        "study robustness --moves 1 --against zv --output out.json --figures .",
         {"robustness.png"},
         with_each_error,
     ),
@@ -150,14 +104,6 @@ RUNS = {
         set(),
         pair_by_pair,
     ),
-    "learning": ("study learning --moves 1 --repetitions 2 --plants springs-30 --seed 5", set(), ever_less),
-    "paths": (
-        "study paths --random 1 --kind arc --shapers zv auto --seed 3 --payload 5 --clean --markdown page.md",
-        set(),
-        in_three_ways,
-    ),
-    "tracking": ("study tracking --shapers auto --speeds 1 0.5 --markdown page.md", set(), at_each_speed),
-    "map": (MAP, {"map_f_d.svg", "map_zeta.svg", "map_delay.svg"}, over_two_joints),
     "shapers": (
         "shapers --f-d 6.7 --zeta 0.34 --figures .",
         {"shapers.png", "settling.png", "mean_delay.png", "elastic.png"},
@@ -171,11 +117,6 @@ RUNS = {
 }
 """Commands, the figures that they write, and what is asked of their results."""
 SAID = {
-    "study paths --random 3 --shapers auto --figures .": (
-        ["1 line,", "1 path with blends,", "joint by joint", "in motion", "circle"],
-        ["refused by the planner", "path_shaping.png", "path_corner.png"],
-    ),
-    "study map --points 3 --robot one-joint": (["f_d Hz", "error % median"], []),
     "shapers": ([f"{name} " for name in SHAPERS] + [one.description for one in SHAPERS.values()], []),
     "shapers --sensitivity": (["5 % from"], []),
 }  # fmt: skip
@@ -198,9 +139,6 @@ def test_a_result_is_right_and_what_is_written_is_what_is_printed(here, name):
     assert all((here / figure).stat().st_size > 5000 for figure in figures)
     if "--output" in words:
         assert json.loads((here / "out.json").read_text(encoding="utf-8")) == told
-    if "--markdown" in words:
-        typed = told["command"] if name == "tracking" else f"tvist {words} --json"
-        assert f"```sh\n{typed}\n```" in (here / "page.md").read_text(encoding="utf-8")
     if "--report" in words:
         assert (here / "report.html").read_text(encoding="utf-8").count("<img") == len(figures)
 

@@ -3,10 +3,10 @@
 import pytest
 
 from tvist_urscript import Machine, ScriptError, compile_script
-from tvist_urscript.dry_functions import Memory
 from tvist_urscript.expressions import MOST_OPERATIONS
 from tvist_urscript.machine import OVERDRAFT
 
+from .dry_functions import Memory
 from .programs import spoilt, valid
 
 CI, ALL = 1_000, 100_000

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tvist_urscript.dry_run import dry_run
+from .dry_run import dry_run
 
 CASES = [
     pytest.param(case, id=f"{path.stem}: {case['name']}")
@@ -19,7 +19,7 @@ REGISTERS = {"int_registers": "int", "double_registers": "double", "bit_register
 @pytest.mark.parametrize("case", CASES)
 def test_case(case):
     assert set(case) <= KNOWN | set(REGISTERS)
-    run = dry_run(case["script"], inputs=case.get("inputs"), longest=2000)
+    run = dry_run(case["script"], case.get("inputs"))
     error = case.get("error")
     if error is None:
         assert run.error is None

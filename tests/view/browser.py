@@ -10,9 +10,8 @@ from contextlib import contextmanager
 import pytest
 from tests import forked
 from tests.conformance.served import PATIENCE
-
-from tvist_view.film import FLAGS
-from tvist_view.film import browser as browser_that_draws
+from tools.film import FLAGS
+from tools.film import browser as browser_that_draws
 
 CHROMIUM = browser_that_draws()
 ARGUMENTS = [flag for flag in FLAGS if not flag.startswith("--headless")]  # playwright says that itself

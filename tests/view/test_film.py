@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from tvist_view.film import Film, FilmError, Format
+from tools.film import Film, FilmError
 
 from .browser import CHROMIUM
 
@@ -17,7 +16,7 @@ def test_the_film_is_slow_where_the_arm_rings(tracks):
 async def test_a_films_pictures_are_drawn_by_a_browser_and_differ(tracks):
     if CHROMIUM is None:
         pytest.skip("there is no Chromium")
-    film = Film(tracks, 100.0, look=Format(width=300, height=200))
+    film = Film(tracks, 100.0, size=(300, 200))
     first, later = await film.pictures([film.start, film.start + 1.2])
     assert first.size == later.size == (300, 200)
     assert (np.asarray(first) != np.asarray(later)).any()
@@ -25,7 +24,7 @@ async def test_a_films_pictures_are_drawn_by_a_browser_and_differ(tracks):
 
 
 async def test_without_a_browser_a_film_says_what_to_install(tracks, monkeypatch):
-    monkeypatch.setattr("tvist_view.film.BROWSERS", ("no-such-browser",))
+    monkeypatch.setattr("tools.film.BROWSERS", ("no-such-browser",))
     film = Film(tracks, 100.0)
     with pytest.raises(FilmError, match="apt-get install chromium"):
         await film.pictures([film.start])

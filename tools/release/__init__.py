@@ -1,1 +1,1 @@
-"""Releases: one version for all distributions, a dated changelog, a tag."""
+"""Releases: clean environments, and wheels with machine code."""

@@ -1,4 +1,6 @@
-"""Wheels of `tvist-compiled`: the kernels of a served robot as machine code, for one Python and one architecture.
+"""`python -m tools.release.compiled DIST PYTHON...` adds wheels of `tvist-compiled` to built packages.
+
+They hold the kernels of a served robot as machine code, each for one Python and one architecture.
 
 They run on any processor of the architecture, and only with the versions of numba and llvmlite that the wheel demands.
 """
@@ -7,12 +9,14 @@ import base64
 import hashlib
 import json
 import platform
+import sys
 import tempfile
 import zipfile
 from pathlib import Path
 
-from tools.release.environments import clean, constraints, install, run
-from tools.release.versions import ReleaseError
+from tools.release.environments import FailedError, clean, constraints, install, run
+
+ROOT = Path(__file__).parents[2]
 
 NAME, FOLDER = "tvist-compiled", "tvist_compiled"
 SYSTEM = "manylinux_2_17"
@@ -34,30 +38,28 @@ Requires-Dist: llvmlite=={llvmlite}
 """
 
 
-def compiled_wheel(root: Path, dist: Path, python: str) -> Path:
+def compiled_wheel(dist: Path, python: str) -> Path:
     """Compile with the packages of a folder, and put the wheel beside them.
 
     Args:
-        root: Folder of the checkout.
         dist: Folder with the wheels just built.
         python: The Python to compile for.
 
     Raises:
-        ReleaseError: There is no machine code afterwards.
         FailedError: Something could not be installed or compiled.
     """
     with tempfile.TemporaryDirectory(prefix="tvist-compiled-") as folder:
         versions, where, kernels = (
             Path(folder) / name for name in ("constraints.txt", "environment", "kernels")
         )
-        versions.write_text(constraints((root / "requirements.lock").read_text("utf-8")), "utf-8")
+        versions.write_text(constraints((ROOT / "requirements.lock").read_text("utf-8")), "utf-8")
         install("tvist[server]", where, dist, versions, python)
         processor = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(kernels)}
         run(where / "bin" / "tvist", "serve", "--compile", cwd=where, env=clean() | processor)
         tag, *numbers = json.loads(run(where / "bin" / "python", "-c", ASKED, cwd=where))
         files = {file.name: file.read_bytes() for file in sorted(kernels.rglob("*.kernel"))}
     if not files:
-        raise ReleaseError(f"nothing is compiled by {python}")
+        raise FailedError(f"nothing is compiled by {python}")
     return written(dist, files, tag, *numbers)
 
 
@@ -94,3 +96,14 @@ def written(dist: Path, kernels: dict[str, bytes], tag: str, version: str, numba
 
 def _digest(data: bytes) -> str:
     return "sha256=" + base64.urlsafe_b64encode(hashlib.sha256(data).digest()).decode().rstrip("=")
+
+
+def main(dist: str, *pythons: str) -> None:
+    """Make a wheel for each Python."""
+    for python in pythons:
+        wheel = compiled_wheel(Path(dist).resolve(), python)
+        print(f"{wheel.name}: {wheel.stat().st_size / 1e6:.1f} MB", flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

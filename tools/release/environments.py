@@ -1,4 +1,4 @@
-"""Clean environments, one for each line of the page on installing; our own packages are those just built."""
+"""Clean environments whose own packages are those just built."""
 
 import os
 import re
@@ -8,12 +8,11 @@ import sys
 import zipfile
 from pathlib import Path
 
-LINE = re.compile(r"`pip install '?(?P<what>tvist[\w-]*(?:\[\w+\])?)'?`")
 PINNED = re.compile(r"^([\w.-]+==[^ ]+(?: ;[^\\\n]*)?)", re.MULTILINE)
 
 
 class FailedError(Exception):
-    """A step of the rehearsal failed; the message is what it said."""
+    """A program failed; the message is what it said."""
 
 
 def run(*words: str | Path, cwd: Path, env: dict[str, str] | None = None, seconds: float = 1800) -> str:
@@ -34,11 +33,6 @@ def run(*words: str | Path, cwd: Path, env: dict[str, str] | None = None, second
     return ended.stdout
 
 
-def installed(page: str) -> list[str]:
-    """Return what the lines of the page on installing name, such as `tvist[server]`."""
-    return list(dict.fromkeys(LINE.findall(page)))
-
-
 def constraints(lock: str) -> str:
     """Return the versions of a lock as constraints, without its hashes: what is just built has none there."""
     return "".join(f"{pin.strip()}\n" for pin in PINNED.findall(lock))
@@ -51,7 +45,7 @@ def clean() -> dict[str, str]:
     return {**found, "PYTHONUNBUFFERED": "1"}
 
 
-def install(what: str, where: Path, dist: Path, versions: Path, python: str = sys.executable) -> None:
+def install(what: str, where: Path, dist: Path, versions: Path, python: str) -> None:
     """Make an environment of a Python with what a line names, by uv where there is one.
 
     Raises:

@@ -13,7 +13,6 @@ from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.courier import Courier
 from tvist_server.fleet import recording_of
 from tvist_server.gateways.exposure import ExposureError, check_endpoints, guarded, guarded_interfaces
-from tvist_server.learnt_file import LearntFile
 from tvist_server.robot import ServedRobot
 
 if TYPE_CHECKING:
@@ -31,13 +30,9 @@ def made_robot(
     path = None
     if config.record is not None:
         path = recording_of(config.record, setup.name) if several else Path(config.record)
-    learn = None
-    if config.learn is not None:
-        learn = recording_of(config.learn, setup.name) if several else Path(config.learn)
     programs, dump, keep = config.program_folder(setup.name), config.dump_folder(), config.keep_ticks()
     try:
-        learnt = None if learn is None else LearntFile(learn, setup)
-        return ServedRobot(setup, path, dump, observe, programs, config.allowed_hosts(), keep, learnt=learnt)
+        return ServedRobot(setup, path, dump, observe, programs, config.allowed_hosts(), keep)
     except ValueError as error:
         raise ConfigError(str(error)) from error
 
@@ -126,7 +121,6 @@ def drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Co
             PERIOD,
             config.speed,
             priority=config.realtime_priority,
-            processor=config.processor,
         )
         return [courier], [clock]
     couriers = [Courier([robot.publisher]) for robot in robots]

@@ -17,7 +17,7 @@ from tvist_plant.plant import PlantError
 from tvist_server.jobs import Do, Jobs
 from tvist_server.lateness import Lateness, Punctuality
 from tvist_server.overload import Overload
-from tvist_server.punctual import PRIORITY, bind, take_priority
+from tvist_server.punctual import PRIORITY, take_priority
 from tvist_server.schedule import Followed, Schedule
 
 log = logging.getLogger(__name__)
@@ -187,7 +187,6 @@ class Realtime(Clock):
         period: Tick [s].
         speed: Simulation speed relative to real time [-].
         priority: Whether to ask the system for real-time priority.
-        processor: Processor to bind the thread to; None to run on any.
     """
 
     def __init__(
@@ -198,7 +197,6 @@ class Realtime(Clock):
         speed: float = 1.0,
         *,
         priority: bool = False,
-        processor: int | None = None,
     ) -> None:
         super().__init__(robots)
         self._hand_on = hand_on
@@ -206,7 +204,7 @@ class Realtime(Clock):
         self._overloads = [Overload(robot.interval or self._period) for robot in robots]
         for robot, overload in zip(robots, self._overloads, strict=True):
             robot.overload = overload
-        self._priority, self._processor = priority, processor
+        self._priority = priority
         self._asked = threading.Event()
         self.granted: list[str] = []
         """What the system has granted the thread, in words; complete after `start`."""
@@ -286,8 +284,6 @@ class Realtime(Clock):
         _wake_sharply()
         if self._priority and take_priority():
             self.granted.append(f"real-time priority {PRIORITY}")
-        if self._processor is not None and bind(self._processor):
-            self.granted.append(f"bound to processor {self._processor}")
 
 
 def _nothing() -> None:

@@ -126,9 +126,6 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     adapt: Adapt | None = None
     """payload: after each motion the robot finds from its torques what it carries, and moves as an arm that carries it,
     instead of what is declared; tvist forget undoes that [nothing]."""
-    learn: str | None = None
-    """File in which the robot keeps what it learns of its motions: one that is made again gets a correction, from what
-    the tool's accelerometer said after its stop. With several robots, each has its own [it learns nothing]."""
     calibration: str | None = None
     """Name of a calibration that comes with the package, or path of a calibration file; none for a robot that is yet to
     be identified [the one that comes with the package for this robot]."""
@@ -138,10 +135,6 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Simulation speed relative to real time."""
     realtime_priority: bool = False
     """Run the control loop with real-time priority (SCHED_FIFO), if the system permits it."""
-    processor: Annotated[int, Meta(ge=0, le=4095)] | None = None
-    """Run the control loop on this processor, counted from 0, and all other threads of the server on others [any]."""
-    lock_memory: bool = False
-    """Keep the server's memory from being swapped out, if the system permits it."""
     start: str | tuple[float, ...] | None = None
     """Pose to start in: a name from the robot file, such as Q1, Q2 or Q3, or joint angles in rad separated by commas
     [Q1; the posture of URSim with a profile]."""
@@ -384,7 +377,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         what = "only knows what its own controller tells"
         if not self.enable_motion:
             asked |= {
-                "shaper": self.shaper, "learn": self.learn, "start": self.start, "speed_cap": self.speed_cap,
+                "shaper": self.shaper, "start": self.start, "speed_cap": self.speed_cap,
                 "tcp": self.tcp, "servo_lag": self.servo_lag, "shape_servo": self.shape_servo or None,
             }  # fmt: skip
             what = "is only watched"

@@ -22,7 +22,7 @@ class PlansOfPrograms:
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
         self._thread = ThreadPoolExecutor(1, "tvist-program-plans")
-        # Begun by the tick thread, it would inherit its priority and processor.
+        # Begun by the tick thread, it would inherit its priority.
         self._thread.submit(int)
 
     def order(self, command: Command, basis: PlanBasis) -> Callable[[], Plan]:

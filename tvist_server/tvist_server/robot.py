@@ -24,7 +24,6 @@ from tvist_server.clock import Clock, Mailbox
 from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.gateways.sockets import ProgramSockets
 from tvist_server.lateness import Punctuality
-from tvist_server.learnt_file import LearntFile
 from tvist_server.plan_ahead import PlanAhead
 from tvist_server.plans_of_programs import PlansOfPrograms
 from tvist_server.program_folder import ProgramFolder
@@ -54,7 +53,6 @@ class ServedRobot:
         hosts: Machines that programs may connect to, besides the one that sent them [none].
         keep: Number of ticks that the recording keeps at least; None keeps all.
         students: Who studies the robot's motions, besides those that the setup asks for.
-        learnt: File with the motions that it learns; None if it learns none.
 
     Raises:
         ValueError: The setup is invalid.
@@ -71,7 +69,6 @@ class ServedRobot:
         hosts: AllowedHosts | None = None,
         keep: int | None = None,
         students: Sequence[Student] = (),
-        learnt: LearntFile | None = None,
     ) -> None:
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
@@ -107,8 +104,6 @@ class ServedRobot:
         sinks += [] if observe is None else [observe(self.controller)]
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
         """Gateway for the sockets of programs."""
-        if learnt is not None:
-            students = (*students, learnt.student(self.warn))
         self._studies = Studies() if self._realtime and (students or setup.adapt) else None
         if self._studies is None:
             experience = experience_of(setup, students)
@@ -121,8 +116,6 @@ class ServedRobot:
             self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience,
             survives=True,
         )  # fmt: skip
-        if learnt is not None:
-            learnt.recall(self._host)
         plant = self.controller.cycle.line.plant  # also where the setup has none
         knows = isinstance(plant, Truthful) and plant.truth() is not None
         self.want_truth = self.publisher.want_truth if knows and not setup.truth else None

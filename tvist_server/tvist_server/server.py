@@ -23,7 +23,6 @@ from tvist_server.gateways.endpoints import is_local
 from tvist_server.gateways.metrics import Metrics
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.starting import Prepare, Starting
-from tvist_server.punctual import leave_processor, lock_memory
 from tvist_server.robot import ServedRobot
 from tvist_server.spread import Share, check_together
 from tvist_server.ur_ports import InterfaceName
@@ -81,7 +80,6 @@ class Server:
         if config.clock == "realtime":  # equal runs in lockstep are equal, tokens included
             setups = [replace(setup, instance=secrets.token_hex(INSTANCE_BYTES)) for setup in setups]
         self._observed = observe is not None
-        self._lock_memory, self._processor = config.lock_memory, config.processor
         self.granted: list[str] = []
         """What the system has granted so that ticks are on time, in words; complete after `start`."""
         # A process that others reach through the first one needs no protection of its own.
@@ -187,11 +185,6 @@ class Server:
         # A thread that wants the interpreter's lock waits this long before it asks for it. Python's default, 5 ms, is
         # longer than a tick, and another thread may hold the lock when the tick thread wakes up.
         sys.setswitchinterval(1e-4)
-        if self._lock_memory and lock_memory():
-            self.granted.append("memory is locked")
-        realtime = any(isinstance(clock, Realtime) for clock in self._clocks)
-        if realtime and self._processor is not None and leave_processor(self._processor):
-            self.granted.append(f"processor {self._processor} is left to the control loop")
         self._console.start()
         for courier in self._couriers:
             courier.start()

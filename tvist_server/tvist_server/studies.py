@@ -11,7 +11,7 @@ class Studies:
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, "tvist-studies")
-        # Begun by the tick thread, it would inherit its priority and processor.
+        # Begun by the tick thread, it would inherit its priority.
         self._thread.submit(int)
 
     def later(self, work: Work) -> Callable[[], bool]:

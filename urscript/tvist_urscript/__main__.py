@@ -1,27 +1,41 @@
-"""Run a script without a robot and print what it says: `python -m tvist_urscript FILE`."""
+"""Print what is wrong with a script: `python -m tvist_urscript FILE`."""
 
+import re
 import sys
 from pathlib import Path
 
-from tvist_urscript.dry_run import dry_run
+from tvist_urscript.checker import check
+from tvist_urscript.errors import ScriptError, name_not_found
+from tvist_urscript.names import BUILT_IN_ARRAYS
+from tvist_urscript.signatures import Signature, parameters
+
+CALL = re.compile(r"(?P<name>\w+)\s*\(")
+ARRAYS = {read: Signature(parameters("n")) for read, _ in BUILT_IN_ARRAYS.values()} | {
+    write: Signature(parameters("n", "value")) for _, write in BUILT_IN_ARRAYS.values() if write
+}
+"""The robot's functions that `digital_out[0]` and the like call."""
 
 
 def main(arguments: list[str]) -> int:
-    """Return the exit code: 0 if the script has ended, 1 if it has an error or does not end, 2 without a file."""
+    """Return the exit code: 0 if the script can run, 1 if it has errors, 2 without a file.
+
+    A function that neither the script nor the language has is taken to be the robot's.
+    """
     if len(arguments) != 1:
         print("usage: python -m tvist_urscript FILE", file=sys.stderr)
         return 2
     path = Path(arguments[0])
-    run = dry_run(path.read_text(encoding="utf-8", errors="replace"))
-    for text in run.memory.said:  # without a terminal's commands
-        print("".join(c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}" for c in text))
-    if run.error is not None:
-        print(f"{path}: {run.error}", file=sys.stderr)
-        return 1
-    if not run.ended:
-        print(f"{path}: the program has not ended after {run.ticks} ticks", file=sys.stderr)
-        return 1
-    return 0
+    text = path.read_text(encoding="utf-8", errors="replace")
+    lines = text.split("\n")
+    errors = [error for error in check(text, ARRAYS) if not _is_of_robot(error, lines)]
+    for error in errors:
+        print(f"{path}:{error.line}:{error.column}: {error.text}")
+    return 1 if errors else 0
+
+
+def _is_of_robot(error: ScriptError, lines: list[str]) -> bool:
+    call = CALL.match(lines[error.line - 1], error.column - 1)
+    return call is not None and error.text == name_not_found(call["name"])
 
 
 if __name__ == "__main__":

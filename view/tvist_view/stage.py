@@ -20,7 +20,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 LARGEST = 16 * 2**20
-"""Largest message of a page, which is a picture of a film [byte]."""
+"""Largest message of a page [byte]; a picture of a film is the largest that there is."""
 WAITS_S = 1.0
 """How long a tab may take to say goodbye when the page ends [s]."""
 

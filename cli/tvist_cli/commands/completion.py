@@ -52,7 +52,6 @@ def _option_values() -> dict[str, _Values]:
         "robot": robot,
         "robots": robot,
         "shaper": shaper,
-        "shapers": shaper,
         "sensitivity": _Values(tuple(SHAPERS), "py"),
         "against": _Values((UNSHAPED, *names("bench"))),
         "plant": _Values(tuple(named_plants()), "py"),

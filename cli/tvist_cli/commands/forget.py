@@ -1,8 +1,8 @@
-"""`tvist forget`: undo what a served robot has learnt from its motions."""
+"""`tvist forget`: undo what a served robot has learnt of its payload."""
 
 import asyncio
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
 from tvist_cli.output import out, print_json
@@ -12,7 +12,6 @@ if TYPE_CHECKING:
 
 
 def forget(
-    what: Literal["payload", "motions"],
     *,
     endpoint: str = "tcp/127.0.0.1:7447",
     name: str | None = None,
@@ -20,14 +19,12 @@ def forget(
     namespace: str = "",
     json: bool = False,
 ) -> None:
-    """Take control of a served robot, and undo what it has learnt from its motions.
+    """Take control of a served robot, and undo what it has learnt of its payload.
 
     A robot served with --adapt payload then moves as an arm that carries the declared payload, until its motions tell
-    it otherwise again; one served with --learn corrects no motion until it has learnt it anew. If another client has
-    control, the command fails with exit code 1 and changes nothing.
+    it otherwise again. If another client has control, the command fails with exit code 1 and changes nothing.
 
     Args:
-        what: What to forget: payload, what the robot has found that it carries; or motions, how it corrects them.
         endpoint: Zenoh endpoint of the robot.
         name: Name of the robot [ur5e; if there is none, the only robot at the endpoint].
         namespace: Namespace of the robot, if it is served in one.
@@ -42,17 +39,11 @@ def forget(
         async with await Robot.connect(endpoint, found, security=security, namespace=namespace) as robot:
             before = await robot.io()
             async with robot.control("tvist forget") as arm:
-                await arm.forget(what)
+                await arm.forget()
             return found, before
 
     with told():
         robot, before = asyncio.run(run())
-    if what == "motions":
-        if json:
-            print_json({"robot": robot, "forgot": "motions"})
-        else:
-            out.print(f"{robot} corrects no motion until it has learnt it anew")
-        return
     declared, assumed = before.payload.mass, before.assumed_payload
     if json:
         print_json({"robot": robot, "declared_kg": declared, "forgot_kg": assumed and assumed.mass})

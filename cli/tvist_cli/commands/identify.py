@@ -17,11 +17,15 @@ from tvist_cli.poses import pose
 from tvist_cli.robot_logs import robot_logs
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from tvist_client.arm import Arm
     from tvist_client.robot import Robot
     from tvist_lab.identification.identify import Identification
+    from tvist_lab.identification.modal import ModalIdentification
     from tvist_lab.identification.payload import PayloadFound
     from tvist_plant.description import RobotDescription
+    from tvist_protocol.calibration import Calibration
     from tvist_protocol.info import Info
 
 ROBOT = "ur5e"
@@ -101,13 +105,14 @@ def identify(
         seed: Seed of the choice of configurations and, in this process, of noise and gear errors.
         at: Poses to measure with more weight (polynomial): names from the robot file, or angles separated by commas
             [all poses of the robot file].
-        figures: Folder to write a figure of the fit to (polynomial).
+        figures: Folder to write figures to: the fit (polynomial) and, in this process, maps of the lowest mode's
+            frequency and damping over the workspace, identified against true.
         look: How to write the figures.
         json: Print one JSON object.
     """
     if min(configurations, repeats, ring_downs, poses) < 1:
         raise Failure("configurations, repeats, ring-downs and poses must be at least 1", code=2)
-    _check_model(model, payloads, at, figures)
+    _check_model(model, payloads, at)
     look.check(figures)
     if not output.absolute().parent.is_dir():  # said before half an hour of jogs
         raise Failure(f"output is {output}: its folder does not exist", code=2)
@@ -138,20 +143,17 @@ def identify(
     elif model == "modal":
         whole = payloads is None and mass is None and endpoint is None
         masses = f"0,{arm.payload.mass:g}" if whole else payloads
-        _modal(place, arm, ring_downs, masses, output, called, json=json)
+        _modal(place, arm, ring_downs, masses, output, called, figures, look, json=json)
     else:
         anchors = place.anchors(at)
         _polynomial(place, arm, anchors, configurations, repeats, output, called, figures, look, json=json)
 
 
-def _check_model(model: str, payloads: str | None, at: list[str] | None, figures: Path | None) -> None:
+def _check_model(model: str, payloads: str | None, at: list[str] | None) -> None:
     if model == "polynomial" and payloads is not None:
         raise Failure("payloads is for the modal model: give --model modal too, or leave it out", code=2)
-    if model == "modal" and (at or figures is not None):
-        which = "at" if at else "figures"
-        raise Failure(
-            f"{which} is for the polynomial model: leave it out, or give --model polynomial", code=2
-        )
+    if model == "modal" and at:
+        raise Failure("at is for the polynomial model: leave it out, or give --model polynomial", code=2)
 
 
 def _at_robot(
@@ -293,7 +295,8 @@ def _polynomial(
         identification = identified_figure(
             done.calibration, done.q, done.f_d, done.zeta, done.true_f_d, done.true_zeta
         )
-        write(look.into(figures), {"identification": identification})
+        maps = _maps(arm, done.calibration, done.calibration.payload.mass) if place.endpoint is None else {}
+        write(look.into(figures), {"identification": identification, **maps})
     found, own = done.calibration.payload.mass, arm.payload.mass
     options = place.options if found == own else f"{place.options} --payload {found:g}"
     report_polynomial(done, output, options, json=json)
@@ -306,6 +309,8 @@ def _modal(
     masses: str | None,
     output: Path,
     name: str,
+    figures: Path | None,
+    look: FigureOptions,
     *,
     json: bool,
 ) -> None:
@@ -322,7 +327,23 @@ def _modal(
     elif place.mass is not None:
         command += f" --payload {place.mass:g}"
     doing = partial(identify_modal, description=arm, plan=plan, name=name, command=command)
-    report_modal(place.calibrate(ring_downs, doing, output), output, place.options, json=json)
+    done: ModalIdentification = place.calibrate(ring_downs, doing, output)
+    if figures is not None:
+        mass = arm.payload.mass if place.mass is None else place.mass
+        write(look.into(figures), _maps(arm, done.calibration, mass))
+    report_modal(done, output, place.options, json=json)
+
+
+def _maps(arm: "RobotDescription", calibration: "Calibration", mass: float) -> "dict[str, Figure]":
+    """Draw the lowest mode over the workspace, identified and true, with a payload of this mass [kg]."""
+    from tvist_lab.figures import workspace_map_figure
+    from tvist_lab.identification.workspace_map import QUANTITIES, workspace_map
+
+    found = workspace_map(arm, calibration, mass)
+    if found is None:
+        return {}
+    words = f"{arm.robot.name}, {mass:g} kg, calibration {calibration.name}"
+    return {f"map_{name}": workspace_map_figure(found, key, words) for key, name in QUANTITIES.items()}
 
 
 def _from_logs(

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
-from tvist_cli.output import progress, typed
+from tvist_cli.output import progress
 from tvist_cli.serving import compile_if_new
 from tvist_cli.studying import Figures, Places, give
 from tvist_cli.tables import print_paper
@@ -25,7 +25,6 @@ def paper(
     look: FigureOptions = AS_USUAL,
     calibration: str = "ur5e_5kg",
     baselines: Annotated[bool, Parameter(negative="--no-baselines")] = True,
-    markdown: Path | None = None,
     json: bool = False,
 ) -> None:
     """Simulate the paper's three motions, unshaped and shaped, as fast as possible; print its tables beside ours.
@@ -37,17 +36,15 @@ def paper(
         look: How to write the figures.
         calibration: Name of a calibration that comes with the package, or path of a calibration file.
         baselines: Run the baselines for comparison as well.
-        markdown: File to write a page to, with all tables and the source of each figure.
         json: Print one JSON object.
     """
-    places = Places(markdown=markdown, figures=figures, look=look)
+    places = Places(figures=figures, look=look)
     places.check()
     if runs < 1:
         raise Failure(f"runs is {runs}: must be at least 1", code=2)
     from tvist_lab.in_process import free_setup, robot_in_process
     from tvist_lab.studies.paper.experiment import count, experiment
     from tvist_lab.studies.paper.report import as_dict
-    from tvist_lab.studies.paper.tables import page_of
     from tvist_server.config import ConfigError
 
     with told(ConfigError, code=2):
@@ -65,7 +62,7 @@ def paper(
 
         done = asyncio.run(run())
     result = as_dict(done)
-    places.write(result, page=lambda: page_of(result, typed()), draw=lambda: _figures(done))
+    places.write(result, draw=lambda: _figures(done))
     give(result, print_paper, json=json)
 
 

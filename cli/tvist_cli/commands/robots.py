@@ -1,11 +1,10 @@
 """`tvist robots`: the arms that there are, what is known of them, and how well their vibration is suppressed."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import out, progress, say, table, typed, words
-from tvist_cli.studying import Places, check_range, check_seed, give, show
+from tvist_cli.output import out, progress, say, table, words
+from tvist_cli.studying import check_range, check_seed, give, show
 
 if TYPE_CHECKING:
     from tvist_plant.description import RobotDescription
@@ -20,7 +19,6 @@ def robots(
     random: int = 100,
     vary: float = 0.0,
     seed: int = 0,
-    markdown: Path | None = None,
     json: bool = False,
 ) -> None:
     """List the arms that come with the package: size, payload, what is measured, what is assumed, and calibrations.
@@ -35,10 +33,9 @@ def robots(
         vary: Percentage by which all springs are stiffer and softer in two further measurements, before each of which
             the arm is identified again.
         seed: Seed of moves, identification and gear errors.
-        markdown: File to write a page with the tables to.
         json: Print one JSON object.
     """
-    from tvist_lab.studies.arms.about import about, robots_page
+    from tvist_lab.studies.arms.about import about
     from tvist_plant.description import DescriptionError, load
     from tvist_plant.description import robots as shipped
 
@@ -53,7 +50,6 @@ def robots(
     for one in listed if measure else ():
         one["measured"] = _measured(one["name"], arms[one["name"]], one, random, vary, seed)
     result = {"robots": listed}
-    Places(markdown=markdown).write(result, page=lambda: robots_page(listed, typed()))
     give(result, lambda _: _print(listed, in_full=bool(robot)), json=json)
 
 

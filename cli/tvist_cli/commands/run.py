@@ -17,7 +17,7 @@ from tvist_cli.serving import leave
 from tvist_server.config import ConfigError, ServeConfig
 
 OPTIONS = {
-    "robot", "profile", "payload", "overload", "adapt", "learn", "shaper", "shape_servo", "plant", "hidden", "start",
+    "robot", "profile", "payload", "overload", "adapt", "shaper", "shape_servo", "plant", "hidden", "start",
     "seed", "record", "truth", "listen", "ur", "ur_allow", "cell", "world",
 }  # fmt: skip
 """Options of `tvist serve` that one robot which ends with its program can do with."""
@@ -99,7 +99,7 @@ def run(
         print_json(results[0] if len(file) == 1 else _together(results, failure))
     elif failure is None:
         say(ran[0].account if len(file) == 1 else f"{len(file)} programs ran as they should")
-    files.write(results, limits.given)
+    files.write(results)
     sys.stdout.flush()
     server = ran[0].server
     if server is not None and not server.left:

@@ -63,10 +63,6 @@ def serve(
     checked = configuration(given, config)
     with told(ConfigError, code=2):
         ending = Ending()
-        if checked.workers > 1 and checked.processor is not None:
-            raise ConfigError(
-                f"processor is {checked.processor}: --workers needs one for each, so leave it out"
-            )
         if checked.workers > 1:
             _several(checked, ending)
             return

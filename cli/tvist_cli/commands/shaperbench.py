@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
-from tvist_cli.output import out, say, typed
+from tvist_cli.output import out, say
 from tvist_cli.shapers_of import load_given, modal_for, on_the_bench
 from tvist_cli.simulated_arm import plants_of
 from tvist_cli.studying import Figures, Places, check_range, check_seed, command, gathered, give, show
@@ -35,7 +35,6 @@ def shaperbench(
     output: Path | None = None,
     figures: Path | None = None,
     look: FigureOptions = AS_USUAL,
-    markdown: Path | None = None,
     report: Path | None = None,
     json: bool = False,
 ) -> None:
@@ -60,7 +59,6 @@ def shaperbench(
         output: JSON file to write the leaderboard to.
         figures: Folder to write figures of settling time against residual vibration and against delay to.
         look: How to write the figures.
-        markdown: File to write a page with the tables to.
         report: File to write a web page with the verdict, the tables and the figures to.
         json: Print one JSON object.
     """
@@ -69,7 +67,7 @@ def shaperbench(
     from tvist_lab.study.arms import ARMS
     from tvist_lab.study.held_out import MOVES
 
-    places = Places(output=output, markdown=markdown, figures=figures, look=look, report=report)
+    places = Places(output=output, figures=figures, look=look, report=report)
     places.check()
     count = moves if moves is not None else QUICK if quick else MOVES
     check_range("moves", count, 1, 10_000)
@@ -109,7 +107,6 @@ def shaperbench(
     }
     places.write(
         result,
-        page=lambda: _page(result),
         draw=lambda: _figures(result),
         web_page=lambda drawn: _web_page(result, drawn),
     )
@@ -129,14 +126,6 @@ def _mine(shaper: str) -> "str | OwnShaper":
     with told(CandidateError, code=2):
         load_shaper(Path(shaper))
     return shaper
-
-
-def _page(result: dict[str, Any]) -> str:
-    from tvist_lab.studies.leaderboard import ON_PAGE, best_in_bold, ranked
-    from tvist_lab.studies.pages import page
-
-    more = {"ranked": ranked(result), "columns": ON_PAGE, "best_in_bold": best_in_bold}
-    return page("shaperbench", result, typed(), **more)
 
 
 def _figures(result: dict[str, Any]) -> Figures:

@@ -1,14 +1,19 @@
-"""`tvist stop`: stop one robot, whoever has control."""
+"""`tvist stop`: stop one robot or all, whoever has control."""
 
+import asyncio
 from pathlib import Path
+from typing import Annotated
 
-from tvist_cli.failure import Failure, told
+from cyclopts import Parameter
+
+from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import out, print_json
 
 
 def stop(
     robot: str | None = None,
     *,
+    everyone: Annotated[bool, Parameter(name="--all")] = False,
     endpoint: str = "tcp/127.0.0.1:7447",
     security: Path | None = None,
     namespace: str = "",
@@ -20,15 +25,22 @@ def stop(
     lockstep it will be after the next steps. Exit code 1: the robot does not answer, refuses, or a
     client has moved it again; the message says why.
 
-    Whoever has control keeps it and can move the robot again. tvist fleet stop --all stops all robots.
+    Whoever has control keeps it and can move the robot again. With --all, each robot's answer is reported; the exit
+    code is 1 if one did not answer or refused, and 0 if all have stopped.
 
     Args:
         robot: Name of the robot, or NAMESPACE/NAME [the only robot at the endpoint, or ur5e].
-        endpoint: Zenoh endpoint of the robot.
+        everyone: Stop all robots that the router or server reaches; with --namespace, those in it or below it.
+        endpoint: Zenoh endpoint of the robot, or of a router.
         namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         json: Print one JSON object.
     """
+    if everyone:
+        if robot is not None:
+            raise Failure(f"give either --all or the robot {robot}", code=2)
+        _stop_all(endpoint, namespace, security, json=json)
+        return
     from tvist_client.fleet import place_of
     from tvist_client.halt import halt
 
@@ -47,6 +59,30 @@ def stop(
         out.print(f"{report.robot}: {_said(report.stopped)}", soft_wrap=True, markup=False)
     if not report.ok:
         raise Failure(f"{report.robot} may still be moving: {report.why}")
+
+
+def _stop_all(endpoint: str, namespace: str, security: Path | None, *, json: bool) -> None:
+    from tvist_client.fleet import Fleet, StopReport
+
+    async def run() -> list[StopReport]:
+        async with Fleet(endpoint, security=security, namespace=namespace) as fleet:
+            return await fleet.stop(list(fleet.places))
+
+    with told():
+        try:
+            reports = asyncio.run(run())
+        except KeyboardInterrupt:
+            raise interrupted("robots that had not answered may still be moving") from None
+    if not reports:
+        raise Failure("there are no robots, so none was stopped")
+    if json:
+        print_json({"robots": reports})
+    for report in reports if not json else ():
+        where = f"{report.namespace}/{report.name}" if report.namespace else report.name
+        out.print(f"{where}: {report.said}", soft_wrap=True, markup=False)
+    failed = [report for report in reports if not report.ok]
+    if failed:
+        raise Failure(f"{len(failed)} of {len(reports)} robots may still be moving: {failed[0].name} first")
 
 
 def _said(stopped: list[str] | None) -> str:

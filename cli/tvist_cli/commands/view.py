@@ -1,18 +1,17 @@
 """`tvist view`: a page with a robot in three dimensions, its plots and its controls."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, progress
+from tvist_cli.output import err
 from tvist_cli.pages import Door, serve_page
 from tvist_cli.tracks import MAGNIFY, Shows, compared, recorded, repeated
 
 LONGEST_S = 120.0
-"""Longest recording that is written as film or HTML [s]."""
-FILMS = (".webp", ".gif")
+"""Longest recording that is written as HTML [s]."""
 
 
 def view(
@@ -25,8 +24,6 @@ def view(
     compare: Annotated[tuple[str, ...] | None, Parameter(consume_multiple=True)] = None,
     robot: str = "ur5e",
     magnify: float = MAGNIFY,
-    film: Path | None = None,
-    theme: Literal["light", "dark"] = "light",
     html: Path | None = None,
     address: str = "127.0.0.1",
     port: int = 8080,
@@ -46,9 +43,6 @@ def view(
         compare: Two or three shapers to simulate and to show beside each other: --compare none auto.
         robot: Name of the robot to simulate with --compare, or path of a robot file.
         magnify: Factor by which bending is drawn larger at first, 1 to 300.
-        film: WebP or GIF file to write the comparison or the recording to, for slides and documents, instead of
-            showing a page; Chromium draws it.
-        theme: Whether a film is light or dark.
         html: HTML file to write the comparison or the recording to, instead of showing a page; it needs no server.
         address: Address on which the page is served.
         port: Port on which the page is served; 0 takes a free one.
@@ -56,28 +50,23 @@ def view(
     """
     if not 1.0 <= magnify <= 300.0:
         raise Failure(f"magnify is {magnify:g}: must be 1 to 300", code=2)
-    if film is not None and film.suffix.lower() not in FILMS:
-        raise Failure(f"film is {film}: must end in {' or '.join(FILMS)}", code=2)
     door = Door(address, port, insecure)
     shows = _recorded_or_simulated(what, compare, robot, both=beside)
     if shows is None:
-        if film is not None or html is not None:
-            raise Failure("--film and --html need a recording or --compare", code=2)
+        if html is not None:
+            raise Failure("--html needs a recording or --compare", code=2)
         _live(what, name, security, namespace, magnify, door)
         return
-    if (film or html) and shows.lasts > LONGEST_S:
-        raise Failure(
-            f"the recording lasts {shows.lasts:.0f} s: --film and --html take at most {LONGEST_S:.0f} s",
-            code=2,
-        )
-    if film is not None:
-        _write_film(shows, magnify, film, theme)
-    if html is not None:
-        with told(OSError):
-            html.write_text(shows.page(magnify), encoding="utf-8")
-        err.print(f"wrote {html}")
-    if film is None and html is None:
+    if html is None:
         shows.serve(magnify, door)
+        return
+    if shows.lasts > LONGEST_S:
+        raise Failure(
+            f"the recording lasts {shows.lasts:.0f} s: --html takes at most {LONGEST_S:.0f} s", code=2
+        )
+    with told(OSError):
+        html.write_text(shows.page(magnify), encoding="utf-8")
+    err.print(f"wrote {html}")
 
 
 def _recorded_or_simulated(
@@ -104,12 +93,3 @@ def _live(endpoint: str, name: str, security: Path | None, namespace: str, facto
 
     live = LivePage(Place(endpoint, security, namespace), name, judge, factor=factor)
     serve_page(live.page, live.meet, door, live.run, live.meshes.content)
-
-
-def _write_film(shows: Shows, factor: float, file: Path, theme: Literal["light", "dark"]) -> None:
-    from tvist_view.film import Film, FilmError, Format
-
-    film = Film(shows.tracks, factor, shows.result, Format(theme=theme))
-    with told(OSError, FilmError), progress(len(film.times()), "pictures") as advance:
-        film.write(file, lambda: advance(1, None))
-    err.print(f"wrote {file}")

@@ -16,6 +16,7 @@ from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import out, print_json, waiting
 
 if TYPE_CHECKING:
+    from tvist_client.fleet import Place
     from tvist_client.many_states import ManyStates
     from tvist_client.robot import Robot
     from tvist_protocol.stream import Event, State, Telemetry
@@ -27,7 +28,7 @@ STALE_S = 1.0
 
 def watch(
     *where: str,
-    name: str = "ur5e",
+    name: str | None = None,
     security: Path | None = None,
     namespace: str = "",
     seconds: float | None = None,
@@ -37,17 +38,19 @@ def watch(
 
     If the robot is not ready to move, the second line says why, even if it stopped before the command started.
 
-    Given a key with wildcards such as `tvist/*/state`, show the newest states of all robots that it selects, one line
-    each.
+    Without a name, and if there are several robots, show them all in a table, each with its modes, who has control, its
+    rate and its load. Given a key with wildcards such as `tvist/*/state`, show the newest states of all robots that it
+    selects, one line each.
 
     Args:
         where: Zenoh endpoint of the robot or router [tcp/127.0.0.1:7447], and a key of states if it is about many
             robots.
-        name: Name of the robot.
-        namespace: Namespace of the robot, if it is served in one.
+        name: Name of the robot [the only one; if there are several, all of them].
+        namespace: Namespace of the robot, if it is served in one; without a name, that of all robots to show.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         seconds: Stop after this many seconds.
-        json: Print each event, and the state ten times a second, as one JSON object per line.
+        json: Print each event, and the state ten times a second, as one JSON object per line; of several robots, one
+            object a second.
     """
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
@@ -58,11 +61,20 @@ def watch(
     if selector is not None:
         _watch_many(selector, endpoint, namespace, security, seconds, json=json)
         return
-    command = unlock_command(endpoint, name, security, namespace)
+    if name is None:
+        place = _only_robot(endpoint, namespace, security)
+        if place is None:
+            from tvist_cli.fleet_table import watch_fleet
 
-    async def run() -> None:
+            showing = watch_fleet(endpoint, namespace, security, json=json)
+            _watch_for(seconds, showing, "the robots keep running")
+            return
+        name, namespace = place.robot, place.namespace
+    command, within = unlock_command(endpoint, name, security, namespace), namespace
+
+    async def run(name: str = name) -> None:
         with waiting(f"waiting for {name} at {endpoint}"):
-            found = await Robot.connect(endpoint, name, security=security, namespace=namespace)
+            found = await Robot.connect(endpoint, name, security=security, namespace=within)
         async with found as robot:
             events: list[Event] = []
             told: list[Telemetry] = []
@@ -89,6 +101,22 @@ def _places(where: tuple[str, ...], default: str) -> tuple[str | None, str]:
     if len(selectors) > 1 or len(endpoints) > 1:
         raise Failure("watch takes one endpoint and one key of states: leave the others out", code=2)
     return selectors[0] if selectors else None, endpoints[0] if endpoints else default
+
+
+def _only_robot(endpoint: str, namespace: str, security: Path | None) -> "Place | None":
+    """Return the only robot in a namespace or below it; None if there are several, or none."""
+    from tvist_client.fleet import Fleet
+
+    async def look() -> "Place | None":
+        async with Fleet(endpoint, security=security, namespace=namespace) as fleet:
+            places = list(fleet.places)
+            return places[0] if len(places) == 1 else None
+
+    with told():
+        try:
+            return asyncio.run(look())
+        except KeyboardInterrupt:
+            raise interrupted("no robot was watched") from None
 
 
 class _Standing:

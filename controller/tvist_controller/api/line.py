@@ -19,9 +19,6 @@ from tvist_controller.line.limits import REBOUND, TORQUE_SHARE, acceleration_on_
 from tvist_controller.line.whole_motion import Driven, DrivenLine, respond
 from tvist_controller.planning.choices import choose_filter, wanted_modes
 from tvist_controller.planning.keeping import keeping_motion
-from tvist_controller.quiet.elastic_arm import ElasticArm
-from tvist_controller.quiet.interior_point import Programme, inside, optimize
-from tvist_controller.quiet.quiet_motion import quiet_motion
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.sources.elastic_source import elastic_feed_forward
 from tvist_controller.sources.mode_source import ModeSource
@@ -37,7 +34,6 @@ __all__ = [
     "ControlCycle",
     "Driven",
     "DrivenLine",
-    "ElasticArm",
     "ElasticFeedForward",
     "InverseDynamics",
     "JointLine",
@@ -45,7 +41,6 @@ __all__ = [
     "MotionLimits",
     "OwnShaper",
     "PlannedMotion",
-    "Programme",
     "RecordedShaper",
     "RefusalError",
     "Setup",
@@ -59,15 +54,12 @@ __all__ = [
     "drivetrain",
     "elastic_feed_forward",
     "estimator_of",
-    "inside",
     "keeping_motion",
     "load_calibration",
     "mass_matrix",
     "modal_estimator",
-    "optimize",
     "paper_payload",
     "quickest_motion",
-    "quiet_motion",
     "respond",
     "resting_after",
     "wanted_modes",

@@ -6,14 +6,9 @@ The modules behind it may change.
 from tvist_controller.about import info_of
 from tvist_controller.authority.presence import Presence
 from tvist_controller.controller import Controller
-from tvist_controller.experience.experience import Experience
 from tvist_controller.experience.lesson import Student
-from tvist_controller.experience.motion_record import AFTER, Beliefs, MotionRecord
-from tvist_controller.experience.motion_student import MotionStudent, added
 from tvist_controller.experience.own_students import experience_of
-from tvist_controller.experience.twin import Twin
 from tvist_controller.host import Host
-from tvist_controller.line.correction import Repetition, heights
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.programs.socket_traffic import SocketNews
@@ -22,27 +17,18 @@ from tvist_controller.reporting.sink import Sink
 from tvist_controller.sources.own_plants import WORLD, OwnPlant, RecordedPlant, load_plant
 
 __all__ = [
-    "AFTER",
     "WORLD",
-    "Beliefs",
     "Controller",
-    "Experience",
     "Host",
     "LoopbackHost",
-    "MotionRecord",
-    "MotionStudent",
     "OwnPlant",
     "Presence",
     "RecordedPlant",
-    "Repetition",
     "ScriptCompiler",
     "Sink",
     "SocketNews",
     "Student",
-    "Twin",
-    "added",
     "experience_of",
-    "heights",
     "info_of",
     "load_plant",
     "truth_of",

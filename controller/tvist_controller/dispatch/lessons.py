@@ -15,7 +15,7 @@ from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import Plan, Planning
 from tvist_controller.safety.declared_payload import DeclaredPayload
 from tvist_protocol.commands import Forget
-from tvist_protocol.lessons import Lesson, MotionLesson
+from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.modes import RobotMode
 
 
@@ -37,13 +37,11 @@ class Lessons:
         filters: Filters,
         payload: DeclaredPayload,
         peripherals: Peripherals,
-        plan: Callable[[Lesson, FilterBasis], Plan],
+        plan: Callable[[PayloadLesson, FilterBasis], Plan],
         emit: Emit,
     ) -> None:
         self._motion, self._filters, self._payload = motion, filters, payload
         self._peripherals, self._plan, self._emit = peripherals, plan, emit
-        self._corrections = motion.cycle.corrections
-        self._digested: tuple[Beliefs | None, bytes] = None, b""
 
     @property
     def held(self) -> bool:
@@ -52,24 +50,15 @@ class Lessons:
 
     def beliefs(self) -> Beliefs:
         """Return what the robot takes its arm for."""
-        basis = self._filters.basis
-        source = basis.source
-        modes = (basis.modes, source.name, *source.f_d, *source.zeta)
-        return Beliefs(self._payload.assumed, source.calibration, basis.name, modes, basis)
+        return Beliefs(self._payload.assumed, self._filters.basis)
 
-    def learn(self, lesson: Lesson, plan: Plan | None = None) -> None:
+    def learn(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
         """Take a lesson at rest, which changes how the robot moves from now on.
 
         Args:
             lesson: The lesson.
             plan: Plan for it, if it was made beforehand; it is used if it still holds.
         """
-        if isinstance(lesson, MotionLesson):
-            self.know_motions()
-            self._corrections.learn(lesson)
-            if lesson.why:
-                self._emit("learnt", why=lesson.why)
-            return
         on = self._filters.basis
         if plan is None or plan.basis != on:
             plan = self._plan(lesson, on)
@@ -80,23 +69,8 @@ class Lessons:
         self._payload.learn(lesson.payload, found, lesson.why, beyond=lesson.beyond)
         self._peripherals.changed = True
 
-    def know_motions(self) -> None:
-        """Tell motions from one another from now on, so that they can be learnt."""
-        self._corrections.beliefs = self._believed
-
-    def _believed(self) -> bytes:
-        """Digest of what the robot takes its arm for, which takes long and seldom changes."""
-        beliefs = self.beliefs()
-        if beliefs != self._digested[0]:
-            self._digested = beliefs, beliefs.digest
-        return self._digested[1]
-
     def _forget(self, call: Call[Forget]) -> None:
-        """Assume what was declared again, or correct no motion."""
-        if call.command.what == "motions":
-            if self._corrections.forget():
-                self._emit("learnt", why="no motion is corrected any more")
-            return
+        """Assume what was declared again."""
         if self._payload.assumed != self._payload.payload:
             self._payload.forget(call.planned())
 

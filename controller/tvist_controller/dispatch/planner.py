@@ -11,10 +11,9 @@ from tvist_controller.planning.path_planner import PathPlanner
 from tvist_controller.planning.plan import Basis, Plan
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.programs.compiling import ScriptCompiler
-from tvist_controller.quiet.interior_point import rehearse
 from tvist_controller.setup import Setup
 from tvist_protocol.commands import Command
-from tvist_protocol.lessons import Lesson, MotionLesson
+from tvist_protocol.lessons import PayloadLesson
 
 
 class Planner:
@@ -45,17 +44,14 @@ class Planner:
 
     def rehearse_plans(self) -> None:
         """Compile what is not inverse kinematics."""
-        rehearse()
         self._paths.rehearse()
 
     def rehearse_scripts(self) -> None:
         """Make what compiling a program needs; that is Python alone, and may be done while a robot ticks."""
         self._scripts.rehearse()
 
-    def for_lesson(self, lesson: Lesson, basis: FilterBasis) -> Plan:
-        """Plan what the robot has learnt: the present filter for what it carries; for a motion, nothing."""
-        if isinstance(lesson, MotionLesson):
-            return Plan(basis, None)
+    def for_lesson(self, lesson: PayloadLesson, basis: FilterBasis) -> Plan:
+        """Plan what the robot has learnt: the present filter for what it carries."""
         try:
             return Plan(basis, self.filters.with_payload(lesson.payload, basis))
         except RefusalError as refusal:

@@ -1,15 +1,13 @@
 """Records the motions of a robot, has them studied, and keeps the lessons until the arm rests."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 from tvist_controller.experience.lesson import Later, Student, Work
 from tvist_controller.experience.motion_record import Beliefs, MotionRecorder
-from tvist_controller.line.correction import Repetition
 from tvist_controller.line.sample import Sample
 from tvist_plant.user_file import named
-from tvist_protocol.lessons import Lesson
+from tvist_protocol.lessons import PayloadLesson
 
 
 def at_once(work: Work) -> Callable[[], bool]:
@@ -27,13 +25,13 @@ class Taught(NamedTuple):
 
     beliefs: Beliefs
     """What the controller took the arm for during the motion."""
-    lesson: Lesson
+    lesson: PayloadLesson
     """What was learnt."""
     plan: Any
     """Plan for it; None if there is none yet."""
 
 
-Planned = Callable[[Lesson, Beliefs], Any]
+Planned = Callable[[PayloadLesson, Beliefs], Any]
 """Plans what a lesson changes."""
 
 
@@ -60,7 +58,6 @@ class Experience:
         self,
         sample: Sample,
         beliefs: Callable[[], Beliefs],
-        repetition: Repetition | None = None,
         *,
         held: bool,
         placements: int,
@@ -70,25 +67,20 @@ class Experience:
         Args:
             sample: Its signals.
             beliefs: Returns what the controller takes the arm for.
-            repetition: The motion in progress, as far as it can be made again.
             held: Whether the drives hold the arm.
             placements: Number of times that the arm was put somewhere, see `ControlCycle`.
         """
         recorder = self._recorder
         if placements != self._placements:
             self._placements = placements
-            recorder.begin_anew()
+            recorder.forget()
         if not held:
             recorder.forget()
             return
         known = beliefs() if recorder.begins and not sample.mode.at_rest else None
-        motion = recorder.take(sample, known, repetition)
+        motion = recorder.take(sample, known)
         if motion is None or len(self._under_way) >= WAITING:
             return
-        if (
-            motion.repetition is not None and motion.beliefs != beliefs()
-        ):  # it was made otherwise than it began
-            motion = replace(motion, repetition=None)
         for student in self._students:
             learnt: list[Taught] = []
 

@@ -16,7 +16,7 @@ from tvist_controller.instruments.joint_lists import (
     as_rows,
     joint_lists,
 )
-from tvist_controller.quiet.elimination import eliminate
+from tvist_controller.kinematics.elimination import eliminate
 from tvist_plant.chain import bend, chain_of, start, step_along, twist
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, Floats, rigid_model

@@ -5,7 +5,6 @@ from typing import TypeVar
 import numpy as np
 
 from tvist_controller.line.boxes import Boxes
-from tvist_controller.line.correction import Corrections
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.guard import Guard, Obstacle
@@ -65,8 +64,6 @@ class ControlCycle:
         """Trajectory generator."""
         self.mode = LineMode.REST
         """What the line does."""
-        self.corrections = Corrections(description)
-        """Corrections of motions that are made again."""
         self.placements = 0
         """Number of times that the arm was put at rest somewhere, which breaks off what it did."""
         self.guard: Guard | None = None
@@ -88,18 +85,10 @@ class ControlCycle:
             signals, line.dynamics.payload_parameters,
             may_begin=mode.shaped and not line.filter.fading, may_go_on=mode is not LineMode.BYPASSED,
         )  # fmt: skip
-        motors, corrections = line.drives.reference, self.corrections
-        if not corrections.idle:  # what was learnt of this motion is added last, behind the lead
-            plain = command
-            command = corrections.add(
-                plain, self.trajectory, shaped=mode is LineMode.SHAPED, rests=mode.at_rest
-            )
-            if motors is not None and command is not plain:
-                motors = motors.corrected(command, corrections.acceleration)
         measured = line.plant.step(command)
         self.sample = Sample(
-            mode, reference, line.shaped.references, line.shaped.joints.window, signals, command, measured, motors,
-            refused,
+            mode, reference, line.shaped.references, line.shaped.joints.window, signals, command, measured,
+            line.drives.reference, refused,
         )  # fmt: skip
         self._settle()  # last, so that the tick that comes to rest is still reported as one of the motion
         return self.sample
@@ -162,9 +151,6 @@ class ControlCycle:
             line.enter(path.start, path.posture_of)
         if mode.shaped and trajectory.limits is not None:
             line.filter.limits = trajectory.limits
-        if self.mode.at_rest:
-            known = mode is LineMode.SHAPED and not (line.filter.fading or line.dynamics.changing)
-            self.corrections.begin(trajectory if known else None)
         self.trajectory, self.mode, self.guard = trajectory, mode, guard
         return trajectory
 
@@ -230,7 +216,6 @@ class ControlCycle:
             measured = measured_standing(plant, len(q))
             q = measured.q.copy()
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
-        self.corrections.drop()
         self.placements += 1
         signals = line.rest_at(q)
         command = line.drives.command(signals, line.dynamics.payload_parameters)

@@ -1,7 +1,5 @@
 """Choice between the two kinds of feed-forward for the drives, and the transition from one to the other."""
 
-from typing import Self
-
 import numpy as np
 from msgspec import Struct
 
@@ -23,17 +21,6 @@ class MotorReference(Struct, frozen=True, eq=False, gc=False):
     """Velocity q̇* + ẇ [rad/s], acceleration q̈* + ẅ [rad/s^2] and torque [N m], shape (3, n)."""
     limited: bool
     """Whether ẅ was limited to the torque that the drives have left."""
-
-    def corrected(self, command: DriveCommand, acceleration: Floats) -> Self:
-        """Return the motion with a correction.
-
-        Args:
-            command: The corrected command.
-            acceleration: Acceleration of the correction, of the first joints [rad/s^2].
-        """
-        rows = np.array([command.qd, self.rows[1], command.torque])
-        rows[1, : len(acceleration)] += acceleration
-        return type(self)(rows, self.limited)
 
 
 class DriveFeedForward:

@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.kinematics.elimination import eliminate
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.quiet.elimination import eliminate
 from tvist_plant.chain import torques
 
 Integers = npt.NDArray[np.int64]

@@ -89,7 +89,7 @@ class RunningMove:
 
     def _begin(self) -> None:
         self._cycle.begin(self._trajectory)
-        self._cycle.line.filter.tvist.aim(self._trajectory.path.end, quiet=self._trajectory.quiet)
+        self._cycle.line.filter.tvist.aim(self._trajectory.path.end)
 
     def _rate(self, speed: float, slowest: float | None) -> float:
         """Rate of its time [-]: lower if it was planned for a shaper that is less slow, peaked or uneven."""

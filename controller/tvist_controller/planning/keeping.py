@@ -71,7 +71,7 @@ def shaped_ahead(motion: PlannedMotion, tvist: Filter) -> Floats | None:
     shaped.enter(path.posture_of, path.start)
     line_filter = LineFilter(mine, motion.limits)
     line_filter.begin(mine, path.start, path.posture_of)
-    mine.aim(path.end, quiet=motion.quiet)
+    mine.aim(path.end)
     ahead = Ahead(motion.paced_at(1.0), line_filter, shaped)
     ahead.until(MAX_AHEAD)
     return np.array(ahead.references) if ahead.rests else None

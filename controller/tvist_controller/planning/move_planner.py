@@ -9,13 +9,11 @@ from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.planning.asked_speed import LATE, REACHED
-from tvist_controller.planning.basis import FilterBasis, MotionBasis
+from tvist_controller.planning.basis import MotionBasis
 from tvist_controller.planning.course import Course
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitted, Fitter, Slower
 from tvist_controller.planning.keeping import keeping_motion
-from tvist_controller.quiet.elastic_arm import ElasticArm
-from tvist_controller.quiet.quiet_motion import quiet_motion
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import (
     JointLine,
@@ -29,7 +27,6 @@ from tvist_controller.trajectory import (
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
 from tvist_protocol.replies import Code
-from tvist_shaping.named import PLANNED
 
 AGILE = MotionLimits(1.5, 2.0, 100.0)
 """Limits of pauses and changes of the speed for motions that are slower by themselves: those of `move_j` by default."""
@@ -86,16 +83,15 @@ class MovePlanner:
         return self._move(command, basis, at_once=False)
 
     def move_within_tick(self, command: MoveJ, basis: MotionBasis) -> PlannedMove:
-        """Plan a motion as `move` does, but within a tick, which is too short for a quiet motion."""
+        """Plan a motion as `move` does, but within a tick, which is too short to shape the motion ahead."""
         return self._move(command, basis, at_once=True)
 
     def _move(self, command: MoveJ, basis: MotionBasis, *, at_once: bool) -> PlannedMove:
         path = JointLine(basis.q, np.array(command.q, dtype=float))
         limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
         if command.duration is None:
-            arm = None if at_once else self._arm(basis.filter)
-            planned = self.along(path, limits, basis, arm=arm, at_once=at_once)
-            slower = None if arm is not None or basis.excess > 0.0 else _jerked(planned.parts[0], limits)
+            planned = self.along(path, limits, basis, at_once=at_once)
+            slower = None if basis.excess > 0.0 else _jerked(planned.parts[0], limits)
         else:
             limits = self._lasting(path, command.duration, basis)
             agility = at_least(limits, AGILE.acceleration, AGILE.jerk)
@@ -122,7 +118,6 @@ class MovePlanner:
         limits: MotionLimits,
         basis: MotionBasis,
         agility: MotionLimits | None = None,
-        arm: ElasticArm | None = None,
         *,
         at_once: bool = False,
     ) -> PlannedMove:
@@ -133,8 +128,6 @@ class MovePlanner:
             limits: Limits for every joint.
             basis: State that the motion depends on.
             agility: Limits of pauses and changes of the speed; None for those of the motion.
-            arm: Model of the arm, which a motion along a straight line in joint space is to leave without vibration;
-                None for the quickest motion.
             at_once: Whether the plan must be made within a tick, which is too short to shape the motion ahead.
 
         Raises:
@@ -149,8 +142,6 @@ class MovePlanner:
                 acceleration=limits.acceleration * slower.acceleration,
             )
             spared = replace(kept, acceleration=kept.acceleration * (1.0 - basis.excess))
-            if arm is not None and isinstance(path, JointLine):
-                return quiet_motion(path, spared, arm, PERIOD, rate, agility)
             if isinstance(path, JointLine) and basis.excess > 0.0 and not at_once:
                 return keeping_motion(path, kept, self._filters.present(basis.filter), rate, agility)
             return quickest_motion(path, spared, PERIOD, rate, agility)
@@ -175,13 +166,6 @@ class MovePlanner:
             room=(arms.velocity / velocity, arms.acceleration / (limits.acceleration * slower.acceleration)),
             surplus=basis.surplus,
         )
-
-    def _arm(self, basis: FilterBasis) -> ElasticArm | None:
-        """Model of the arm if the filter wants quiet motions; None if it does not, or if there is no model."""
-        calibration = basis.source.calibration
-        if basis.name != PLANNED or calibration is None or calibration.modal is None:
-            return None
-        return ElasticArm(self._description, calibration, basis.declared)
 
     def meeting(self, way: Way, basis: MotionBasis) -> tuple[float, Meeting] | None:
         """Return the share of a way after which two bodies would meet, and which; None if it is clear."""

@@ -55,7 +55,6 @@ class PlannedMotion(Trajectory):
         period: Tick [s].
         speed: Initial rate of its time relative to the clock's [-].
         agility: Limits of a change of the rate, at least those of the law, which may be slow; None for the same.
-        quiet: Whether the law leaves no vibration without a filter, if its time passes at the initial rate.
     """
 
     path: Path
@@ -68,11 +67,7 @@ class PlannedMotion(Trajectory):
         period: float,
         speed: float = 1.0,
         agility: MotionLimits | None = None,
-        *,
-        quiet: bool = False,
     ) -> None:
-        self.quiet = quiet
-        """Whether the law leaves no vibration without a filter."""
         self.path, self._period = path, period
         self.law = law
         """Its time law."""

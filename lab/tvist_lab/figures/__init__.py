@@ -11,7 +11,6 @@ from tvist_lab.figures.move_plan import move_plan_figure
 from tvist_lab.figures.one_joint import figure_2
 from tvist_lab.figures.paper_metrics import figure_15, figure_16
 from tvist_lab.figures.pareto import pareto_figure, settling_figure
-from tvist_lab.figures.path_shaping import corner_figure, path_shaping_figure
 from tvist_lab.figures.recorded import Recorded, motion_figure, observed_figure
 from tvist_lab.figures.ring_down import ring_down_figure
 from tvist_lab.figures.studies import residual_by_move_figure, robustness_figure, study_figure, sweep_figure
@@ -31,7 +30,6 @@ __all__ = [
     "after_stop_figure",
     "catalogue_figure",
     "compared_figure",
-    "corner_figure",
     "elastic_figure",
     "figure_1",
     "figure_2",
@@ -47,7 +45,6 @@ __all__ = [
     "move_plan_figure",
     "observed_figure",
     "pareto_figure",
-    "path_shaping_figure",
     "residual_by_move_figure",
     "ring_down_figure",
     "robustness_figure",

@@ -20,21 +20,22 @@ from tvist_lab.figures.style import (
     legend,
     note,
     panels,
-    remark,
     title,
+    width,
 )
+from tvist_lab.identification.workspace_map import WorkspaceMap
 from tvist_lab.recordings import Floats
-from tvist_lab.studies.workspace_map import WorkspaceMap
 from tvist_protocol.calibration import Calibration
 
 LABELS = {
     "f_d_hz": ("$f_d$", "damped frequency of the lowest mode", "Hz"),
     "zeta": (r"$\zeta$", "damping ratio of the lowest mode", "–"),
-    "delay_ms": (r"$\Delta$", "delay of the shaper", "ms"),
 }
 """Key of a map to its symbol, its meaning and its unit."""
 SMALL = 7.0
 """Size of labels within a map [pt]."""
+NARROW = 5.0
+"""Width up to which maps are one below the other [inch]."""
 LEVELS = 9
 """Largest number of levels of a map."""
 
@@ -75,23 +76,21 @@ def identified_figure(
     return figure
 
 
-def workspace_map_figure(found: WorkspaceMap, key: str, words: str, columns: int = 2) -> Figure:
+def workspace_map_figure(found: WorkspaceMap, key: str, words: str) -> Figure:
     """Draw one quantity as identified, as it truly is, and the error.
 
-    The three maps are side by side over two columns of a journal, and one below the other over one. White areas are
-    left out, because the arm would touch itself or the floor there.
+    The three maps are side by side, and in a figure that is to be narrow one below the other. White areas are left out,
+    because the arm would touch itself or the floor there.
 
     Args:
         found: The maps.
-        key: "f_d_hz", "zeta" or "delay_ms".
+        key: "f_d_hz" or "zeta".
         words: What they are of, for the heading.
-        columns: Columns of the journal.
     """
     symbol, meaning, unit = LABELS[key]
+    beside = width() > NARROW
     figure, axes = (
-        panels(1, 3.0, columns=3, share_x=False, share_y=True)
-        if columns == 2
-        else panels(3, 8.4, share_x=True)
+        panels(1, 3.0, columns=3, share_x=False, share_y=True) if beside else panels(3, 8.4, share_x=True)
     )
     both = np.array([found.identified[key], found.true[key]])
     levels = _levels(float(np.nanmin(both)), float(np.nanmax(both)))
@@ -105,9 +104,9 @@ def workspace_map_figure(found: WorkspaceMap, key: str, words: str, columns: int
     title(axes[2], "Size of the error")
     color_bar(figure, drawn, axes[2:], "Error (%)", **bar)
     rows, across = (name.replace("_", " ").capitalize() for name in found.names)
-    for panel in axes if columns == 2 else axes[-1:]:
+    for panel in axes if beside else axes[-1:]:
         panel.set_xlabel(f"{across} (°)")
-    for panel in axes if columns == 1 else axes[:1]:
+    for panel in axes[:1] if beside else axes:
         panel.set_ylabel(f"{rows} (°)")
     explain(figure, {symbol: f"{meaning}; {words}"})
     return figure
@@ -136,8 +135,6 @@ def _map(
         note(panel, ", ".join(names), (x, y), (5, 4), fontsize=SMALL)
     for axis in (panel.xaxis, panel.yaxis):
         axis.set_major_locator(MultipleLocator(60.0))
-    if np.isnan(values).all():
-        remark(panel, "no free configuration", (0.5, 0.5), ha="center")
     return drawn
 
 

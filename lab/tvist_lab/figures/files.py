@@ -1,4 +1,4 @@
-"""Files of figures: their format, their resolution, and their width in columns of a journal."""
+"""Files of figures: their format, their resolution, and their width."""
 
 import re
 import textwrap
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
@@ -16,16 +17,16 @@ from matplotlib.text import Text
 
 from tvist_lab.figures.own_style import own
 from tvist_lab.figures.print_style import for_print, is_below
-from tvist_lab.figures.style import COLUMN_MM, DPI
+from tvist_lab.figures.style import COLUMN, DPI, WIDTH, width
 
 FORMATS = ("png", "pdf", "svg")
 """Formats of figures: one bitmap, two of lines."""
-SMALLER = {1: 0.8, 2: 1.0}
-"""Size of text and lines over one and over two columns, as a share of that over two [-]."""
+SMALLER = 0.8
+"""Size of text and lines over one column, as a share of that over two [-]."""
 LARGER = 1.4
 """Size of text and lines on slides, as a share of the usual one [-]."""
-LOWER = {1: 0.84, 2: 1.0}
-"""Height over one and over two columns, as a share of that over two [-]."""
+LOWER = 0.84
+"""Height over one column, as a share of that over two [-]."""
 STABLE = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 """Metadata without the date and the program's version, so that equal figures give equal files."""
 FONTS: Any = {"pdf.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "tvist"}
@@ -41,10 +42,6 @@ class FigureFiles:
     folder: Path
     format: str = "png"
     """One of `FORMATS`."""
-    dpi: int = DPI
-    """Resolution of PNG, and of bitmaps within PDF and SVG [dots per inch]."""
-    columns: int = 2
-    """Width in columns of a journal: 1 for 89 mm, 2 for 183 mm."""
     style: str = ""
     """One of `STYLES`, or empty for the usual one."""
 
@@ -55,20 +52,18 @@ class FigureFiles:
             figure: The figure.
             name: Name of the file without its suffix.
         """
-        path = self.folder / f"{name}.{self.format}"
-        return save(figure, path, dpi=self.dpi, columns=self.columns, style=self.style)
+        return save(figure, self.folder / f"{name}.{self.format}", style=self.style)
 
 
-def save(figure: Figure, path: str | Path, *, dpi: int = DPI, columns: int = 2, style: str = "") -> Path:
+def save(figure: Figure, path: str | Path, *, style: str = "") -> Path:
     """Write a figure; the suffix determines the format, and missing folders are created.
 
-    In the style `paper`, what its headings and explanations said is written beside it, as NAME.txt.
+    Width and resolution are those of a style file, if one is used. In the style `paper`, what its headings and
+    explanations said is written beside it, as NAME.txt.
 
     Args:
-        figure: The figure. It is resized to the columns, and its text with it.
+        figure: The figure. It is resized to that width, and its text with it.
         path: File to write.
-        dpi: Resolution of PNG, and of bitmaps within PDF and SVG [dots per inch].
-        columns: Width in columns of a journal: 1 for 89 mm, 2 for 183 mm.
         style: One of `STYLES`, or empty for the usual one.
 
     Returns:
@@ -84,23 +79,24 @@ def save(figure: Figure, path: str | Path, *, dpi: int = DPI, columns: int = 2, 
         figure.set_label(style)
         _scale(figure, LARGER)
         figure.set_size_inches(figure.get_figwidth(), LARGER**0.5 * figure.get_figheight())
-    fit(figure, columns)
+    fit(figure, width())
+    dpi = own().get("savefig.dpi", DPI)
     with mpl.rc_context(FONTS):
         figure.savefig(file, dpi=dpi, metadata=STABLE.get(file.suffix))
     return file
 
 
-def fit(figure: Figure, columns: int) -> None:
-    """Give a figure the width of one or two columns, with text that remains readable and within its panel.
+def fit(figure: Figure, wide: float) -> None:
+    """Give a figure a width [inch], with text that remains readable and within its panel.
 
     A figure that has this width already keeps its size.
     """
-    width, height = figure.get_size_inches()
-    now = min(COLUMN_MM, key=lambda count: abs(COLUMN_MM[count] / 25.4 - width))
-    if now != columns:
-        figure.set_size_inches(COLUMN_MM[columns] / 25.4, height * LOWER[columns] / LOWER[now])
+    now, height = figure.get_size_inches()
+    if abs(wide - now) > 1e-6:
+        lower, smaller = (np.interp(wide, (COLUMN, WIDTH), (share, 1.0)) for share in (LOWER, SMALLER))
+        figure.set_size_inches(wide, height * float(lower))
         if "font.size" not in own():  # else the reader's file says how large text is, whatever the width
-            _scale(figure, SMALLER[columns] / SMALLER[now])
+            _scale(figure, float(smaller))
     for box in list(figure.legends):
         _narrow(figure, box)
     # Words that are still too long must not push the panels aside.

@@ -6,16 +6,20 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.font_manager import FontProperties
 
 SUFFIX = ".mplstyle"
 """End of the name of a style file."""
 LEFT_OUT = (
-    "axes.prop_cycle", "backend", "figure.dpi", "figure.figsize", "interactive", "lines.color", "lines.linestyle",
-    "lines.marker", "lines.markersize", "savefig.bbox", "savefig.directory", "savefig.dpi", "savefig.format", "toolbar",
+    "axes.prop_cycle", "backend", "figure.dpi", "interactive", "lines.color", "lines.linestyle",
+    "lines.marker", "lines.markersize", "savefig.bbox", "savefig.directory", "savefig.format", "toolbar",
 )  # fmt: skip
-"""Settings that a figure here has from elsewhere: what a curve is determines its colour and dashes, and options the
-width, the resolution and the format."""
+"""Settings that a figure here has from elsewhere: what a curve is determines its colour and dashes, and an option the
+format."""
+
+RANGES = {"figure.figsize": (2.0, 40.0), "savefig.dpi": (30.0, 2400.0)}
+"""Least and largest width [inch] and resolution [dots per inch] that a file may set."""
 
 _OWN: dict[str, Any] = {}
 
@@ -39,6 +43,10 @@ def use(path: Path) -> tuple[str, ...]:
         StyleError: It cannot be read, or has a setting that matplotlib does not know, or a wrong value.
     """
     found = _read(path)
+    for name, (least, most) in RANGES.items():
+        value = found.get(name, "figure")
+        if value != "figure" and not least <= (number := float(np.ravel(value)[0])) <= most:
+            raise StyleError(f"style {path} sets {name} to {number:g}: must be {least:g} to {most:g}")
     if found.get("text.usetex") and shutil.which("latex") is None:
         raise StyleError(f"style {path} sets text.usetex, which needs LaTeX: there is no program latex")
     kept = {name: value for name, value in found.items() if name not in LEFT_OUT}

@@ -33,12 +33,12 @@ FAINT = "#8A8A8A"
 """Colour of limits and other auxiliary lines."""
 MUTED = "#5B6670"
 """Colour of less important text."""
-COLUMN_MM = {1: 89.0, 2: 183.0}
-"""Width of a figure over one or two columns of a journal [mm]."""
-WIDTH = COLUMN_MM[2] / 25.4
-"""Width of every figure as it is drawn [inch]."""
+WIDTH = 183.0 / 25.4
+"""Width of every figure as it is drawn, two columns of a journal [inch]."""
+COLUMN = 89.0 / 25.4
+"""Width of one column [inch]."""
 DPI = 150
-"""Resolution of bitmaps unless another one is asked for [dots per inch]."""
+"""Resolution of bitmaps unless a style file has another one [dots per inch]."""
 LIMIT = (0, (4, 3))
 """Dashes of limits and other auxiliary lines."""
 ALPHA = r"$|\alpha|$ (m/s²)"
@@ -102,6 +102,11 @@ SERIES = (
 """Styles of curves, in the order in which they are used."""
 OF_SHAPED, OF_UNSHAPED, OF_THIRD = SERIES[:3]
 """Styles of what is shaped, of what is not, and of a third one."""
+
+
+def width() -> float:
+    """Return the width of every figure as it is written [inch]: that of a style file, or two columns of a journal."""
+    return float(own().get("figure.figsize", (WIDTH,))[0])
 
 
 def rules() -> dict[str, Any]:

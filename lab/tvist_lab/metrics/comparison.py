@@ -38,7 +38,7 @@ class ComparedMotion:
         }
 
     def as_dict(self) -> dict[str, Any]:
-        """Convert to plain values, as `tvist log compare` prints them."""
+        """Convert to plain values, as `tvist log analyze A B` prints them."""
         return {
             "number": {"a": self.a, "b": self.b},
             "a": self.first.as_dict(),

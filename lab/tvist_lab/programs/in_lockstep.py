@@ -13,7 +13,6 @@ from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.programs import ProgramClosePopup
 from tvist_server.config import ConfigError
-from tvist_server.learnt_file import LearntFile
 from tvist_server.recording.recorder import Recorder
 
 ATTEND_EVERY = 50
@@ -26,7 +25,6 @@ def run_in_lockstep(
     inputs: Sequence[str],
     *,
     record: Path | None = None,
-    learn: Path | None = None,
     timeout: float | None = None,
     attend: Callable[[ProgramWatch], None],
     on_record_error: Callable[[str], None],
@@ -40,7 +38,6 @@ def run_in_lockstep(
         text: Text of the program.
         inputs: Inputs to set before, each as NAME=VALUE.
         record: MCAP file to record into.
-        learn: File with the motions that it learns; None if it learns none.
         timeout: Robot time after which the run ends although the program goes on [s].
         attend: Tells people about the run; called when the program has said something, and now and then.
         on_record_error: Called once, from another thread, with a sentence when the recording has stopped by itself.
@@ -54,7 +51,6 @@ def run_in_lockstep(
     try:
         controller = Controller(setup)
         check_unpaced(controller.cycle.line.plant)
-        learnt = None if learn is None else LearntFile(learn, controller.setup)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     waiting: list[Command] = []
@@ -67,7 +63,7 @@ def run_in_lockstep(
             start_of_it = controller.setup.to_builtins()
             recorder = Recorder(record, info_of(controller), start_of_it, wait=True, on_error=on_record_error)
             sinks.insert(0, ends.enter_context(recorder))
-        host = _host(controller, sinks, learnt)
+        host = Host(controller, *sinks, experience=experience_of(controller.setup))
         try:
             start(lambda command: host.request(encode(command)), text, inputs)
         except BaseException:
@@ -89,17 +85,3 @@ def run_in_lockstep(
 
 def _nothing() -> None:
     """Do nothing, since the loop checks after each tick whether the run is over."""
-
-
-def _host(controller: Controller, sinks: Sequence[Sink], learnt: LearntFile | None) -> Host:
-    """Return the host of a robot, which learns what its setup says, and its motions if there is a file for them."""
-    setup = controller.setup
-    if learnt is None:
-        return Host(controller, *sinks, experience=experience_of(setup))
-
-    def tell(why: str) -> None:
-        host.warn(why)
-
-    host = Host(controller, *sinks, experience=experience_of(setup, [learnt.student(tell)]))
-    learnt.recall(host)
-    return host

@@ -12,6 +12,7 @@ from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from tvist_lab.figures.files import fit
+from tvist_lab.figures.style import WIDTH
 
 DPI = 138
 """Resolution of pictures [dpi]; a figure's 183 mm are the 994 pixels to which the page grows."""
@@ -68,7 +69,7 @@ class Page:
 
 def picture(figure: Figure, caption: str) -> Picture:
     """Put a figure into the page as PNG."""
-    fit(figure, 2)
+    fit(figure, WIDTH)
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=DPI, metadata={"Software": None})
     return Picture("data:image/png;base64," + base64.b64encode(stream.getvalue()).decode(), caption)

@@ -134,21 +134,6 @@ def _less(peak: float, before: float) -> float:
     return 100.0 * (1.0 - peak / before)
 
 
-def tables(hidden: Sequence[int] = ()) -> dict[str, list[Shown]]:
-    """Columns of the tables of a page, by their titles."""
-    return {
-        f"{_heading(kind)}: {share}": [
-            *FIRST, *(Shown(one, f"{kind}.{one}.reduction_percent.{share}", 1) for one in those),
-        ]
-        for kind, those in columns(hidden).items()
-        for share in ("median", "p5")
-    }  # fmt: skip
-
-
-def _heading(kind: str) -> str:
-    return "Plants by name" if kind == PLANT else f"Wrong {kind}"
-
-
 def on_terminal(hidden: Sequence[int] = ()) -> dict[str, list[Shown]]:
     """Columns of the tables of a terminal, by their titles, each with median and 5th percentile."""
 

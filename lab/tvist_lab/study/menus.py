@@ -8,9 +8,9 @@ from typing import Literal
 
 from tvist_shaping.named import BUILT_IN
 
-Menu = Literal["bench", "robustness", "baselines", "paths", "bound", "lesson"]
-"""Where a method is made unless others are named: ShaperBench; robustness; `evaluate`, beside the shaper; `paths`; the
-bound; and where the notebooks offer it.
+Menu = Literal["bench", "robustness", "baselines", "lesson"]
+"""Where a method is made unless others are named: ShaperBench; robustness; `evaluate`, beside the shaper;
+and where the notebooks offer it.
 """
 Kind = Literal[
     "filter", "for target", "for payload", "for workspace", "held", "longer", "as long as", "jerk of a period",
@@ -37,7 +37,7 @@ class Row:
     """Number of modes; more than one needs a modal calibration."""
 
 
-SHOWN: tuple[Menu, ...] = ("bench", "paths", "lesson")
+SHOWN: tuple[Menu, ...] = ("bench", "lesson")
 """Menus of a shaper without a row."""
 ROWS = (
     Row("equal_duration_double_s", "longer double S", ("baselines",), "longer"),
@@ -58,20 +58,19 @@ ROWS = (
     Row("fixed_mzv", "fixed MZV", ("baselines", "bench"), "for workspace", "mzv"),
     Row("fixed_ei2", "fixed EI2", ("baselines", "bench"), "for workspace", "ei2"),
     Row("fixed_ei3", "fixed EI3", ("baselines", "bench"), "for workspace", "ei3"),
-    Row("zv", "TVIST-ZV, lowest mode", ("bench", "robustness", "paths", "bound", "lesson")),
+    Row("zv", "TVIST-ZV, lowest mode", ("bench", "robustness", "lesson")),
     Row("zv_3_modes", "TVIST-ZV, three modes", ("bench",), of="zv", modes=3),
-    Row("mzv", "TVIST-MZV, lowest mode", ("paths", "lesson")),
-    Row("zvd", "TVIST-ZVD, lowest mode", ("bench", "paths", "lesson")),
-    Row("ei", "TVIST-EI, lowest mode", ("bench", "paths", "lesson")),
+    Row("mzv", "TVIST-MZV, lowest mode", ("lesson",)),
+    Row("zvd", "TVIST-ZVD, lowest mode", ("bench", "lesson")),
+    Row("ei", "TVIST-EI, lowest mode", ("bench", "lesson")),
     Row("ei2", "TVIST-EI2, lowest mode", ("lesson",)),
     Row("ei3", "TVIST-EI3, lowest mode", ("lesson",)),
-    Row("auto", "constant mean delay, auto", ("bench", "robustness", "paths", "bound")),
-    Row("auto-target", "ZV of three modes for the end of each move", ("bench", "robustness", "paths", "bound")),
-    Row("short", "constant mean delay, short", ("bench", "paths")),
-    Row("planned", "planned to leave no vibration", ("bench", "robustness", "bound")),
+    Row("auto", "constant mean delay, auto", ("bench", "robustness")),
+    Row("auto-target", "ZV of three modes for the end of each move", ("bench", "robustness")),
+    Row("short", "constant mean delay, short", ("bench",)),
     Row("smoothing", "smoothing of elastic alone", ("bench", "robustness"), "shaped alone", "elastic"),
-    Row("elastic", "smoothing, elastic feed-forward", ("bench", "robustness", "bound")),
-    Row("elastic-16", "smoothing of 16 ms, elastic feed-forward", ("bench", "robustness", "bound")),
+    Row("elastic", "smoothing, elastic feed-forward", ("bench", "robustness")),
+    Row("elastic-16", "smoothing of 16 ms, elastic feed-forward", ("bench", "robustness")),
     Row("elastic-position", "smoothing, elastic feed-forward without torques", ("bench",)),
     Row("elastic-auto", "auto, smoothing, elastic feed-forward", ("bench", "robustness")),
     Row("product", "constant mean delay, product of three ZV", ("bench",), "held", modes=3),

@@ -17,7 +17,7 @@ from tvist_shaping.base import Filter
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter
-from tvist_shaping.named import AIMED, PLANNED
+from tvist_shaping.named import AIMED
 from tvist_shaping.steady import ProductDesign, SteadyFilter
 
 
@@ -109,13 +109,8 @@ class Named(Stepping):
 
     @property
     def told_target(self) -> bool:
-        """Whether the filter, or the motion that is planned instead of it, uses the target."""
-        return self.recipe.shaper in {AIMED, PLANNED}
-
-    @property
-    def shapes(self) -> bool:
-        """False for `planned`, which plans a move of its own instead of shaping a reference."""
-        return self.recipe.shaper != PLANNED
+        """Whether the filter uses the target."""
+        return self.recipe.shaper == AIMED
 
     def stepper(self, task: Task) -> Running:
         """Return the filter, reset and given the target."""
@@ -128,7 +123,7 @@ class Named(Stepping):
 
     def shaped(self, task: Task) -> Shaped:
         """Shape the reference, or a motion that is planned for the filter as a robot plans it."""
-        if task.stream or (self.shapes and not task.as_served):
+        if task.stream or not task.as_served:
             return super().shaped(task)
         tvist, own = own_move(self.recipe, task.description, task.move, task.limits)
         elastic = None if self.alone else self.recipe.elastic(task.description, tvist)

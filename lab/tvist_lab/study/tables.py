@@ -1,10 +1,8 @@
-"""Tables of figures: what to show of nested results, in which digits, for a terminal, a page or a web page alike."""
+"""Tables of figures: what to show of nested results, in which digits, for a terminal or a web page alike."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
-
-from tvist_lab.markdown_table import markdown_table
 
 Entry = Mapping[str, Any]
 
@@ -42,8 +40,3 @@ def titles(columns: Iterable[Shown]) -> tuple[str, ...]:
 def cells(entries: Iterable[Entry], columns: Sequence[Shown]) -> list[tuple[str, ...]]:
     """Return the cells of a table, a row for each entry."""
     return [tuple(column.text(entry) for column in columns) for entry in entries]
-
-
-def in_markdown(entries: Iterable[Entry], columns: Sequence[Shown], *, left: int = 1) -> str:
-    """Return a table in Markdown, of which the first columns are text."""
-    return markdown_table(titles(columns), cells(entries, columns), left=left)

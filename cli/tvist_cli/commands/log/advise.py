@@ -11,7 +11,6 @@ from tvist_cli.output import out, print_json, progress, say, table, typed, write
 def advise(
     *files: Path,
     output: Path | None = None,
-    force: bool = False,
     logs: LogOptions = AS_IT_IS,
     json: bool = False,
 ) -> None:
@@ -22,15 +21,12 @@ def advise(
 
     Args:
         files: Recordings or logs of one robot in any format that tvist log analyze reads.
-        output: Web page to write, in one file, with the two figures that show why.
-        force: Replace an existing page.
+        output: Web page to write or replace, in one file, with the two figures that show why.
         logs: How to read logs.
         json: Print one JSON object with all figures of each shaper and motion.
     """
     if not files:
         raise Failure("advise needs at least one recording or log: tvist log advise run.mcap", code=2)
-    if output is not None and output.exists() and not force:
-        raise Failure(f"{output} exists already: give --force to replace it, or another --output")
     from tvist_lab.advice import advise as advised
     from tvist_lab.advice import as_dict, command, verdict
     from tvist_lab.metrics import Measured

@@ -5,7 +5,7 @@ from pathlib import Path
 from tvist_cli.failure import Failure, told
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.misuse import lower
-from tvist_cli.output import print_json, say
+from tvist_cli.output import default_output, print_json, say
 
 
 def export(
@@ -13,7 +13,6 @@ def export(
     *,
     to: str,
     output: Path | None = None,
-    force: bool = False,
     logs: LogOptions = AS_IT_IS,
     json: bool = False,
 ) -> None:
@@ -25,8 +24,8 @@ def export(
             array in npz and mat. Units, events and info go along; those of a CSV into FILE.csv-metadata.json. With
             foxglove, the recording is written with channels for the 3D panel of Foxglove and Lichtblick, and beside it
             a layout for both.
-        output: File to write [FILE with its ending replaced, such as run.csv or run.foxglove.mcap for run.mcap].
-        force: Replace an existing file.
+        output: File to write or replace [FILE with its ending replaced, such as run.csv or run.foxglove.mcap for
+            run.mcap, if there is none yet].
         logs: How to read logs.
         json: Print one JSON object.
     """
@@ -45,8 +44,8 @@ def export(
     for place in written:
         if place.exists() and file.exists() and place.samefile(file):
             raise Failure(f"{place} is the file to be exported: choose another one with --output", code=2)
-        if place.exists() and not force:
-            raise Failure(f"{place} exists already: give --force to replace it, or --output")
+        if output is None:
+            default_output(place)
     with told(RecordingError):
         if kind == FOXGLOVE:
             from tvist_lab.foxglove.export import export as draw

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import out, print_json, table, typed, waiting
+from tvist_cli.output import default_output, out, print_json, table, typed, waiting
 from tvist_cli.robot_logs import robot_logs
 
 if TYPE_CHECKING:
@@ -13,8 +13,7 @@ if TYPE_CHECKING:
 
 def fit(
     *files: Path,
-    output: Path = Path("robot.toml"),
-    force: bool = False,
+    output: Path | None = None,
     robot: str | None = None,
     payload: float | None = None,
     check: list[Path] | None = None,
@@ -30,8 +29,7 @@ def fit(
     Args:
         files: Recordings of unshaped motions, or logs of another robot with its targets, in any format that tvist log
             analyze reads. Ten motions are few, twenty with different loads are good.
-        output: Robot file to write.
-        force: Replace an existing file.
+        output: Robot file to write or replace [robot.toml, if there is none yet].
         robot: Robot file to begin at, or name of a robot [the one whose model the logs name].
         payload: Mass of the disc on the flange that the robot was said to carry in kg [what the logs say].
         check: Log whose motions the twin has to predict and does not see, repeatable [each motion of the logs in turn,
@@ -42,8 +40,7 @@ def fit(
     """
     if not files:
         raise Failure("fit needs at least one recording or log: tvist log fit run.mcap", code=2)
-    if output.exists() and not force:
-        raise Failure(f"{output} exists already: give --force to replace it, or --output")
+    output = default_output(Path("robot.toml")) if output is None else output
     if not output.absolute().parent.is_dir():  # said before minutes of simulations
         raise Failure(f"output is {output}: its folder does not exist", code=2)
     checks = check or []

@@ -4,13 +4,12 @@ from pathlib import Path
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.log_options import AS_IT_IS, LogOptions
-from tvist_cli.output import out, print_json, typed, write_report
+from tvist_cli.output import default_output, out, print_json, typed, write_report
 
 
 def report(
     *files: Path,
-    output: Path = Path("report.html"),
-    force: bool = False,
+    output: Path | None = None,
     logs: LogOptions = AS_IT_IS,
     json: bool = False,
 ) -> None:
@@ -21,15 +20,13 @@ def report(
     Args:
         files: Recordings or logs in any format that tvist log analyze reads. The first one is what others are compared
             with.
-        output: File to write.
-        force: Replace an existing file.
+        output: File to write or replace [report.html, if there is none yet].
         logs: How to read logs.
         json: Print the verdict as one JSON object.
     """
     if not files:
         raise Failure("report needs at least one recording or log: tvist log report run.mcap", code=2)
-    if output.exists() and not force:
-        raise Failure(f"{output} exists already: give --force to replace it, or --output")
+    output = default_output(Path("report.html")) if output is None else output
     from tvist_lab.recordings import RecordingError
     from tvist_lab.report import recordings_page
 

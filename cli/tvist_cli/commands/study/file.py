@@ -1,7 +1,6 @@
 """`tvist study FILE`: run a study of one's own, a TOML file of a sweep or a Python file."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from tvist_cli import kept
 from tvist_cli.failure import Failure, told
@@ -9,9 +8,6 @@ from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import typed
 from tvist_cli.study_names import STUDY
 from tvist_cli.studying import Places
-
-if TYPE_CHECKING:
-    from tvist_lab.study.study import Study
 
 
 def file(
@@ -21,7 +17,6 @@ def file(
     processes: int | None = None,
     scheduler: str | None = None,
     look: FigureOptions = AS_USUAL,
-    markdown: Path | None = None,
     report: Path | None = None,
     json: bool = False,
 ) -> None:
@@ -37,7 +32,6 @@ def file(
         processes: Number of processes on this machine [one for each core].
         scheduler: Address of a Dask scheduler whose workers to use instead, such as tcp://HOST:8786.
         look: How to write the figure.
-        markdown: File to write a page with the table to; for Python files.
         report: File to write a web page with table and figure to; for Python files.
         json: Print one JSON object.
     """
@@ -46,8 +40,8 @@ def file(
     if file.suffix != ".py":
         from tvist_cli.commands.study.sweep import sweep
 
-        if markdown is not None or report is not None:
-            raise Failure("--markdown and --report are for a study in a Python file", code=2)
+        if report is not None:
+            raise Failure("--report is for a study in a Python file", code=2)
         sweep(file, output=output, processes=processes, scheduler=scheduler, look=look, json=json)
         return
     from tvist_lab.figures import study_figure
@@ -55,7 +49,7 @@ def file(
     from tvist_lab.study.study import ENDS, StudyError, read_study
     from tvist_lab.words import MANY
 
-    places = Places(markdown=markdown, report=report)
+    places = Places(report=report)
     folder = kept.folder_of(file, output, processes, scheduler, look)
     places.check()
     with told(StudyError, OSError):
@@ -75,17 +69,8 @@ def file(
         result["figure"] = str(look.into(folder).write(figure, "study"))
     places.write(
         result,
-        page=lambda: _page(study, on_pages),
         draw=lambda: {"study": figure},
         web_page=lambda drawn: study_page(study, on_pages, drawn, typed()),
     )
     entries = result["summary"]
     kept.tell(result, entries, study.shown(entries), json=json, title=f"{study.title}: ")
-
-
-def _page(study: "Study", result: dict[str, Any]) -> str:
-    from tvist_lab.studies.pages import page
-    from tvist_lab.study.measures import MEASURES
-
-    columns, measures = study.shown(result["summary"]), [MEASURES[name] for name in study.show]
-    return page("study", result, typed(), columns=columns, measures=measures, left=len(study.by) + 1)

@@ -7,7 +7,6 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
-from tvist_cli.output import typed
 from tvist_cli.shapers_of import modal_for, on_the_bench
 from tvist_cli.studying import Figures, Places, check_range, check_seed, command, gathered, give, show
 
@@ -23,7 +22,6 @@ def robustness(
     output: Path | None = None,
     figures: Path | None = None,
     look: FigureOptions = AS_USUAL,
-    markdown: Path | None = None,
     json: bool = False,
 ) -> None:
     """Compare the reduction of vibration with the delay of shapers, on arms other than calibrated.
@@ -44,18 +42,16 @@ def robustness(
         output: JSON file to write the result to.
         figures: Folder to write a figure of reduction against delay to.
         look: How to write the figures.
-        markdown: File to write a page with the tables to.
         json: Print one JSON object.
     """
-    from tvist_lab.studies.pages import page
-    from tvist_lab.studies.robustness import PLANT, columns, jobs, report, tables
+    from tvist_lab.studies.robustness import jobs, report
     from tvist_lab.studies.shaperbench import draw
     from tvist_lab.study.engine import made
     from tvist_lab.study.held_out import MOVES
     from tvist_lab.study.menus import names
     from tvist_lab.study.shaping import ShaperFaultError
 
-    places = Places(output=output, markdown=markdown, figures=figures, look=look)
+    places = Places(output=output, figures=figures, look=look)
     places.check()
     moves = MOVES if moves is None else moves
     check_range("moves", moves, 1, 10_000)
@@ -80,17 +76,7 @@ def robustness(
         "hidden": hidden or [],
         "shapers": report(methods, [row for rows in done for row in rows], hidden or ()),
     }
-    places.write(
-        result,
-        page=lambda: page(
-            "robustness",
-            result,
-            typed(),
-            tables=tables(hidden or ()),
-            plants=[(one.name, one.label) for one, _ in columns(hidden or ())[PLANT].values()],
-        ),
-        draw=lambda: _figures(result),
-    )
+    places.write(result, draw=lambda: _figures(result))
     give(result, _print, json=json)
 
 

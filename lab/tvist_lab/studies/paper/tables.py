@@ -1,10 +1,7 @@
-"""Table 2 beside the paper's and a table of all methods: their rows, and the page of the documentation with both."""
+"""Rows of Table 2 beside the paper's, and of a table of all methods."""
 
 from typing import Any
 
-from tvist_lab.markdown_table import markdown_table
-from tvist_lab.studies.pages import page
-from tvist_lab.studies.paper.origins import MEANINGS, origins
 from tvist_lab.studies.paper.published import published
 from tvist_lab.study.tables import Shown, cells
 
@@ -61,23 +58,6 @@ def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, 
         return first.format(said) if rows[name]["still_after_ms"] == soonest else said
 
     return cells([{"label": label(name), **row} for name, row in rows.items()], METHODS)
-
-
-def page_of(result: dict[str, Any], command: str) -> str:
-    """Return Tables 1 and 2 beside the paper's, the baselines, and the origin of each figure."""
-    headings = [column.title for column in METHODS]
-    return page(
-        "paper",
-        result,
-        command,
-        second=markdown_table(("motion", "", *FIGURES), table_2(result["table_2"], 2)),
-        methods_of={
-            motion: markdown_table(headings, methods(result, motion, "**{}**"))
-            for motion in result["baselines"]
-        },
-        meanings=MEANINGS,
-        origins=markdown_table(("figure", "paper", "here", "origin", "remark"), origins(result)),
-    )
 
 
 def _form(value: float | None, form: str, unit: str = "") -> str:

@@ -1,0 +1,111 @@
+"""The first mode over the workspace: as a calibration tells it, and as the simulated arm has it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tvist_controller.api.line import CollisionModel, ModeSource, body, paper_payload
+from tvist_lab.recordings import Floats
+from tvist_lab.workspace import identified, ranges, workspace
+from tvist_plant.description import RobotDescription
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_protocol.calibration import Calibration
+
+QUANTITIES = {"f_d_hz": "f_d", "zeta": "zeta"}
+"""Keys of the maps, with the words in the names of their files."""
+POINTS = 41
+"""Number of angles of each joint."""
+
+
+@dataclass(frozen=True)
+class WorkspaceMap:
+    """Values on a grid over two joints; NaN where the arm would touch itself or the floor."""
+
+    joints: tuple[int, int]
+    """Indices of the joints along the grid's rows and columns."""
+    names: tuple[str, str]
+    """Their names."""
+    angles: tuple[Floats, Floats]
+    """Their angles [rad], shapes (R,) and (C,)."""
+    rest: tuple[float, ...]
+    """Configuration of the other joints; those of the grid are zero in it [rad]."""
+    identified: dict[str, Floats]
+    """Key of `QUANTITIES` to what the calibration tells, shape (R, C)."""
+    true: dict[str, Floats]
+    """The same of the simulated arm."""
+    poses: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Named poses of the robot, by their angles along rows and columns [rad]; those on the map."""
+
+    def error(self, key: str) -> Floats:
+        """Deviation of what is identified from what is true [%], shape (R, C)."""
+        return np.asarray(100.0 * (self.identified[key] / self.true[key] - 1.0))
+
+
+def workspace_map(
+    description: RobotDescription, calibration: Calibration, mass: float, points: int = POINTS
+) -> WorkspaceMap | None:
+    """Compute f_d and ζ of the lowest mode on a grid over two joints.
+
+    The grid is over the first two joints that change the modes: for a six-joint arm, shoulder and elbow. The other
+    joints are in the middle of the workspace. The payload is both carried and declared.
+
+    Args:
+        description: The robot.
+        calibration: Its calibration; a modal model is used if there is one, else the polynomials.
+        mass: Mass of the disc on the flange [kg].
+        points: Number of angles of each joint.
+
+    Returns:
+        The maps; None if the arm has one joint, or would touch itself or the floor at each place of the grid.
+
+    Raises:
+        EstimatorError: The calibration does not fit the arm.
+    """
+    if description.joints < 2:
+        return None
+    limits = ranges(description)
+    changing, whole = identified(limits), workspace(limits)
+    count = min(len(whole.low), description.joints)
+    moved = [joint for joint in range(count) if changing.high[joint] > changing.low[joint]]
+    first, second = sorted([*moved, *(joint for joint in range(count) if joint not in moved)][:2])
+    middle = np.zeros(description.joints)
+    middle[:count] = [0.5 * (low + high) for low, high in zip(changing.low, changing.high, strict=True)][
+        :count
+    ]
+    middle[[first, second]] = 0.0
+    angles = tuple(np.linspace(whole.low[joint], whole.high[joint], points) for joint in (first, second))
+
+    payload = paper_payload(description, mass)
+    source = ModeSource("polynomial" if calibration.modal is None else "modal", description, calibration)
+    estimator = source.estimator(1, payload)
+    arm = FlexibleArm(description, body(payload))
+    collision = CollisionModel(description, body(payload))
+    told, true = ({key: np.full((points, points), np.nan) for key in QUANTITIES} for _ in range(2))
+    for row, column in np.ndindex(points, points):
+        q = middle.copy()
+        q[first], q[second] = angles[0][row], angles[1][column]
+        if collision.meeting(q) is not None:
+            continue
+        f_d, zeta = estimator.settle(q)
+        modes = arm.modes(q)
+        for maps, mode in ((told, (f_d[0], zeta[0])), (true, (modes.f_d[0], modes.zeta[0]))):
+            for key, value in zip(QUANTITIES, mode, strict=True):
+                maps[key][row, column] = value
+    if np.isnan(true["zeta"]).all():
+        return None
+    joints = description.robot.joints
+    poses = {name: (q[first], q[second]) for name, q in description.poses.items()}
+    return WorkspaceMap(
+        joints=(first, second),
+        names=(joints[first], joints[second]),
+        angles=(angles[0], angles[1]),
+        rest=tuple(middle.tolist()),
+        identified=told,
+        true=true,
+        poses={
+            name: at
+            for name, at in poses.items()
+            if all(grid[0] - 1e-6 <= angle <= grid[-1] + 1e-6 for grid, angle in zip(angles, at, strict=True))
+        },
+    )

@@ -1,0 +1,13 @@
+"""The fenced blocks of a page."""
+
+import re
+import textwrap
+
+FENCE = re.compile(
+    r"^(?P<indent> *)```(?P<kind>\w*)\n(?P<text>.*?)^(?P=indent)```$", re.MULTILINE | re.DOTALL
+)
+
+
+def fences(text):
+    """Kind and text of each fence."""
+    return [(match["kind"], textwrap.dedent(match["text"])) for match in FENCE.finditer(text)]

@@ -1,0 +1,32 @@
+"""`python -m tools.tables PAGE [RESULT.json]`: makes a page of the documentation with measured tables.
+
+Without a result, which is what the page's command prints with `--json`, it runs that command, which may take hours.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from tools.tables.pages import PAGES, page_of
+
+ROOT = Path(__file__).parents[2]
+
+
+def main() -> None:
+    """Make the page that the command line names."""
+    if len(sys.argv) not in (2, 3) or sys.argv[1] not in PAGES:
+        sys.exit(f"usage: python -m tools.tables {'|'.join(PAGES)} [RESULT.json]")
+    name = sys.argv[1]
+    page = PAGES[name]
+    if len(sys.argv) == 3:
+        text = Path(sys.argv[2]).read_text(encoding="utf-8")
+    else:
+        _, *words = f"{page.command} {page.files} --json".split()
+        ran = [sys.executable, "-m", "tvist_cli", *words]
+        text = subprocess.run(ran, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
+    (ROOT / page.path).write_text(page_of(name, json.loads(text)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
