@@ -23,9 +23,8 @@ from tvist_plant.plant import PERIOD
 from tvist_plant.sensors import gear_phases
 from tvist_shaping import Estimator, Fixed, TvistFilter, residual, shaper
 from tvist_shaping.catalogue import SHAPERS
-from tvist_view.lesson import largest_after_stop
 from tvist_view.look import Look
-from tvist_view.signals import moves
+from tvist_view.signals import MOVING, moves
 from tvist_view.track import Shown, Track
 
 MADE = Path(__file__).parents[1] / "view" / "page" / "try" / "made"
@@ -96,9 +95,16 @@ def _ur5e() -> dict[str, Any]:
         one["samples"] = {name: one["samples"][name] for name in ("time", "alpha")}
     return {
         "tracks": packed,
-        "left": [largest_after_stop(track) for track in tracks],
+        "left": [_largest_after_stop(track) for track in tracks],
         "stop": stop - start,
     }
+
+
+def _largest_after_stop(track: Track) -> float:
+    """Largest acceleration of the tool once the shaped reference has come to rest [m/s²]."""
+    signals = track.signals
+    moving = np.flatnonzero(signals.acceleration > MOVING)
+    return float(np.nan_to_num(signals.alpha[moving[-1] + 5 :]).max(initial=0.0))
 
 
 def checked() -> dict[str, Any]:

@@ -1,9 +1,11 @@
 """Run a study whose rows are kept in a folder: its options, its progress, and what it took."""
 
+import logging
 import re
 import time
-from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +15,8 @@ from tvist_cli.output import print_json, progress, say
 from tvist_cli.studying import check_range, show
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     import polars as pl
 
     from tvist_lab.study.engine import Plan
@@ -20,6 +24,8 @@ if TYPE_CHECKING:
 
 ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?([^\s:/\[\]]+|\[[\da-fA-F:.]+\]):\d{1,5}")
 """Address of a scheduler."""
+PATIENCE = 10.0
+"""Time within which a scheduler has to answer, and to have a worker [s]."""
 
 
 def folder_of(
@@ -54,7 +60,7 @@ def run(
     Raises:
         Failure: The folder cannot be used, or the runner does not run.
     """
-    from tvist_lab.runners.cluster import Cluster
+    from tvist_lab.runners import outcomes
     from tvist_lab.study import engine
     from tvist_lab.study.store import ROWS
     from tvist_lab.study.work import FAILED, TOO_WEAK
@@ -67,7 +73,10 @@ def run(
             bar = stack.enter_context(progress(missing, "moves", kept))
             return lambda done: bar(done, None)
 
-        ran = engine.run(plan, folder, Cluster(scheduler, processes), begin)
+        def runner(work: Any, jobs: Any) -> Any:
+            return outcomes(stack.enter_context(executor(processes, scheduler)), work, jobs)
+
+        ran = engine.run(plan, folder, runner, begin)
     rows, effort = ran.rows, ran.effort
     return rows, {
         "rows_file": str(folder / ROWS),
@@ -83,6 +92,42 @@ def run(
             "scheduling_and_transfer_percent": effort.overhead_percent,
         },
     }
+
+
+@contextmanager
+def executor(number: int | None, scheduler: str | None) -> "Iterator[Executor]":
+    """Start processes of this machine, or connect to a scheduler of Dask.
+
+    Raises:
+        ConnectionError: There is no scheduler at the address, or it has no workers or other ones.
+    """
+    if scheduler is None:
+        from tvist_lab.runners import processes
+
+        with processes(number) as pool:
+            yield pool
+        return
+    from distributed import Client
+
+    # What is done again when a worker dies is no reason for a warning.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+    try:
+        client = Client(scheduler, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ConnectionError(f"no Dask scheduler answers at {scheduler}") from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE)
+        except TimeoutError as error:
+            raise ConnectionError(
+                f"the Dask scheduler at {scheduler} has no workers: start some with dask worker {scheduler}"
+            ) from error
+        own = version("tvist")
+        for worker, found in client.run(version, "tvist", on_error="return").items():
+            if found != own:
+                has = f"tvist {found}" if isinstance(found, str) else "no tvist"
+                raise ConnectionError(f"the worker {worker} has {has}: install tvist {own}")
+        yield client.get_executor(pure=False)
 
 
 def tell(

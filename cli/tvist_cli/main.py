@@ -26,7 +26,7 @@ LOG = {
     "analyze": "Say what a recording or a log holds and measure its motions, or compare two.",
     "advise": "Say from logs what rings, and which shaper to take.",
     "report": "Write a web page about recordings: a verdict, tables and figures in one file.",
-    "export": "Write a recording as CSV, Parquet, npz or mat, or for Foxglove.",
+    "export": "Write a recording as CSV or Parquet, or for Foxglove.",
     "fit": "Fit a robot file to logs, with which a simulated arm does what the robot did.",
     "replay": "Run a recording's commands again and compare bit by bit, or publish it.",
 }
@@ -54,7 +54,7 @@ GROUPS = {
     "Make and manage": {
         "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",
         "paper": "Run the paper's experiment and print its tables beside ours.",
-        "lesson": "Open a page on which to try shaping, or show why a fixed shaper is not enough.",
+        "lesson": "Open a page on which to try shaping.",
         "identify": "Calibrate a robot from its own accelerometer, or from its logs.",
         "robots": "List the arms: what is measured, what assumed, and how well auto stills each.",
         "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",

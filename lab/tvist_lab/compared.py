@@ -23,7 +23,6 @@ async def run_beside(
     *,
     robot: str = "ur5e",
     seed: int = 0,
-    modes: tuple[float, float] | None = None,
 ) -> tuple[Info, Collected]:
     """Move one arm through poses with a shaper; every motion begins at the same tick whatever the shaper.
 
@@ -32,16 +31,12 @@ async def run_beside(
         poses: Joint angles, the first of which it starts at [rad].
         robot: Robot that comes with the package, or path of a robot file.
         seed: Seed of sensor noise and gear errors.
-        modes: Frequency [Hz] and damping ratio [-] that the shaper is designed for, everywhere; None: those of the
-            robot's calibration.
 
     Returns:
         The robot, and everything it published.
     """
     setup = free_setup(robot=robot, shaper=shaper, seed=seed)
     async with robot_in_process(setup) as client, client.control("compare") as arm:
-        if modes is not None:
-            await arm.set_estimator("fixed", f_d=[modes[0]], zeta=[modes[1]])
         await arm.reset(q=poses[0])
         with collect(client) as collected:
             begun = await client.advance(LEAD)

@@ -17,7 +17,7 @@ from tvist_lab.figures import (
     ring_down_figure,
 )
 from tvist_lab.metrics import motions
-from tvist_lab.one_joint.lesson import lesson
+from tvist_lab.one_joint.plucks import pluck_all
 from tvist_lab.studies.paper.experiment import Experiment
 from tvist_lab.studies.paper.published import MOTIONS
 
@@ -38,7 +38,7 @@ def draw(done: Experiment, *, all_figures: bool) -> dict[str, Figure]:
     if all_figures:
         figures |= {
             "figure_01": figure_1(),
-            "figure_02": figure_2(lesson()),
+            "figure_02": figure_2(pluck_all()),
             "figure_03": figure_3(),
             "figure_04": figure_4(),
             "figure_07": figure_7(),

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from proof.search import changes, programs, sequences, stops, streams
-from tvist_lab.runners import Processes, in_order
+from tvist_lab.runners import in_order
 from tvist_plant.description import RobotDescription, load
 
 Judge: TypeAlias = Callable[[RobotDescription, int], Any]
@@ -62,9 +62,7 @@ def search(
     def run(what: str, count: int, judge: Judge) -> tuple[dict[str, Any], list[Any]]:
         tasks = [(arms[case % len(arms)], seed * APART + case) for case in range(count)]
         outcomes, wrong = [], []
-        for (arm, number), found in zip(
-            tasks, in_order(Processes(), partial(_try, judge), tasks), strict=True
-        ):
+        for (arm, number), found in zip(tasks, in_order(partial(_try, judge), tasks), strict=True):
             if not isinstance(found, str | None):
                 outcomes.append(found)
             if isinstance(found, str) or (found is not None and not found.kept):

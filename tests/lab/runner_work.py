@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from pathlib import Path
 
 
@@ -12,7 +13,9 @@ class OddError(Exception):
         super().__init__(f"{first} {second}")
 
 
-def square(number):
+def square_late(number):
+    """The first ones come last."""
+    time.sleep(0.1 if number < 3 else 0.0)
     return number * number
 
 

@@ -77,8 +77,6 @@ def make(figures, recorded, found):
         "catalogue": lambda: figures.catalogue_figure(known),
         "sensitivity": lambda: figures.sensitivity_figure([SHAPERS["zv"]], 0.0, np.linspace(-0.4, 0.6, 51)),
         "settling_against_delay": lambda: figures.settling_against_delay_figure(known, 10.0, 0.1),
-        "elastic": figures.elastic_figure,
-        "mean_delay": figures.mean_delay_figure,
         "pareto": lambda: figures.pareto_figure(leaderboard("leaderboard")),
         "settling": lambda: figures.settling_figure(leaderboard("leaderboard")),
         "robustness": lambda: figures.robustness_figure(leaderboard("robustness")),
@@ -99,7 +97,7 @@ def make(figures, recorded, found):
 
 NAMES = [
     "figure_1", "figure_3", "figure_4", "figure_7", "figure_8", "figure_12", "observed", "figure_15", "figure_16",
-    "after_stop", "ring_down", "catalogue", "sensitivity", "settling_against_delay", "elastic", "mean_delay", "pareto",
+    "after_stop", "ring_down", "catalogue", "sensitivity", "settling_against_delay", "pareto",
     "settling", "robustness", "moves", "one_move", "identified", "map", "map over two columns",
     "no move that counts", "compared", "sweep",
 ]  # fmt: skip

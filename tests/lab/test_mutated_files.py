@@ -205,12 +205,12 @@ def _logs(folder):
     return [*_csv(folder), *_dump(folder), *_rosbag(folder), *_mcap(folder), run]
 
 
-def _exported(folder, kind):
+def _exported(folder):
     from tests.lab.test_export import recording
 
     from tvist_lab.recordings.export import export
 
-    export(recording(), path := folder / f"run.{kind}", kind)
+    export(recording(), path := folder / "run.parquet", "parquet")
     return path
 
 
@@ -220,21 +220,13 @@ def _parquet(folder):
     plain = folder / "plain.parquet"
     names, values = _log().table()
     pl.DataFrame(values, schema=names).write_parquet(plain, compression="uncompressed", row_group_size=40)
-    return [_exported(folder, "parquet"), plain]
+    return [_exported(folder), plain]
 
 
 def _npz(folder):
     path = folder / "plain.npz"
     np.savez(path, **_log().columns)
-    return [_exported(folder, "npz"), path]
-
-
-def _mat(folder):
-    from scipy.io import savemat
-
-    for version in ("4", "5"):
-        savemat(folder / f"plain{version}.mat", _log().columns, format=version, oned_as="column")
-    return [_exported(folder, "mat"), folder / "plain4.mat", folder / "plain5.mat"]
+    return [path]
 
 
 def _toml(folder):
@@ -393,7 +385,6 @@ READERS = {
     "mcap": (_mcap, _read_recording),
     "parquet": (_parquet, _read_recording),
     "npz": (_npz, _read_recording),
-    "mat": (_mat, _read_recording),
     "commands": (_logs, _run_commands),
     "toml": (_toml, _read_robot),
     "urdf": (_urdf, _read_robot),
@@ -466,7 +457,7 @@ HOSTILE = {
 }  # fmt: skip
 """Files made to hang a reader or to take its memory, each with its kind."""
 
-APART = {"parquet": 10, "mat": 10, "commands": 3}
+APART = {"parquet": 10, "commands": 3}
 """How many times fewer files are tried of kinds of which each takes long."""
 
 

@@ -12,7 +12,7 @@ from polars.testing import assert_frame_equal
 
 from tvist_controller import calibrations
 from tvist_lab.figures import study_figure
-from tvist_lab.runners import Failed, Processes, TaskError
+from tvist_lab.runners import Failed, TaskError, outcomes, processes
 from tvist_lab.studies.sweep.spec import Spec, SpecError, read_spec
 from tvist_lab.studies.sweep.sweep import COLUMNS, SCHEMA, Axes, SweptRobot, setting_name, summary
 from tvist_lab.study.arms import scattered
@@ -58,7 +58,7 @@ class Quick:
     def __init__(self, order=sorted, stop=10**9, fail=()):
         self.order, self.stop, self.fail, self.asked = order, stop, fail, []
 
-    def run(self, _work, tasks):
+    def __call__(self, _work, tasks):
         for count, place in enumerate(self.order(range(len(tasks)))):
             if count == self.stop:
                 raise KeyboardInterrupt
@@ -71,6 +71,11 @@ class Quick:
                 for number, row in enumerate(rows, position * len(rows)):
                     row |= {"error": None, "delay_ms": 0.1 * number, "reduction_percent": 50.0}
                 yield place, Done(rows, "a", 0.0, 1.0)
+
+
+def in_processes(work, tasks):
+    with processes(2) as pool:
+        yield from outcomes(pool, work, tasks)
 
 
 def run(axes, *others):
@@ -325,7 +330,7 @@ def test_the_study_of_the_page_is_made_kept_and_summarized(tmp_path):
     text = of_the_page()
     (tmp_path / "speeds.py").write_text(text.replace("20, seed", "1, seed"), encoding="utf-8")
     study = read_study(tmp_path / "speeds.py")
-    ran = run_plan(study.plan(), tmp_path / "x", Processes(few=9), quietly)
+    ran = run_plan(study.plan(), tmp_path / "x", in_processes, quietly)
     assert run_plan(study.plan(), tmp_path / "x", Quick(), quietly).resumed == 3
     entries = study.summary(ran.rows)
     assert [(one["speed"], one["shaper"]) for one in entries] == [
@@ -381,12 +386,12 @@ class Locked(Axes):
 
 def test_a_task_that_cannot_be_pickled_and_one_that_fails_name_their_moves_and_the_others_go_on(tmp_path):
     tasks = tasks_of(tmp_path, "shapers = ['none']\nmoves = 4\npayloads = [5]")
-    bad = run(Locked(tasks.spec, tasks.robots), tmp_path / "x", Processes(few=2, chunk=1), quietly).rows
+    bad = run(Locked(tasks.spec, tasks.robots), tmp_path / "x", in_processes, quietly).rows
     assert bad["status"].to_list() == ["measured", "failed", "failed", "measured"]
     assert bad["move"].to_list() == [1, 2, 3, 4]
     assert "cannot be pickled" in bad["error"][1]
     assert bad["error"][2].startswith(("ValueError", "IndexError"))
-    good = run(tasks, tmp_path / "x", Processes(), quietly)
+    good = run(tasks, tmp_path / "x", in_processes, quietly)
     assert good.resumed == 2
     rows = [{"row": place} | row for place, task in enumerate(tasks) for row in measure_each(task)]
     assert_frame_equal(good.rows, frame(rows, SCHEMA))

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 from tests import forked
 
-FOLDER = Path(__file__).parents[2] / "shaping" / "examples"
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "shaping" / "examples"
+PAGE = ROOT / "docs" / "explanations" / "one-flexible-joint.md"
 EXAMPLES = sorted(FOLDER.glob("*.py"))
 
 
@@ -34,3 +36,4 @@ def test_the_one_joint_example_shows_that_zv_needs_the_right_frequency():
     assert left["unshaped"] == 100.0
     assert left["ZV for 90°"] > 15.0
     assert left["TVIST"] < 4.0
+    assert ended.stdout in PAGE.read_text(encoding="utf-8")

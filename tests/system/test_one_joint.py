@@ -76,18 +76,6 @@ def test_what_it_carries_is_not_identified():
     assert ended.assert_failed(1, "no joint of a one-joint arm carries weight").out == ""
 
 
-def test_the_lesson_prints_its_numbers_and_draws_its_figure(tmp_path):
-    said = tvist("lesson", "--figures", tmp_path, "--json").assert_done().json
-    assert said["worst_f_d_percent"] < 0.5
-    assert said["poses"]["Q1"]["left_percent"]["zv_fixed"] > 25.0
-    assert said["poses"]["Q1"]["left_percent"]["tvist_identified"] < 2.0
-    assert (tmp_path / "figure_02.png").exists()
-
-
-def test_a_port_for_a_lesson_that_is_not_served_is_refused():
-    tvist("lesson", "--port", "9000").assert_failed(2, "give --serve, too")
-
-
 def test_the_lesson_is_a_file_that_is_there(monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)

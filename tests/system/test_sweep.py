@@ -144,3 +144,9 @@ def test_a_worker_of_a_cluster_that_is_killed_changes_no_row(spec, whole, tmp_pa
     assert (process.returncode, err) == (0, "")
     assert json.loads(out)["failed"] == 0
     assert_frame_equal(rows_of(tmp_path / "x"), whole)
+
+
+def test_an_address_without_a_scheduler_is_told(spec, tmp_path):
+    ended = finished(*words(spec, tmp_path / "x", "--scheduler", "tcp://127.0.0.1:1"))
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert ended.stderr == "tvist: no Dask scheduler answers at tcp://127.0.0.1:1\n"

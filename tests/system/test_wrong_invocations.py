@@ -90,7 +90,7 @@ MISUSE = [
     (("log", "record", "x.mcap", "--keep", "10"), ["keep is '10'", "90s, 10min or 2h"]),
     (("serve", "--record", "x.mcap", "--keep", "0s"), ["keep is '0s'", "from 1s"]),
     (("serve", "--keep", "10min"), ["keep is 10min", "nothing is recorded"]),
-    (("log", "export", "x.mcap", "--to", "xls"), ["to is 'xls'", "csv, parquet, npz, mat"]),
+    (("log", "export", "x.mcap", "--to", "xls"), ["to is 'xls'", "csv, parquet, foxglove"]),
     (("log", "export", "x.mcap"), ["--to is missing"]),
     (("log", "export", "x.mcap", "--to", "foxglove", "--imu", "i.csv"), ["--imu", "needs a recording"]),
     (("log", "analyze", "x.csv", "--imu-columns", "time=t"), ["--imu-columns is about --imu"]),

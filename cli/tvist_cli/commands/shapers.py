@@ -49,8 +49,8 @@ def shapers(
             of a mode whose frequency they assume wrongly [zv zvd ei].
         errors: With --sensitivity, lowest and highest percentage by which the assumed frequency is too high.
         output: With --sensitivity, JSON file to write the curves to.
-        figures: Folder to write figures to: residual vibration for a wrong frequency, settling time against delay, and
-            the effects of a varying mean delay and of elastic feed-forward; with --sensitivity, the curves.
+        figures: Folder to write figures to: residual vibration for a wrong frequency, and settling time against delay;
+            with --sensitivity, the curves.
         look: How to write the figures.
         json: Print one JSON object.
     """
@@ -91,8 +91,6 @@ def shapers(
 def _figures(listed: "list[AnyShaper]", f_d: float, zeta: float) -> Figures:
     from tvist_lab.figures import (
         catalogue_figure,
-        elastic_figure,
-        mean_delay_figure,
         settling_against_delay_figure,
     )
     from tvist_shaping import Shaper
@@ -100,8 +98,6 @@ def _figures(listed: "list[AnyShaper]", f_d: float, zeta: float) -> Figures:
     of_impulses = [one for one in listed if isinstance(one, Shaper)]
     return {
         "shapers": catalogue_figure(of_impulses, zeta),
-        "mean_delay": mean_delay_figure(),
-        "elastic": elastic_figure(),
         "settling": settling_against_delay_figure(of_impulses, f_d, zeta),
     }
 

@@ -14,7 +14,6 @@ from tvist_lab.figures.pareto import pareto_figure, settling_figure
 from tvist_lab.figures.recorded import Recorded, motion_figure, observed_figure
 from tvist_lab.figures.ring_down import ring_down_figure
 from tvist_lab.figures.studies import residual_by_move_figure, robustness_figure, study_figure, sweep_figure
-from tvist_lab.figures.through_filters import elastic_figure, mean_delay_figure
 from tvist_lab.figures.wrong_frequency import (
     catalogue_figure,
     figure_4,
@@ -30,7 +29,6 @@ __all__ = [
     "after_stop_figure",
     "catalogue_figure",
     "compared_figure",
-    "elastic_figure",
     "figure_1",
     "figure_2",
     "figure_3",
@@ -40,7 +38,6 @@ __all__ = [
     "figure_15",
     "figure_16",
     "identified_figure",
-    "mean_delay_figure",
     "motion_figure",
     "move_plan_figure",
     "observed_figure",

@@ -18,7 +18,7 @@ from tvist_lab.figures.style import (
     remark,
     title,
 )
-from tvist_lab.one_joint.lesson import Lesson, PoseResult
+from tvist_lab.one_joint.plucks import Modes, Plucked
 from tvist_lab.recordings import Floats
 
 APART = 0.62
@@ -28,20 +28,20 @@ WORDS = ("increased inertia", "", "decreased inertia")
 SPRING_TURNS = 2.5
 
 
-def figure_2(lesson: Lesson) -> Figure:
+def figure_2(modes: Modes) -> Figure:
     """Draw the arm at the three angles of the elbow, and its frequency and damping over that angle.
 
     Top: the arm from above, with its inertia about the shoulder. Below: f_d and ζ by the formula, as lines, and as the
     simulated arm's accelerometer tells them after a pluck, as points.
 
     Args:
-        lesson: What was computed and measured.
+        modes: What was computed and measured.
     """
     figure, (arms, frequencies, dampings) = panels(3, 7.2, share_x=False, ratios=(1.35, 1.25, 0.8))
-    _draw_arms(arms, lesson)
-    masses = sorted({one.mass for one in lesson.curve})
+    _draw_arms(arms, modes)
+    masses = sorted({one.mass for one in modes.curve})
     for mass, style in zip(masses, SERIES, strict=False):
-        here = [one for one in lesson.curve if one.mass == mass]
+        here = [one for one in modes.curve if one.mass == mass]
         elbow = np.degrees([one.elbow for one in here])
         for panel, formula, simulated in (
             (frequencies, [one.f_d for one in here], [one.simulated_f_d for one in here]),
@@ -56,20 +56,20 @@ def figure_2(lesson: Lesson) -> Figure:
     for panel in (frequencies, dampings):
         panel.set(xlim=(-4.0, 154.0), xticks=np.arange(0.0, 151.0, 30.0))
         panel.set_ylim(bottom=0.0)
-        for result in lesson.poses.values():
-            panel.axvline(np.degrees(result.mode.elbow), color=FAINT, linewidth=0.9, linestyle=LIMIT)
+        for pose in modes.poses:
+            panel.axvline(np.degrees(pose.elbow), color=FAINT, linewidth=0.9, linestyle=LIMIT)
     frequencies.set_ylabel("Damped frequency $f_d$ (Hz)")
     frequencies.tick_params(labelbottom=False)
     dampings.set(ylabel="Damping ratio ζ (–)", xlabel="Elbow $q$, 0 stretched out (°)")
     remark(
         frequencies,
         r"$f_d = \frac{1}{2\pi}\sqrt{\frac{K}{I(q)}\,}\sqrt{1 - \zeta^2}$"
-        f"    simulated within {lesson.worst_f_d:.2f} %",
+        f"    simulated within {modes.worst_f_d:.2f} %",
         (0.02, 0.1),
     )
     remark(
         dampings,
-        r"$\zeta = \frac{D}{2\sqrt{K I(q)}}$" + f"    simulated within {lesson.worst_zeta:.1f} %",
+        r"$\zeta = \frac{D}{2\sqrt{K I(q)}}$" + f"    simulated within {modes.worst_zeta:.1f} %",
         (0.02, 0.14),
     )
     legend(
@@ -81,23 +81,21 @@ def figure_2(lesson: Lesson) -> Figure:
     return figure
 
 
-def _draw_arms(panel: Axes, lesson: Lesson) -> None:
+def _draw_arms(panel: Axes, modes: Modes) -> None:
     """The arm from above, once a pose."""
     panel.set_aspect("equal")
     panel.set_axis_off()
-    upper, forearm = lesson.description.kinematics.a
-    for number, (result, word) in enumerate(zip(lesson.poses.values(), WORDS, strict=True)):
-        _draw_arm(panel, np.array([number * APART, 0.0]), upper, forearm, result, word)
+    upper, forearm = modes.description.kinematics.a
+    for number, (pose, word) in enumerate(zip(modes.poses, WORDS, strict=True)):
+        _draw_arm(panel, np.array([number * APART, 0.0]), upper, forearm, pose, word)
     note(panel, "Actuator with\nflexibility", (-0.09, 0.0), ha="right", va="center")
-    title(panel, f"The arm from above, with {lesson.description.payload.mass:g} kg")
+    title(panel, f"The arm from above, with {modes.description.payload.mass:g} kg")
     panel.set(xlim=(-0.36, 2 * APART + 0.36), ylim=(-0.23, upper + forearm + 0.03))
 
 
-def _draw_arm(
-    panel: Axes, shoulder: Floats, upper: float, forearm: float, result: PoseResult, word: str
-) -> None:
+def _draw_arm(panel: Axes, shoulder: Floats, upper: float, forearm: float, pose: Plucked, word: str) -> None:
     """One pose: the upper arm points up, the forearm is turned by q."""
-    elbow = result.mode.elbow
+    elbow = pose.elbow
     joint = shoulder + np.array([0.0, upper])
     tip = joint + forearm * np.array([np.sin(elbow), np.cos(elbow)])
     ahead = joint + np.array([0.0, 0.62 * forearm])
@@ -130,7 +128,7 @@ def _draw_arm(
         color=UNSHAPED, linewidth=1.2, zorder=5,
     )  # fmt: skip
     note(panel, f"$q$ = {np.degrees(elbow):.0f}°", (joint[0] - 0.02, joint[1] + 0.1), ha="right", va="center")
-    lines = [f"$I$ = {result.mode.inertia:.3f} kg m²", word]
+    lines = [f"$I$ = {pose.inertia:.3f} kg m²", word]
     panel.annotate(
         "\n".join(filter(None, lines)), (shoulder[0], shoulder[1] - 0.085), ha="center", va="top", fontsize=9,
         color=INK,

@@ -1,1 +1,1 @@
-"""The lesson of the paper's Figure 2: one flexible joint, whose inertia changes as the arm folds."""
+"""The paper's Figure 2: one flexible joint, whose inertia changes as the arm folds."""

@@ -1,4 +1,4 @@
-"""Files whose readers a damaged one can crash: they are read in a process of their own, and only this one ends.
+"""Parquet is read in a process of its own: a damaged file can crash the reader, and then only this process ends.
 
 `python -m tvist_lab.recordings.apart FILE` writes names and arrays of the file as npz, or says why it cannot.
 """
@@ -10,7 +10,6 @@ import subprocess
 import sys
 import textwrap
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -27,16 +26,10 @@ DENSEST = 2000
 """Largest size of the content over that of its file; deflation reaches 1032, recordings a tenth of it."""
 LEAST_CONTENT = 1 << 20
 """Size of the content that any file may have [bytes]."""
-KINDS = "biufU"
-"""NumPy's kinds of what is read: numbers and text."""
-MATLAB_KINDS = (
-    "char", "double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
-)  # fmt: skip
-"""Classes of variables that are read."""
 
 
 def read_apart(path: Path) -> Arrays:
-    """Return the arrays of a Parquet or MAT-file.
+    """Return the arrays of a Parquet file.
 
     Raises:
         ValueError: The file cannot be read.
@@ -110,25 +103,9 @@ def _parquet(path: Path) -> Arrays:
     return arrays if text is None else arrays | {KEY: np.array(text)}
 
 
-def _mat(path: Path) -> Arrays:
-    from scipy.io import loadmat, whosmat
-
-    # Only what is read is loaded: cells and structures claim sizes of their own.
-    try:
-        sizes = {name: math.prod(shape) for name, shape, kind in whosmat(path) if kind in MATLAB_KINDS}
-    except NotImplementedError:
-        raise ValueError("it is of MATLAB's version 7.3: save it with -v7") from None
-    check_size(path, sum(sizes.values()))
-    arrays = loadmat(path, variable_names=list(sizes), chars_as_strings=True)
-    return {name: arrays[name] for name in sizes if name in arrays and arrays[name].dtype.kind in KINDS}
-
-
-_READERS: dict[str, Callable[[Path], Arrays]] = {".parquet": _parquet, ".mat": _mat}
-
-
 def _main(path: Path) -> int:
     try:
-        arrays = _READERS[path.suffix.lower()](path)
+        arrays = _parquet(path)
         packed = io.BytesIO()
         np.savez(packed, np.array(list(arrays), np.str_), *arrays.values())
     except (Exception, pl.exceptions.PanicException) as error:  # noqa: BLE001  a damaged file can raise nearly anything

@@ -1,11 +1,11 @@
-"""Recordings as CSV, Parquet, npz and mat, in full precision."""
+"""Recordings as CSV and Parquet, in full precision."""
 
 import io
 import json
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import msgspec
 import numpy as np
@@ -21,7 +21,6 @@ EXACT = 2.0**53
 """Whole numbers up to this one are the same as an integer and as a float."""
 
 _SYSTEM = re.compile(r"IO error: (.*) \(os error")
-_MATLAB_NAME = re.compile(r"[A-Za-z]\w{0,62}", re.ASCII)
 
 
 class ExportError(RecordingError):
@@ -38,9 +37,9 @@ def written_by(path: Path, kind: str) -> list[Path]:
 def export(recording: Recording, path: Path, kind: str) -> None:
     """Write a recording to a file, replacing it.
 
-    Scalars are columns of their own names. Vectors are columns NAME_0, NAME_1, … in CSV and Parquet, as UR's record.py
-    names them, and arrays of shape (T, k) in npz and mat. `timestamp` comes first. Units, events and info stand in the
-    metadata of Parquet, in the variable `tvist` of npz and mat, and in a file beside a CSV, as JSON.
+    Scalars are columns of their own names, and vectors are columns NAME_0, NAME_1, …, as UR's record.py names them.
+    `timestamp` comes first. Units, events and info stand in the metadata of Parquet, and in a file beside a CSV, as
+    JSON.
 
     Args:
         recording: The recording.
@@ -48,8 +47,8 @@ def export(recording: Recording, path: Path, kind: str) -> None:
         kind: One of `FORMATS`.
 
     Raises:
-        ExportError: A file cannot be written, for example because the disk is full, or a column's name is not possible
-            in this format. No file has changed then, except that the description of a CSV may be new.
+        ExportError: A file cannot be written, for example because the disk is full. No file has changed
+            then, except that the description of a CSV may be new.
     """
     try:
         if kind == "csv":
@@ -59,8 +58,6 @@ def export(recording: Recording, path: Path, kind: str) -> None:
             FORMATS[kind](recording, stream)
     except (OSError, pl.exceptions.PolarsError) as error:
         raise ExportError(f"{path} cannot be written: {_reason(error)}") from error
-    except ExportError as error:
-        raise ExportError(f"{path} cannot be written: {error}") from error
 
 
 def flat(recording: Recording) -> pl.DataFrame:
@@ -94,40 +91,6 @@ def _write_parquet(recording: Recording, stream: IO[bytes]) -> None:
     table = io.BytesIO()  # from a stream that fails, polars makes an error that does not say why
     flat(recording).write_parquet(table, metadata={KEY: describe(recording).decode()})
     stream.write(table.getbuffer())
-
-
-def _write_npz(recording: Recording, stream: IO[bytes]) -> None:
-    arrays: dict[str, Any] = {**ordered(recording), KEY: np.array(describe(recording).decode())}
-    np.savez_compressed(stream, **arrays)
-
-
-def _write_mat(recording: Recording, stream: IO[bytes]) -> None:
-    from scipy.io import savemat
-
-    columns = ordered(recording)
-    for name in columns:
-        if not _MATLAB_NAME.fullmatch(name):
-            raise ExportError(f"column {name} cannot be a variable of MATLAB: up to 63 letters, digits and _")
-    units = {name: meaning_of(name).unit() for name in columns}
-    content: dict[str, Any] = dict(columns)
-    content |= {"units": units, "events": _events(recording), KEY: describe(recording).decode()}
-    savemat(stream, content, format="5", long_field_names=True, oned_as="column", do_compression=True)
-
-
-def _events(recording: Recording) -> np.ndarray[Any, Any]:
-    """Events as a MATLAB structure array; -1 where an event has no id."""
-    names = ("tick", "kind", "id", "code", "why")
-    rows = [
-        (
-            float(event.tick),
-            event.kind,
-            -1.0 if event.id is None else float(event.id),
-            event.code or "",
-            event.why or "",
-        )
-        for event in recording.events
-    ]
-    return np.array(rows, dtype=[(name, object) for name in names])
 
 
 def _csv_on_the_web(recording: Recording, path: Path) -> bytes:
@@ -164,7 +127,5 @@ def _reason(error: Exception) -> str:
 FORMATS: dict[str, Callable[[Recording, IO[bytes]], None]] = {
     "csv": _write_csv,
     "parquet": _write_parquet,
-    "npz": _write_npz,
-    "mat": _write_mat,
 }
 """Formats, each with the function that writes it; a file's ending is the format's name."""

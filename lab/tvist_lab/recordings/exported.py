@@ -1,4 +1,4 @@
-"""Recordings from Parquet, npz and mat: those of `tvist log export`, and others with columns of RTDE's names."""
+"""Recordings from Parquet that `tvist log export` wrote, and Parquet and npz with columns of RTDE's names."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +21,7 @@ class ExportedError(RecordingError):
 
 
 def read_exported(path: Path, needs: Needs = ROBOT, names: str | None = None) -> Recording:
-    """Read a table in Parquet, arrays that NumPy saved, or a MAT-file of version 4 to 7, by the ending of its name.
+    """Read a table in Parquet, or arrays that NumPy saved, by the ending of its name.
 
     Args:
         path: The file.

@@ -11,14 +11,14 @@ from tvist_plant.user_file import UserFileError, check_is_file
 
 SHOWN = 4096
 """Number of first bytes by which text is told from packets."""
-TABLES = (".parquet", ".npz", ".mat")
+TABLES = (".parquet", ".npz")
 """Endings of the names of files with named arrays."""
 
 
 def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs = ROBOT) -> Recording:
     """Read a recording of this controller, or a log of another one.
 
-    Recordings: MCAP, and what `tvist log export` writes (CSV, Parquet, npz, mat). Logs: CSV with RTDE's names, dumps of
+    Recordings: MCAP, and what `tvist log export` writes (CSV, Parquet). Logs: CSV with RTDE's names, dumps of
     UR's port 30003, rosbag2 in MCAP (a file, or its folder). CSV and dumps may be compressed by gzip.
 
     Args:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tvist_lab.recordings import Floats
-from tvist_lab.runners import Runner, TaskError
+from tvist_lab.runners import TaskError
 from tvist_lab.study.arms import ARMS
 from tvist_lab.study.case import Case
 from tvist_lab.study.engine import made
@@ -129,13 +129,13 @@ def jobs(
     ]
 
 
-def play(jobs: Sequence[Job], runner: Runner | None = None) -> Iterator[tuple[Row, ...]]:
-    """Do all jobs in order, by default on all cores of this machine; a method that fails has rows that say why.
+def play(jobs: Sequence[Job]) -> Iterator[tuple[Row, ...]]:
+    """Do all jobs in order, on all cores of this machine; a method that fails has rows that say why.
 
     Raises:
         TaskError: Something else than a method failed.
     """
-    for rows in made(jobs, runner, measure_each):
+    for rows in made(jobs, measure_each):
         for row in rows:
             if row["status"] == FAILED and fault_of(row) is None:
                 raise TaskError(row["error"])

@@ -12,32 +12,26 @@ from typing import Any
 import msgspec
 import polars as pl
 
-from tvist_lab.runners import Failed, Processes, Runner, in_order
+from tvist_lab.runners import Failed, in_order
 from tvist_lab.study.columns import Schema, frame
 from tvist_lab.study.store import Store
 from tvist_lab.study.work import FAILED, Job, Row, failed, measure, measure_each, why
 
 PART = 32
 """Number of jobs in a part: at most as many are lost when the program is killed."""
-AT_ONCE = 8
-"""Motions that a process makes before it returns results; less than twice as many do not justify another process."""
+FEW = 16
+"""Largest number of motions that do not justify another process."""
 
 
-def made(
-    jobs: Sequence[Job],
-    runner: Runner | None = None,
-    work: Callable[[Job], tuple[Row, ...]] = measure,
-) -> Iterator[tuple[Row, ...]]:
-    """Make all jobs; yield the rows of each in order, as soon as they are available.
+def made(jobs: Sequence[Job], work: Callable[[Job], tuple[Row, ...]] = measure) -> Iterator[tuple[Row, ...]]:
+    """Make all jobs on all cores of this machine; yield the rows of each in order, as soon as they are available.
 
     Args:
         jobs: The jobs.
-        runner: What runs them; None for all cores of this machine.
         work: `measure`, which fails with the first method that does, or `measure_each`.
     """
     motions = max((job.motions for job in jobs), default=1)
-    here = Processes(few=max(2 * AT_ONCE // motions, 2), chunk=max(AT_ONCE // motions, 1))
-    return in_order(runner or here, work, jobs)
+    return in_order(work, jobs, few=max(FEW // motions, 2))
 
 
 @dataclass(frozen=True)
@@ -118,6 +112,10 @@ class Ran:
     """What the others took."""
 
 
+Runner = Callable[[Callable[[Job], Done], Sequence[Job]], Iterator[tuple[int, Done | Failed]]]
+"""`tvist_lab.runners.outcomes` with an executor."""
+
+
 def run(plan: Plan, folder: Path, runner: Runner, begin: Callable[[int], Callable[[int], None]]) -> Ran:
     """Run the jobs that are missing or failed, and write all rows.
 
@@ -150,7 +148,7 @@ def _run(
     kept: list[Row] = []
     pending = 0
     try:
-        for index, outcome in runner.run(do, missing) if missing else ():
+        for index, outcome in runner(do, missing) if missing else ():
             if isinstance(outcome, Failed):
                 rows = failed(missing[index], FAILED, why(outcome.error))
             else:

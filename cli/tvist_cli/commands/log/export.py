@@ -1,4 +1,4 @@
-"""`tvist log export`: write a recording as CSV, Parquet, npz or mat, or with an arm that Foxglove draws."""
+"""`tvist log export`: write a recording as CSV or Parquet, or with an arm that Foxglove draws."""
 
 from pathlib import Path
 
@@ -16,14 +16,13 @@ def export(
     logs: LogOptions = AS_IT_IS,
     json: bool = False,
 ) -> None:
-    """Write a recording or a log as CSV, Parquet, npz or mat, in full precision, or a recording for Foxglove.
+    """Write a recording or a log as CSV or Parquet, in full precision, or a recording for Foxglove.
 
     Args:
         file: A recording, or any log that tvist log analyze reads.
-        to: csv, parquet, npz, mat or foxglove. A vector becomes columns NAME_0, NAME_1, ... in CSV and Parquet, and one
-            array in npz and mat. Units, events and info go along; those of a CSV into FILE.csv-metadata.json. With
-            foxglove, the recording is written with channels for the 3D panel of Foxglove and Lichtblick, and beside it
-            a layout for both.
+        to: csv, parquet or foxglove. A vector becomes columns NAME_0, NAME_1, ... Units, events and info go along;
+            those of a CSV into FILE.csv-metadata.json. With foxglove, the recording is written with channels for the
+            3D panel of Foxglove and Lichtblick, and beside it a layout for both.
         output: File to write or replace [FILE with its ending replaced, such as run.csv or run.foxglove.mcap for
             run.mcap, if there is none yet].
         logs: How to read logs.

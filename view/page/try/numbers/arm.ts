@@ -158,7 +158,7 @@ export interface ArmRun {
   stopped: number;
 }
 
-/** One motion of the arm, as `tvist lesson --numbers` makes it; `shaper` null: unshaped. */
+/** One motion of the arm, as the packages simulate it; `shaper` null: unshaped. */
 export function run(arm: ArmParameters, start: number[], target: number[], shaper: Shaper | null, estimator: Estimator, after = AFTER): ArmRun {
   const way = pointToPoint(start, target, arm.limits, arm.period);
   const filter = shaper && new Filter(shaper, estimator, start, arm.period);

@@ -1,4 +1,9 @@
-"""The same motion of a UR5e through several filters: elastic feed-forward, and a varying mean delay."""
+"""`python -m tools.figures`: draws `elastic.png` and `mean_delay.png`, two figures of the documents.
+
+Both show a motion of a UR5e through several filters: elastic feed-forward, and a varying mean delay.
+"""
+
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,6 +21,7 @@ from tvist_controller.api.line import (
     quickest_motion,
 )
 from tvist_controller.api.robot import truth_of
+from tvist_lab.figures import FigureFiles
 from tvist_lab.figures.style import ALPHA, OF_ALPHA, OF_SHAPED, OF_THIRD, OF_UNSHAPED, dashed, legend, panels
 from tvist_lab.recordings import Floats
 from tvist_plant.description import load
@@ -23,6 +29,7 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping import BUILT_IN
 from tvist_shaping.base import Filter
 
+IMAGES = Path(__file__).parents[1] / "docs" / "images"
 LIMITS = MotionLimits(1.5, 2.0, 100.0)
 SHOWN = (-0.12, 0.4)
 """Times shown of the rest after elastic feed-forward, from the stop of the unshaped reference [s]."""
@@ -133,3 +140,13 @@ def _shape(tvist: Filter, start: Floats, end: Floats) -> tuple[Floats, Floats]:
         references.append(tvist.filter(motion.next()))
         delays.append(tvist.mean_delay)
     return np.array(delays), np.array(references)
+
+
+def main() -> None:
+    """Write both files."""
+    for name, figure in (("elastic", elastic_figure()), ("mean_delay", mean_delay_figure())):
+        print(FigureFiles(IMAGES, "png").write(figure, name))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,9 +1,9 @@
-"""Lesson 2: what changes with the pose, and why one fixed shaper is not enough."""
+"""Lesson 1: what changes with the pose, and why one fixed shaper is not enough."""
 
 import marimo
 
 __generated_with = "0.25.2"
-app = marimo.App(app_title="2: What changes with the pose")
+app = marimo.App(app_title="1: What changes with the pose")
 
 with app.setup:
     import marimo as mo
@@ -21,7 +21,7 @@ with app.setup:
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    # 2: What changes with the pose
+    # 1: What changes with the pose
 
     **You learn** how much the frequency and the damping of a UR5e change while it moves, and why a shaper that is
     designed once cannot serve its whole workspace.
@@ -93,7 +93,7 @@ def _(estimator):
     mo.md(
         "The paper's poses: "
         + "; ".join(f"{key} {f[0]:.1f} Hz, $\\zeta$ = {z[0]:.2f}" for key, (f, z) in _named.items())
-        + ". Lesson 3 moves between them."
+        + "."
     )
     return
 

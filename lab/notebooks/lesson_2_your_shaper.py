@@ -1,9 +1,9 @@
-"""Lesson 4: a shaper of your own, judged on moves of the simulated arm."""
+"""Lesson 2: a shaper of your own, judged on moves of the simulated arm."""
 
 import marimo
 
 __generated_with = "0.25.2"
-app = marimo.App(app_title="4: Your own shaper")
+app = marimo.App(app_title="2: Your own shaper")
 
 with app.setup:
     import math
@@ -26,7 +26,7 @@ with app.setup:
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    # 4: Your own shaper
+    # 2: Your own shaper
 
     **You learn** to write an input shaper, to see whether it works on an arm and not only on paper, and what
     robustness is worth when the frequency is not known exactly.
@@ -81,7 +81,12 @@ def _(own, rival):
     _panel.axhline(5.0, color=INK, linewidth=0.8, linestyle="--")
     _panel.set(xlabel="True over assumed frequency", ylabel="Swing that remains (%)", ylim=(0, 60))
     legend(_figure, _panel)
-    mo.vstack([mo.md("## Look at it\n\nThis is lesson 1's formula, for a damping ratio of 0.2."), _figure])
+    mo.vstack(
+        [
+            mo.md("## Look at it\n\nThis is by the formula for one mode, for a damping ratio of 0.2."),
+            _figure,
+        ]
+    )
     return
 
 
@@ -116,7 +121,7 @@ def _(count, draw):
 def _(calibration, moves, own, robot):
     def try_on_moves(name, frequency_error):
         """Each move unshaped and shaped, where the shaper is told a frequency that is too high by a share."""
-        known = (OwnShaper("lesson_4_your_shaper.py", "mine", "", own),)
+        known = (OwnShaper("lesson_2_your_shaper.py", "mine", "", own),)
         method = Named(Recipe(name, calibration, frequency_error, own=known), name)
         return [measure(Job(Case(robot, move), (method,)))[0] for move in moves]
 

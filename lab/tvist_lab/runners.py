@@ -1,0 +1,186 @@
+"""Run the same work on many tasks by any executor: processes of this machine, or a cluster."""
+
+import multiprocessing
+import multiprocessing.resource_tracker
+import pickle
+import signal
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from queue import SimpleQueue
+from typing import Any, TypeVar
+
+from tvist_plant.user_file import named
+from tvist_server.ending import end_with_parent, signals_held
+from tvist_server.punctual import processors
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+AHEAD = 1024
+"""Largest number of tasks handed out at a time: more than a cluster has processes, few enough to keep in memory."""
+OF_TERMINAL = {signal.SIGINT, signal.SIGHUP, signal.SIGQUIT}
+"""Signals that reach all processes of a terminal, from its keys or at its end; the first process ends the others."""
+
+
+class TaskError(Exception):
+    """A task gave no result for a reason that is not an exception of the work itself; the message gives it."""
+
+
+@dataclass(frozen=True)
+class Failed:
+    """Why a task gave no result."""
+
+    error: Exception
+    """What the work raised, or a `TaskError`."""
+
+
+def outcomes(
+    executor: Executor, work: Callable[[Task], Result], tasks: Sequence[Task]
+) -> Iterator[tuple[int, Result | Failed]]:
+    """Yield the index of each task with its result or failure, in any order, each as soon as it is available.
+
+    A task that fails, or cannot be pickled, gives a failure, and the others continue. No result depends on the order,
+    on the number of processes, or on other tasks.
+
+    Args:
+        executor: What does the tasks.
+        work: A module-level function; each task contains all it needs, and no state is kept between tasks.
+        tasks: Tasks; they and their results are pickled. Each is taken from the sequence when its turn comes.
+
+    Raises:
+        ChildProcessError: A process of a pool died, such as for want of memory.
+        ConnectionError: The executor has dropped a task, as a cluster's does without its scheduler.
+    """
+    out: dict[Future[bytes], int] = {}
+    arrived: SimpleQueue[Future[bytes]] = SimpleQueue()
+    following = 0
+    try:
+        while out or following < len(tasks):
+            while following < len(tasks) and len(out) < AHEAD:
+                task = tasks[following]
+                try:
+                    packed = pickle.dumps(task)
+                except Exception as error:  # noqa: BLE001  what a task contains may raise anything
+                    yield following, Failed(TaskError(f"it cannot be pickled: {named(error)}"))
+                else:
+                    with signals_held():  # a process that this starts must get all that it needs to begin
+                        future = executor.submit(_attempt, work, packed)
+                    out[future] = following
+                    future.add_done_callback(arrived.put)
+                following += 1
+            if out:
+                future = arrived.get()
+                yield out.pop(future), _outcome(future)
+    except BrokenExecutor:
+        raise ChildProcessError("a process died while it did a task; perhaps memory ran out") from None
+    except CancelledError:
+        raise ConnectionError("the executor has dropped its tasks; perhaps its scheduler has gone") from None
+
+
+def in_order(work: Callable[[Task], Result], tasks: Sequence[Task], few: int = 8) -> Iterator[Result]:
+    """Do tasks on all cores of this machine; yield each result as soon as it and all before it are available.
+
+    Args:
+        work: See `outcomes`.
+        tasks: See `outcomes`.
+        few: Largest number of tasks that are done in this process, since starting others takes seconds.
+
+    Raises:
+        Exception: What the first task that failed has raised.
+    """
+    number = min(processors(), len(tasks))
+    if number <= 1 or len(tasks) <= few:
+        yield from map(work, tasks)
+        return
+    early: dict[int, Result | Failed] = {}
+    following = 0
+    with processes(number) as pool:
+        for index, outcome in outcomes(pool, work, tasks):
+            early[index] = outcome
+            while following in early:
+                one = early.pop(following)
+                if isinstance(one, Failed):
+                    raise one.error
+                following += 1
+                yield one
+
+
+@contextmanager
+def processes(number: int | None = None) -> Iterator[Executor]:
+    """Start processes of this machine, which end with the body, whatever ends it.
+
+    Args:
+        number: Number of processes; None for one for each core.
+    """
+    _start_tracker()
+    others = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(number or processors(), multiprocessing.get_context("spawn"), _begin)
+    try:
+        yield pool
+    except BaseException:  # what the processes still do is of no use
+        for process in set(multiprocessing.active_children()) - others:
+            process.terminate()
+        raise
+    finally:
+        # Without waiting, the pool's thread may meet the end of this process half way.
+        pool.shutdown(cancel_futures=True)
+
+
+def _begin() -> None:
+    """Let this process end when the one that hands out the work does, and not before."""
+    for number in OF_TERMINAL:
+        signal.signal(number, signal.SIG_IGN)
+    end_with_parent()
+
+
+def _start_tracker() -> None:
+    """Start the process by which multiprocessing cleans up, so that a closed terminal does not end it.
+
+    By itself it ignores Control+C alone; it inherits what this thread has blocked.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_TERMINAL)
+    try:
+        multiprocessing.resource_tracker.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _attempt(work: Callable[[Any], Any], packed: bytes) -> bytes:
+    """Do a task in a process for work: unpickle it, do it, and pickle its outcome."""
+    try:
+        outcome = work(pickle.loads(packed))  # noqa: S301  it comes from the process that started this one
+    except Exception as error:  # noqa: BLE001  any failure is this task's alone
+        outcome = Failed(_portable(error))
+    try:
+        return pickle.dumps(outcome)
+    except Exception as error:  # noqa: BLE001  likewise
+        return pickle.dumps(Failed(TaskError(f"its result cannot be pickled: {named(error)}")))
+
+
+def _portable(error: Exception) -> Exception:
+    """Return an error that survives pickling, with its traceback as a note."""
+    lines = "".join(traceback.format_exception(error))
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301  these bytes are our own
+    except Exception:  # noqa: BLE001  a constructor may raise anything
+        error = TaskError(named(error))
+    error.add_note(f"In the process that did the task:\n{lines}")
+    return error
+
+
+def _outcome(future: Future[bytes]) -> Any:
+    """Return the result or failure of a task that an executor has done.
+
+    Raises:
+        BrokenExecutor: The executor does no more tasks.
+        CancelledError: It has dropped this one.
+    """
+    try:
+        return pickle.loads(future.result())  # noqa: S301  it comes from a process that does the user's own work
+    except (BrokenExecutor, CancelledError):
+        raise
+    except Exception as error:  # noqa: BLE001  a worker that cannot do the work at all
+        return Failed(error)
