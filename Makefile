@@ -15,7 +15,7 @@ DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 # The folders of what they install.
 SOURCES := cli clients controller lab protocol shaping sim_plant testing tvist_server urscript view
 
-.PHONY: acceptance checksums page docs docs-serve release setup demo notebooks test test-all lint elsewhere bench nightly soak dist format lock schemas clean
+.PHONY: acceptance checksums page docs docs-serve release setup demo notebooks test test-all lint elsewhere bench nightly search soak dist format lock schemas clean
 
 setup: $(READY)
 
@@ -56,15 +56,21 @@ elsewhere: setup
 	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 $(addprefix --package ,tvist_client tvist_protocol tvist_shaping tvist_urscript)
 
 bench: setup
-	$(BIN)/python -m proof bench
+	$(BIN)/python -m benchmarks
 
 # The tests that take minutes each or need Podman: under an hour in two processes.
 nightly: setup elsewhere
 	$(BESIDE) -m nightly --durations 20
 
+# Random cases of all that is promised of stops, streams, changes and sequences of commands, over five arms in turn.
+CASES ?= 100
+SEED ?= 0
+search: setup
+	$(BESIDE) -m search --cases $(CASES) --seed $(SEED)
+
 # Those, and a search for an hour of what `.ci/run` searches for a minute.
-soak: nightly
-	$(BIN)/python -m proof search --stops 2000 --streams 500 --changes 500 --sequences 3000 --flexible --robot ur3e ur5e ur16e ur30 tests/plant/urdf/seven.urdf
+soak: CASES = 2000
+soak: nightly search
 
 # The clients of other projects, and what docs/reference/ur-clients.md says of them. SOURCES and BUILD of UR's C++ library: see
 # tests/acceptance/urcl.py, which needs root.

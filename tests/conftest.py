@@ -17,6 +17,10 @@ def pytest_addoption(parser):
     )
     parser.addoption("--quick", action="store_true", help="run what is quick by durations.json")
     parser.addoption("--turn", help="run what is quick, and every n-th of the other cases: 1/2 or 2/2")
+    parser.addoption(
+        "--cases", type=int, default=5, help="number of cases of each test with the mark `search`"
+    )
+    parser.addoption("--seed", type=int, default=0, help="seed of these cases")
 
 
 def pytest_configure(config):

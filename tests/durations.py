@@ -80,12 +80,16 @@ def _function(nodeid):
 
 
 def arrange(items):
-    """Let one process have each file's tests, one have all that need the clock, and the longest group begin first."""
+    """Let one process have each file's tests, one have all that need the clock, and the longest group begin first.
+
+    The cases of a search go to any process.
+    """
     seconds = kept()
     took = defaultdict(float)
     for item in items:
         file, _ = _function(item.nodeid)
-        group = CLOCK if item.get_closest_marker("realtime") else file
+        group = item.nodeid if item.get_closest_marker("search") else file
+        group = CLOCK if item.get_closest_marker("realtime") else group
         item.add_marker(pytest.mark.xdist_group(group))
         took[group] = max(took[group], sum(seconds.get(file, {OTHERS: 10.0}).values()))
     took[CLOCK] = float("inf")

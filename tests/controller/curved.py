@@ -1,8 +1,8 @@
 """Robots that move along curves, of which the wire has none yet."""
 
 import numpy as np
-from proof.search.draws import SHAPERS
-from proof.search.subject import Subject
+from tests.search.draws import SHAPERS
+from tests.search.subject import Subject
 
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.planning.filter_planner import FilterPlanner

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from proof.search.draws import postures
-from proof.search.subject import RigidArm
+from tests.search.draws import postures
+from tests.search.subject import RigidArm
 
 from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.controller import Controller

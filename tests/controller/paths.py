@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from proof.search.subject import Subject, torques
+from tests.search.subject import Subject, torques
 
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
 from tvist_controller.line.limits import TORQUE_SHARE
@@ -32,9 +32,9 @@ class Journey:
     def payload(self):
         return paper_payload(UR5E, self.mass)
 
-    def begin(self, *, flexible: bool = False) -> Subject | None:
+    def begin(self) -> Subject | None:
         """A robot that has just accepted the path; None if it refuses it."""
-        robot = Subject(UR5E, self.q, self.payload, shaper=self.shaper, flexible=flexible)
+        robot = Subject(UR5E, self.q, self.payload, shaper=self.shaper)
         robot.send(SetTcp, offset=TOOL)
         robot.send(c.SetSpeed, fraction=self.speed)
         return robot if isinstance(robot.send(MovePath, **self.path), Accepted) else None

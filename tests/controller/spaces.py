@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from proof.search.subject import Subject
 from scipy.spatial.transform import Rotation, Slerp
+from tests.search.subject import Subject
 
 from tvist_controller.setup import paper_payload
 from tvist_plant.description import Payload

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from proof.search.draws import SHAPERS
-from proof.search.subject import Subject, torques
+from tests.search.draws import SHAPERS
+from tests.search.subject import Subject, torques
 
 from tvist_controller.trajectory import Bends, JointLine, MotionLimits, quickest_motion
 from tvist_protocol import commands as c

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from proof.search.draws import SHAPERS
-from proof.search.stops import KINDS, PAUSES
-from proof.search.subject import Subject
+from tests.search.draws import SHAPERS
+from tests.search.stops import KINDS, PAUSES
+from tests.search.subject import Subject
 
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CollisionModel

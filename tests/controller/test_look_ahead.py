@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from proof.search import changes, streams
+from tests.search import changes, streams
 
 from tvist_controller.about import info_of
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from proof.search.draws import SHAPERS
-from proof.search.stops import KINDS, PAUSES
+from tests.search.draws import SHAPERS
+from tests.search.stops import KINDS, PAUSES
 
 from tvist_controller.foresight.line_copy import resting_after
 from tvist_protocol.commands import MoveJ, Pause, Resume, SetPayload, Stop

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from proof.search.draws import SHAPERS
-from proof.search.subject import Subject
 from scipy.spatial.transform import Rotation
 from tests.plant.arms import chain
+from tests.search.draws import SHAPERS
+from tests.search.subject import Subject
 
 from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.setup import paper_payload

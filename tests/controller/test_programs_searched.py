@@ -1,4 +1,4 @@
-"""What random sequences of commands with programs (`python -m proof search --sequences`) have found, reduced."""
+"""What random sequences of commands with programs (`make search`) have found, reduced."""
 
 import numpy as np
 import pytest

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from proof.search.stops import draw, judge
+from tests.search.stops import draw, judge
 
 from tvist_controller.trajectory import JointLine, JointStop, MotionLimits, PathStop, quickest_motion
 from tvist_protocol import commands as c

@@ -1,99 +1,87 @@
-"""A hidden robot with errors of its torque sensors, which makes random motions and becomes another in between."""
+"""A hidden robot whose payload or springs change while it runs, and whose sensors are not those of its file."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.api.line import Setup, body, load_calibration, paper_payload
-from tvist_controller.api.robot import Controller
-from tvist_lab.workspace import WORKSPACE
-from tvist_plant.description import Payload, load
+from tvist_plant.description import Payload
+from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.hidden import hidden, hidden_payload
-from tvist_plant.plant import Measurement
+from tvist_plant.plant import PERIOD, Measurement
 from tvist_plant.variants import stiffer
-from tvist_protocol.commands import MoveJ, TakeControl
-from tvist_protocol.replies import Accepted
 
 CONSTANTS = 0.05
 """Largest relative error of a joint's torque constant [-]."""
-RIPPLE = (0.01, 24 * 101)
-"""Amplitude of the torque's ripple over the joint's torque limit [-], and its waves per turn of the joint."""
-SPEEDS = ((0.6, 1.0, 50.0), (1.05, 1.4, 100.0), (1.5, 2.0, 100.0), (1.5, 3.0, 200.0))
-"""Velocity, acceleration and jerk of the motions [rad/s, rad/s², rad/s³]."""
+RIPPLE = (0.01, 24)
+"""Amplitude of the torque's ripple over the joint's torque limit [-], and its waves per turn of the motor."""
+GEAR = 101
+"""Turns of a motor per turn of its joint."""
+DRIFT = (0.2, 300.0)
+"""Share by which friction drifts either way, and the time of a whole period of it [-, s]."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """What becomes of an arm without a word."""
+
+    mass: float = 0.0
+    """Mass that is added to what the arm carries [kg]."""
+    springs: float = 1.0
+    """Factor of the stiffness of all gears and links [-]."""
 
 
 class ChangingArm:
-    def __init__(self, description, said, seed):
-        self._description, self._seed, self.payload = hidden(description, seed), seed, said
-        self._carried = hidden_payload(said, seed)
-        random, n = np.random.default_rng([seed, 67]), description.joints
-        self._gains = 1.0 + random.uniform(-CONSTANTS, CONSTANTS, n)
-        self._phases = random.uniform(0.0, 2.0 * np.pi, n)
-        self._ripple = RIPPLE[0] * np.array(description.limits.torque)
-        self.become()
+    """A hidden robot with errors of its torque sensors, which can be changed while it rests; a `Placeable` plant."""
 
-    def become(self, mass=0.0, springs=1.0):
-        """Carry so much more from now on, with gears and links that are stiffer by this factor."""
+    def __init__(self, description, said, seed):
+        self._description, self._seed = hidden(description, seed), seed
+        self._carried, self.payload = hidden_payload(said, seed), said
+        random, limits = np.random.default_rng([seed, 67]), np.array(description.limits.torque)
+        n = description.joints
+        self._gains = 1.0 + random.uniform(-CONSTANTS, CONSTANTS, n)
+        self._ripple = RIPPLE[0] * limits
+        self._phases, self._friction_phase = random.uniform(0.0, 2.0 * np.pi, (2, n))
+        self._friction = np.array(self._description.drives.coulomb_friction)
+        self._width = self._description.drives.friction_width
+        self._ticks = 0
+        self._last: DriveCommand | None = None
+        self._arm = self._made(Change())
+
+    def _made(self, change):
+        description = stiffer(self._description, change.springs)
+        mass = self._carried.mass + change.mass
         carried = self._carried
-        heavier = Payload(mass=carried.mass + mass, com=carried.com, inertia=carried.inertia)
-        self._arm = FlexibleArm(stiffer(self._description, springs), heavier)
+        if change.mass:
+            like = carried if carried.mass > 0.25 else self._description.payload
+            xx, xy, xz, yy, yz, zz = (mass / like.mass * one for one in like.inertia)
+            carried = Payload(mass=mass, com=like.com, inertia=(xx, xy, xz, yy, yz, zz))
+        return FlexibleArm(description, carried)
+
+    def change(self, change):
+        """Make another arm of it, which rests where it rested."""
+        assert self._last is not None, "it has been placed"
+        self._arm = self._made(change)
+        self._arm.reset(self._last, seed=self._seed + self._ticks)
 
     def reset(self, command, *, payload=None, seed=0):
-        self.payload = self.payload if payload is None else payload
+        """Put the arm at rest."""
+        if payload is not None:
+            self.payload, self._carried = payload, hidden_payload(payload, self._seed)
+            self._arm = self._made(Change())
+        self._last = command
         return self._read(self._arm.reset(command, seed=seed))
 
     def step(self, command):
-        self.last = command
+        """Move the arm by one period."""
+        self._ticks += 1
+        self._last = command
         return self._read(self._arm.step(command))
 
     def _read(self, measured):
-        ripple = self._ripple * np.sin(RIPPLE[1] * measured.q + self._phases)
-        return Measurement(
-            measured.q, measured.qd, self._gains * measured.moment + ripple, measured.accelerometer
-        )
-
-
-class Worker:
-    """A robot with such an arm; `states` has the state after each tick."""
-
-    def __init__(self, seed):
-        description, self._random = load("ur5e"), np.random.default_rng([seed, 73])
-        payload = paper_payload(description, float(self._random.uniform(0.5, 3.0)))
-        self.arm = ChangingArm(description, body(payload), seed)
-        setup = Setup(
-            description=description, q=description.poses["Q1"], payload=payload,
-            calibration=load_calibration("ur5e_modal"), shaper="none", clock="free", seed=seed,
-        )  # fmt: skip
-        self.controller = Controller(setup, self.arm)
-        self._token = self.controller.receive(TakeControl(client="test")).token
-        self.states = []
-
-    def change(self, **becomes):
-        self.arm.become(**becomes)
-        self.arm.reset(self.arm.last, seed=len(self.states))
-
-    def move(self):
-        """Make a random motion, and rest."""
-        while not isinstance(self.controller.receive(self._drawn()), Accepted):
-            pass
-        self._tick()
-        while not self.controller.cycle.mode.at_rest:
-            self._tick()
-        for _ in range(int(self._random.integers(150, 400))):
-            self._tick()
-
-    def _drawn(self):
-        here = np.array(self.controller.latest.reference_q)
-        away = self._random.uniform([*WORKSPACE.low, -2.0, -2.0], [*WORKSPACE.high, 2.0, 2.0]) - here
-        q = here + self._random.uniform(0.3, 1.0) * away
-        velocity, acceleration, jerk = SPEEDS[self._random.integers(len(SPEEDS))]
-        return MoveJ(
-            token=self._token,
-            q=tuple(q.tolist()),
-            velocity=velocity,
-            acceleration=acceleration,
-            jerk=jerk,
-        )
-
-    def _tick(self):
-        self.controller.tick()
-        self.states.append(self.controller.latest)
+        """Return what its sensors show: a drive with more friction also needs more torque."""
+        share, period = DRIFT
+        drift = share * np.sin(2.0 * np.pi * self._ticks * PERIOD / period + self._friction_phase)
+        torque = measured.moment + drift * self._friction * np.tanh(measured.qd / self._width)
+        ripple = self._ripple * np.sin(RIPPLE[1] * GEAR * measured.q + self._phases)
+        return Measurement(measured.q, measured.qd, self._gains * torque + ripple, measured.accelerometer)

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.lab.changing_arm import Worker
+from tests.lab.changing_arm import Change
+from tests.lab.worker import Worker
 
 from tvist_lab.metrics import Measured, changes, motions
 from tvist_lab.recordings import Recording
@@ -17,11 +18,11 @@ COLUMNS = (
 PEOPLE = "look whether mount, base, a joint or the tool is loose, or whether another tool is on."
 
 
-def recorded(before=8, after=4, **becomes):
-    worker = Worker(4)
+def recorded(change, before=8, after=4):
+    worker = Worker("ur5e", 4)
     for number in range(before + after):
         if number == before:
-            worker.change(**becomes)
+            worker.arm.change(change)
         worker.move()
     columns = {
         name: np.array([getattr(state, name) for state in worker.states], dtype=float) for name in COLUMNS
@@ -34,7 +35,7 @@ def recorded(before=8, after=4, **becomes):
 
 
 def test_a_payload_that_was_picked_up_is_told_with_its_mass():
-    said = changes(recorded(mass=2.0))
+    said = changes(recorded(Change(mass=2.0)))
     (mass,) = [one for one in said if "kg" in one]
     number, more = re.match(
         r"After motion (\d+), the arm carries about ([\d.]+) kg more than in", mass
@@ -43,14 +44,14 @@ def test_a_payload_that_was_picked_up_is_told_with_its_mass():
     assert float(more) == pytest.approx(2.0, abs=0.6)
 
 
-def test_softer_gears_are_told_with_the_joint():
-    said = [one for one in changes(recorded(springs=0.7)) if "the gear of the " in one]
+def test_springs_that_have_become_softer_are_told():
+    said = [one for one in changes(recorded(Change(springs=0.7))) if "the gear of the " in one]
     assert said
     assert all(int(re.match(r"After motion (\d+),", one)[1]) > 8 and "% softer" in one for one in said)
 
 
 def test_of_an_arm_that_stays_as_it_was_nothing_is_told():
-    assert changes(recorded(after=2)) == []
+    assert changes(recorded(Change(), after=2)) == []
 
 
 def by_hand(f_d, poses):

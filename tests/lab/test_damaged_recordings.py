@@ -56,22 +56,12 @@ def _part(kind, data=b""):
     return struct.pack("<BQ", kind, len(data)) + data
 
 
-BOMBS = {
-    "empty records": (_part(0x50), 1, 10**7),
-    "empty records of many chunks": (_part(0x50), 10_000, 1000),
-    "messages": (_part(Opcode.MESSAGE, bytes(22)), 1, 10**6),
-    "zeros": (_part(0x50, bytes(10**8)), 1, 1),
-    "zeros of many chunks": (_part(0x50, bytes(10**6)), 10_000, 1),
-}
-
-
-@pytest.mark.parametrize("kind", BOMBS)
-def test_a_chunk_holds_no_more_than_its_size_allows(kind, tmp_path):
-    part, chunks, repeated = BOMBS[kind]
-    data = part * repeated
+@pytest.mark.parametrize(("size", "count"), [(0, 10**7), (30, 10**6), (10**8, 1)])
+def test_a_chunk_holds_no_more_than_its_size_allows(size, count, tmp_path):
+    data = _part(Opcode.MESSAGE, bytes(size)) * count
     packed = zstandard.compress(data)
     head = struct.pack("<QQQII", 0, 0, len(data), 0, 4) + b"zstd" + struct.pack("<Q", len(packed))
     path = tmp_path / "bomb.mcap"
-    path.write_bytes(MAGIC + _part(Opcode.HEADER, bytes(8)) + _part(Opcode.CHUNK, head + packed) * chunks)
+    path.write_bytes(MAGIC + _part(Opcode.HEADER, bytes(8)) + _part(Opcode.CHUNK, head + packed))
     with path.open("rb") as stream, pytest.raises(DAMAGE, match="a chunk of"):
         list(records(stream))

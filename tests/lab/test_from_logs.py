@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from proof.logs.everyday import everyday_logs, unseen
+from tests.lab.everyday import everyday_logs, unseen
 
 from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.identification.design import predicted

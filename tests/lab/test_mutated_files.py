@@ -4,6 +4,7 @@ A child process reads them under limits of its processor time and memory, so tha
 memory without end, ends the child and not the tests. The file at fault remains in the child's folder.
 """
 
+import io
 import os
 import resource
 import signal
@@ -284,8 +285,7 @@ def _read_recording(path):
 
 def _run_commands(path):
     """What a user does with a log: each command ends well or refuses in one line, whatever the others do."""
-    import contextlib
-    import io
+    from contextlib import redirect_stdout, suppress
 
     from tvist_cli.commands.log import analyze, export, replay
     from tvist_cli.failure import Failure
@@ -296,7 +296,7 @@ def _run_commands(path):
         refused = []
         for command, options in commands.items():
             _limit_time()
-            with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+            with redirect_stdout(io.StringIO()), suppress(SystemExit):
                 try:
                     command(path, **options)
                 except Failure as failure:

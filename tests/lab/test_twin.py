@@ -5,8 +5,8 @@ import asyncio
 import numpy as np
 import pytest
 from msgspec.structs import replace
-from proof.logs.everyday import everyday_logs
 from scipy.spatial.transform import Rotation
+from tests.lab.everyday import everyday_logs
 
 from tvist_controller.api.line import paper_payload
 from tvist_lab.identification.observed import mounting_of, observe, repeated

@@ -1,7 +1,7 @@
 """A link between a client and a robot that can be cut, held up, delayed and made slow."""
 
-from proof.bridge.relay import Relay
 from tests.places import free_port
+from tests.system.relay import Relay
 
 
 class Proxy(Relay):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tools.one_mass import STEP, swing
+from tests.view.one_mass import STEP, swing
 
 frequencies, dampings = st.floats(3.0, 10.0), st.floats(0.0, 0.3)
 

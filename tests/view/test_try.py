@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.view import page_numbers
 from tests.view.browser import browser
-from tools import try_page
 
 from tvist_shaping.catalogue import SHAPERS
 
@@ -14,7 +14,6 @@ ROOT = Path(__file__).parents[2]
 FILE = ROOT / "view" / "tvist_view" / "try.html"
 SOURCES = ROOT / "view" / "page" / "try"
 PATIENCE_MS = 60_000.0
-CHECKED = json.loads((try_page.MADE / "checked.json").read_text())
 
 
 @pytest.fixture(scope="module")
@@ -54,65 +53,56 @@ def close(found, wanted, most=1e-9):
     assert np.abs(np.array(found) - np.array(wanted)).max() <= most
 
 
-def test_what_the_page_is_checked_by_is_what_the_packages_say_now():
-    now = json.loads(json.dumps(try_page.checked()))
-    assert now["shapers"].keys() == CHECKED["shapers"].keys()
-    for name, rows in now["shapers"].items():
-        for row, kept in zip(rows, CHECKED["shapers"][name], strict=True):
-            for key, values in row.items():
-                close(values, kept[key])
-    for one, kept in zip(now["motions"], CHECKED["motions"], strict=True):
-        close(one["link"], kept["link"])
-
-
 def test_the_page_has_every_row_of_the_catalogue(numbers):
     assert numbers.evaluate("tried.missing") == []
-    assert list(CHECKED["shapers"]) == list(SHAPERS)
+    assert numbers.evaluate("Object.keys(tried.SHAPERS)") == list(SHAPERS)
 
 
-@pytest.mark.parametrize("name", CHECKED["shapers"])
+@pytest.mark.parametrize("name", SHAPERS)
 def test_a_shaper_is_that_of_the_library(numbers, name):
-    for row in CHECKED["shapers"][name]:
+    for mode in page_numbers.MODES:
+        true, wanted = page_numbers.of_shaper(name, *mode)
         found = numbers.evaluate(
             """([name, [f_d, zeta], f]) => { const made = tried.SHAPERS[name](f_d, zeta);
             return { ...made, residual: f.map((one) => tried.residual(one, zeta, made)) }; }""",
-            [name, row["mode"], row["f"]],
+            [name, mode, true],
         )
-        for key in ("A", "tau", "residual"):
-            close(found[key], row[key])
+        for key, values in wanted.items():
+            close(found[key], values)
     found = numbers.evaluate("(name) => tried.band(tried.SHAPERS[name](1, 0), 1, 0, 0.05)", name)
-    assert found == pytest.approx([float(end) for end in CHECKED["bands"][name]], abs=1e-9, nan_ok=True)
+    assert found == pytest.approx(SHAPERS[name].band(0.05), abs=1e-9, nan_ok=True)
 
 
 def test_the_filter_is_that_of_the_library(numbers):
+    samples, wanted = page_numbers.filtered()
     found = numbers.evaluate(
         """(samples) => { const mode = tried.following(tried.parameters);
         const one = new tried.Filter(tried.SHAPERS.zvd, mode, [0.1, 2.5], 0.002);
         return samples.map((sample) => one.filter(sample)); }""",
-        CHECKED["filter"]["samples"],
+        samples,
     )
-    close(found, CHECKED["filter"]["shaped"])
+    close(found, wanted)
 
 
 def test_the_mass_swings_as_the_lesson_says(numbers):
-    wanted = CHECKED["swing"]
     found = numbers.evaluate(
         "([mode, believed]) => tried.swing(...mode, tried.SHAPERS.zv(...believed))",
-        [wanted["mode"], wanted["believed"]],
+        page_numbers.SWING,
     )
-    for key in ("reference", "deflection"):
-        close(found[key][:: try_page.EVERY], wanted[key])
+    for key, wanted in page_numbers.swung().items():
+        close(found[key], wanted)
 
 
-@pytest.mark.parametrize("motion", CHECKED["motions"], ids=lambda one: f"{one['shaper']} {one['estimator']}")
+@pytest.mark.parametrize("motion", page_numbers.MOTIONS, ids=lambda one: f"{one[0]} {one[1]}")
 def test_a_whole_motion_is_that_of_the_simulated_arm(numbers, motion):
+    wanted = page_numbers.moved(*motion)
     found = numbers.evaluate(
-        """({ shaper, estimator, start, target }) => { const arm = tried.parameters;
+        """([shaper, estimator, start, target]) => { const arm = tried.parameters;
         const mode = estimator === "following" ? tried.following(arm) : tried.fixed(...tried.modeOf(arm, Math.PI / 2));
         return tried.run(arm, start, target, tried.SHAPERS[shaper], mode, 500).link; }""",
         motion,
     )
-    close(found[:: try_page.EVERY][: len(motion["link"])], motion["link"])
+    close(found[: len(wanted)], wanted)
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (390, 844)])

@@ -4,7 +4,6 @@ The modules behind it may change; a study of moves imports nothing else of this 
 """
 
 from tvist_controller.calibrations import available as calibrations
-from tvist_controller.calibrations import default_for as default_calibration
 from tvist_controller.calibrations import estimator_of
 from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.calibrations.modal import drivetrain, mass_matrix, modal_estimator
@@ -50,7 +49,6 @@ __all__ = [
     "calibrations",
     "central_differences",
     "choose_filter",
-    "default_calibration",
     "drivetrain",
     "elastic_feed_forward",
     "estimator_of",

@@ -300,9 +300,9 @@ class Ring:
     def colour(self, left: Floats, frequencies: Floats) -> Floats:
         """Power of a residual at some frequencies over that of white noise, at least 1, by autoregression."""
         left = left.reshape(self.alpha.shape)
-        lags = np.array([float(np.sum(left[lag:] * left[: len(left) - lag])) for lag in range(COLOURS + 1)])
-        if len(left) < 8 * COLOURS or lags[0] <= 0.0:
+        if len(left) < 8 * COLOURS or not np.sum(left * left) > 0.0:
             return np.ones(len(frequencies))
+        lags = np.array([float(np.sum(left[lag:] * left[: len(left) - lag])) for lag in range(COLOURS + 1)])
         filtered = solve_toeplitz(lags[:-1] + lags[0] * 1e-6 * (np.arange(COLOURS) == 0), lags[1:])
         turns = np.exp(-2j * np.pi * np.outer(frequencies * self.period, np.arange(1, COLOURS + 1)))
         innovation = (lags[0] - float(filtered @ lags[1:])) / lags[0]

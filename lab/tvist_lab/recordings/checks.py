@@ -61,7 +61,9 @@ def check_numbers(path: Path, columns: Mapping[str, Floats], places: Places) -> 
         if len(strange := np.argwhere(np.abs(values) > most)):
             row, *entry = strange[0].tolist()
             where = f"{path}, {places[0]} {places[1][row]:.0f}, column {'_'.join([name, *map(str, entry)])}"
-            raise LogError(f"{where}: {values[(row, *entry)]:g} is no number of a robot")
+            raise LogError(
+                f"{where}: {values[(row, *entry)]:g} in SI units is no number of a robot: at most {most:g}"
+            )
 
 
 def check_period(path: Path, period: float) -> None:

@@ -71,7 +71,7 @@ def analyze(
     except (RecordingError, NotMeasurableError) as error:
         if json:
             print_json({**about, "motions": []})
-        raise Failure(str(error)) from error
+        raise Failure(f"{file}: {error}") from error
     if json:
         print_json({**about, **measured})
 

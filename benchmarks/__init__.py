@@ -1,0 +1,1 @@
+"""Speed, each figure beside a reference from the same run; part of no distribution."""

@@ -1,0 +1,71 @@
+"""Processor time of ticks beside MuJoCo's: of plant, filter, Figure 6 and the whole line."""
+
+from collections.abc import Mapping
+
+from benchmarks.figure import Figure, Tell, figure, in_alternation
+from tvist_controller.api.line import body
+from tvist_lab.bench import moving
+from tvist_lab.bench.moving import Run
+from tvist_lab.in_process import free_setup
+from tvist_plant.plant import PERIOD
+from tvist_plant.world.second_opinion import SecondOpinion
+
+REPETITIONS = 20
+MUJOCO_STEP = 0.00025
+"""Step at which MuJoCo agrees with our plant [s]."""
+
+
+def line(tell: Tell) -> dict[str, Figure]:
+    """Measure the line and its parts."""
+    tell("the line and its parts beside MuJoCo")
+    parts = {
+        "plant": ("2 ms of the flexible arm", moving.plant_tick()),
+        "filter": ("the filter zv with its estimator", _filter_tick()),
+        "cycle": ("Figure 6 with zv: trajectory to plant", moving.cycle_tick()),
+        "line": ("the line with zv: messages to encoded state", moving.line_tick("zv")),
+        "line_auto": ("the line with auto", moving.line_tick("auto")),
+        "line_elastic": ("the line with elastic", moving.line_tick("elastic")),
+    }
+    figures, found = _beside_mujoco(parts)
+    ours, theirs = ([1e6 * PERIOD / taken for taken in found[name]] for name in ("line", "mujoco"))
+    ahead, arms = "robots that a core computes in real time", "arms that a core computes with MuJoCo"
+    return {**figures, "realtime_factor": figure(ahead, "", ours, arms, theirs)}
+
+
+def streams(tell: Tell) -> dict[str, Figure]:
+    """Measure the line while it is fed with set-points."""
+    tell("streams of set-points beside MuJoCo")
+    parts = {
+        f"stream_{rate}_hz": (
+            f"the line with zv and set-points at {rate} Hz",
+            moving.stream_tick(500 // rate),
+        )
+        for rate in (500, 125)
+    }
+    return _beside_mujoco(parts)[0]
+
+
+def _beside_mujoco(parts: Mapping[str, tuple[str, Run]]) -> tuple[dict[str, Figure], dict[str, list[float]]]:
+    setup = free_setup(truth=False)
+    mujoco = moving.arm_tick(SecondOpinion(setup.description, body(setup.payload), MUJOCO_STEP))
+    runs = {"mujoco": mujoco, **{key: run for key, (_, run) in parts.items()}}
+    found = in_alternation(runs, REPETITIONS)
+    figures = {
+        f"{key}_us_per_tick": figure(said, "µs", found[key], "MuJoCo's tick", found["mujoco"])
+        for key, (said, _) in parts.items()
+    }
+    return figures, found
+
+
+def _filter_tick() -> Run:
+    tvist, references = moving.line_filter(free_setup(truth=False)), moving.motion()
+
+    def go() -> None:
+        for q in references:
+            tvist.filter(q)
+
+    def run() -> float:
+        tvist.reset(references[0])
+        return moving.us_per_tick(go)
+
+    return run

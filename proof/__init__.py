@@ -1,1 +1,0 @@
-"""What proves the project's own claims, and no user runs: `python -m proof` from a checkout."""

@@ -1,1 +1,0 @@
-"""Whether what is advised from a log comes true."""

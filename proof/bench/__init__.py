@@ -1,1 +1,0 @@
-"""Speed of each part and of served robots beside references, and long runs."""

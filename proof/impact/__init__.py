@@ -1,1 +1,0 @@
-"""What shaping does to impact and to settling on a surface."""

@@ -1,1 +1,0 @@
-"""What logs of everyday motions tell of hidden robots."""

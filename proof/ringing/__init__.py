@@ -1,1 +1,0 @@
-"""Judge the modes that the laboratory finds in a ring-down, by another method and by ringing whose truth is known."""

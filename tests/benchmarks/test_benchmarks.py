@@ -1,0 +1,91 @@
+"""Figures beside their references, and what the benchmarks make of them."""
+
+import json
+
+import numpy as np
+import pytest
+from benchmarks.__main__ import main
+from benchmarks.figure import figure, in_alternation, median_interval
+from benchmarks.lateness import compared, mean_interval
+
+
+def test_the_interval_of_a_median_holds_it_as_often_as_it_says():
+    chance = np.random.default_rng(0)
+    held = [
+        low <= 0.0 <= high for _, low, high in (median_interval(chance.normal(size=20)) for _ in range(2000))
+    ]
+    assert 0.95 <= np.mean(held) <= 0.98  # order statistics hold it a little more often
+
+
+def test_a_ratio_is_that_of_each_repetition_so_that_a_drift_of_the_machine_cancels_out():
+    drift = np.linspace(1.0, 3.0, 20)
+    one = figure("ours", "µs", 0.5 * drift, "theirs", drift)
+    assert (one.compared, one.low, one.high) == (0.5, 0.5, 0.5)
+
+
+def test_there_is_no_ratio_to_nothing():
+    assert figure("ours", "", [1.0, 2.0], "theirs", [0.0, 0.0]).compared is None
+
+
+def test_repetitions_alternate_forwards_and_backwards_after_a_first_one_that_does_not_count():
+    order = []
+    taken = in_alternation({name: lambda name=name: order.append(name) or len(order) for name in "ab"}, 2)
+    assert "".join(order) == "ababba"
+    assert taken == {"a": [3, 6], "b": [4, 5]}
+
+
+@pytest.mark.parametrize(("often", "ticks"), [(0.02, 1.0), (0.3, 5.0)])
+def test_the_interval_of_rare_misses_holds_their_mean(often, ticks):
+    chance, held = np.random.default_rng(0), []
+    for _ in range(60):
+        missed = 0.05 * chance.poisson(often, 200) * chance.geometric(1.0 / ticks, 200)
+        low, high = mean_interval(missed, 0.05)
+        held.append(low <= 0.05 * often * ticks <= high)
+    assert np.mean(held) >= 0.85
+
+
+def test_that_nothing_was_missed_proves_only_what_the_rule_of_three_says():
+    low, high = mean_interval([0.0] * 300, 0.05)
+    assert -low == pytest.approx(high)
+    assert high == pytest.approx(0.05 * 3 / 300, rel=0.01)
+
+
+def test_a_robot_is_compared_with_the_thread_by_the_mean_of_the_pairs():
+    found = compared([(0.2, 0.1), (0.1, 0.1)], 4.0)
+    assert found["pairs"] == 2
+    assert (found["robot_percent"], found["bare_percent"]) == pytest.approx((0.15, 0.1))
+    assert found["difference_points"] == pytest.approx(0.05)
+    assert found["lower_end_points"] <= 0.05 <= found["upper_end_points"]
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["--only", "lines"], "invalid choice: 'lines'"),
+        (["--seconds", "-1"], "is -1: must be 0 to 86400"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(words, why, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2
+    assert why in capsys.readouterr().err
+
+
+@pytest.mark.nightly
+def test_each_figure_of_what_is_computed_comes_with_its_reference(capsys):
+    assert main(["--seconds", "0", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert {"plant_us_per_tick", "filter_us_per_tick", "line_us_per_tick", "realtime_factor"} <= said.keys()
+    for key, one in said["figures"].items():
+        assert one["value"] == said[key] > 0.0
+        assert one["low"] <= one["compared"] <= one["high"]
+
+
+@pytest.mark.nightly
+@pytest.mark.realtime
+@pytest.mark.parametrize("part", ["reader", "rtde", "lateness", "bridge"])
+def test_the_parts_that_serve_robots_measure_something(part, capsys):
+    assert main(["--only", part, "--seconds", "2", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["figures"] or said[part]

@@ -1,0 +1,113 @@
+"""How well `tvist identify --plant` finds hidden robots that take positions alone, at poses that it never visited."""
+
+import asyncio
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from msgspec.structs import replace as with_fields
+from tests.bridge.in_lockstep import HiddenRobot, Link, Port
+
+from tvist_controller.api.line import body, modal_estimator
+from tvist_controller.api.robot import OwnPlant
+from tvist_lab.identification.modal_plan import ModalPlan
+from tvist_lab.identification.positioned import JOG, identify_moved, make_moves, plan_moves
+from tvist_lab.in_process import free_setup, robot_in_process
+from tvist_lab.workspace import identified, ranges
+from tvist_plant.description import load
+from tvist_plant.variants import hidden_variant
+from tvist_server.moving.servo_lag import ServoLag, Setpoints
+
+SPEED = 0.5
+"""Speed cap [rad/s]."""
+STANDS = (0.2, -1.3, 1.4, -1.7, -1.5, 0.1)
+"""Where the arm stands at first [rad]."""
+BEGINS = 100
+"""Ticks until the program follows."""
+PLACES = 60
+"""Number of unseen configurations of each robot."""
+
+
+class Rows(Port):
+    """The same with rows at a lower rate: measurements are those of every so many periods."""
+
+    def __init__(self, every, *more):
+        super().__init__(*more)
+        self._every, self._seen = every, self.measure()
+
+    def step(self, command):
+        """Send the set-point, and return the latest row."""
+        row = super().step(command)
+        if self.counts.ticks % self._every == 0:
+            self._seen = row
+        return self._seen
+
+
+async def identified_in_lockstep(description, hidden, every):
+    """Identify one hidden robot behind the program, a link and our control line, as fast as it computes."""
+    name = description.robot.name
+    setup = free_setup(robot=name, truth=False, shaper="none", calibration="none")
+    q, payload = np.array(STANDS), setup.payload
+    reach = np.array(description.limits.position)
+
+    def port(*_):
+        robot = HiddenRobot(description, hidden, q, payload)
+        robot.follow(SPEED)
+        return Rows(every, robot, Setpoints(q, None, fastest=1.04 * SPEED, reach=reach), Link(), hidden)
+
+    limits = with_fields(description.limits, velocity=(SPEED,) * description.joints)
+    drives = with_fields(description.drives, windup_feedforward=(0.0,) * description.joints)
+    capped = with_fields(description, limits=limits, drives=drives)
+    whole = replace(setup, description=capped, q=tuple(q.tolist()), plant=OwnPlant("lockstep", "", port))
+    async with robot_in_process(whole) as robot, robot.control("identify") as control:
+        await robot.advance(BEGINS)
+        moves = await plan_moves(robot, description, ModalPlan(seed=hidden, jog=JOG))
+        moved = await make_moves(robot, control, moves, lambda _: None)
+    return identify_moved(moves, moved, name="found", command="tvist identify", progress=lambda _: None)
+
+
+def unseen(description, hidden, declared, seed):
+    """Return configurations, and frequency and damping ratio of the lowest mode of the hidden robot there.
+
+    It is linearised at rest. There a gear whose twist has turned back is as stiff as its hysteresis makes it.
+    """
+    stiffer = 1.0 + description.imperfections.get("hysteresis", 0.0)
+    drives = description.drives
+    stiff = with_fields(drives, gear_stiffness=tuple(stiffer * K for K in drives.gear_stiffness))
+    arm: Any = hidden_variant(hidden).make(with_fields(description, drives=stiff), body(declared), 0)
+    places = identified(ranges(description)).random(PLACES, description.joints, seed + 1000)
+    found = [(q, arm.modes(q)) for q in places]
+    return [(q, float(modes.f_d[0]), float(modes.zeta[0])) for q, modes in found]
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("every", [1, 4])
+@pytest.mark.parametrize(("name", "hidden"), [("ur5e", 11), ("ur5e", 12), ("ur5-light", 13)])
+def test_a_robot_that_takes_positions_alone_is_known_where_it_was_never_visited(
+    name, hidden, every, measured
+):
+    description = load(name)
+    done = asyncio.run(identified_in_lockstep(description, hidden, every))
+    calibration, servo, true = done.found.calibration, done.servo, ServoLag.simulated()
+    estimator = modal_estimator(calibration, description, calibration.payload, 1)
+    errors, sure = [], []
+    for q, f_d, zeta in unseen(description, hidden, calibration.payload, hidden):
+        own_f_d, own_zeta = (values[0] for values in estimator.estimate(q))
+        known = done.found.forecast.at(q, 0)
+        errors.append(np.abs(np.log((own_f_d / f_d, own_zeta / zeta))))
+        sure.append((known.f_d_error[0], known.zeta_error[0]))
+    median, p90 = 100.0 * np.quantile(errors, (0.5, 0.9), axis=0)
+    held = 100.0 * np.mean(np.array(errors) < 1.96 * np.array(sure), axis=0)
+    for what, value in {
+        "ring-downs": done.found.used, "time [s]": done.seconds, "known [%]": done.found.known_percent,
+        "f_d, median [%]": median[0], "f_d, p90 [%]": p90[0], "f_d, interval holds [%]": held[0],
+        "ζ, median [%]": median[1], "ζ, p90 [%]": p90[1], "ζ, interval holds [%]": held[1],
+        "lag of servoj [%]": np.nan if servo is None else 100.0 * (servo.lag / true.time - 1.0),
+        "gain of servoj [%]": np.nan if servo is None else 100.0 * (servo.gain / true.gain - 1.0),
+    }.items():  # fmt: skip
+        measured(what, f"{value:.3g}")
+    assert done.found.used <= 12
+    assert done.seconds <= 300.0
+    assert p90[0] <= (4.0 if every == 1 else 9.0)
+    assert p90[1] <= (25.0 if every == 1 else 50.0)

@@ -1,0 +1,160 @@
+"""Streams of set-points to the floor, to the arm itself and to limits, ended at random."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from tests.search import draws
+from tests.search.draws import WITHIN
+from tests.search.subject import CLIENT, SESSION, Subject, refused, speeds
+
+from tvist_controller.api.line import CLEARANCE, CollisionModel, JointLine, body, paper_payload
+from tvist_lab.recordings import Floats
+from tvist_plant.plant import PERIOD
+from tvist_protocol import commands as c
+from tvist_protocol.simulation import SimulationInject
+
+LENGTH = 3.0
+"""Duration of a stream unless something ends it [s]."""
+
+ENDS: dict[str, Callable[[Subject], object]] = {
+    "silence": lambda _: None,
+    "servo_stop": lambda robot: robot.send(c.ServoStop),
+    "stop": lambda robot: robot.send(c.Stop),
+    "stranger's stop": lambda robot: robot.send(c.Stop, token=None, deceleration=1.0),
+    "token gone": lambda robot: robot.controller.client_gone(CLIENT, SESSION),
+    "power off": lambda robot: robot.send(c.PowerOff),
+    "protective stop": lambda robot: robot.send(SimulationInject, fault="protective_stop"),
+    "emergency stop": lambda robot: robot.send(SimulationInject, fault="emergency_stop"),
+    "safeguard stop": lambda robot: robot.send(SimulationInject, fault="safeguard_stop"),
+}
+"""Ways to end a stream."""
+BEYOND = 1e-8
+"""By so much the filter's interpolation may overshoot a reference that stops at the end of a joint's range [rad]."""
+
+
+@dataclass(frozen=True)
+class StreamCase:
+    """One stream."""
+
+    seed: int
+    start: Floats
+    towards: Floats
+    mass: float
+    shaper: str
+    period: float
+    velocity: float
+    acceleration: float
+    jerk: float
+    end: str
+    ends_at: float
+    """Time at which it is ended [s]."""
+    lost: float
+    """Share of the set-points that are not sent [-]."""
+    wave: float
+    """Amplitude of a superimposed sine [rad]."""
+
+
+@dataclass(frozen=True)
+class StreamOutcome:
+    """Outcome of a stream."""
+
+    case: StreamCase
+    near: float
+    """How much the reference violated the clearance between two bodies; must be 0 or less [m]."""
+    beyond: float
+    """Largest excess over a joint's range; must be 0 or less [rad]."""
+    speeds: tuple[float, float]
+    """Largest velocity and acceleration of a joint, relative to its limits; must be `WITHIN` or less [-]."""
+    counted: bool
+    """Whether set-points were counted as limited if many were faster than the stream's limit."""
+
+    @property
+    def kept(self):
+        """Whether every figure is within its bound."""
+        return self.near <= 0.0 and self.beyond <= BEYOND and max(self.speeds) <= WITHIN and self.counted
+
+
+def draw(description, seed):
+    """Return a case by its number; most cases lead to a meeting."""
+    random = np.random.default_rng([seed, 12])
+    collisions = CollisionModel(description, body(paper_payload(description, 0.0)))
+    mass = draws.mass(description, random)
+    collisions.declare(body(paper_payload(description, mass)))
+    while True:
+        start, towards = draws.postures(description, random, 2)
+        if random.random() < 0.5:  # through the floor
+            towards[1] = start[1] + random.choice([-1.0, 1.0]) * random.uniform(1.0, 3.0)
+        if collisions.meeting(start) is not None:
+            continue
+        if random.random() < 0.2 or collisions.on_way(JointLine(start, towards).whole) is not None:
+            break
+    return StreamCase(
+        seed=seed,
+        start=start,
+        towards=towards,
+        mass=mass,
+        shaper=draws.shaper(description, random),
+        period=float(random.choice([0.002, 0.002, 0.008, 0.02])),
+        **draws.limits(description, random),
+        end=str(random.choice(list(ENDS))),
+        ends_at=float(random.uniform(0.05, LENGTH)),
+        lost=float(random.choice([0.0, 0.0, 0.05, 0.3])),
+        wave=float(random.choice([0.0, 0.05])),
+    )
+
+
+def eased(share):
+    """Share of a way from rest to rest that is covered after a share of its time [-]."""
+    share = min(share, 1.0)
+    return share * share * (3.0 - 2.0 * share)
+
+
+def judge(description, case):
+    """Send the stream, and check the result."""
+    random = np.random.default_rng([case.seed, 13])
+    robot = Subject(
+        description, case.start, paper_payload(description, case.mass), shaper=case.shaper,
+        clock="realtime",
+    )  # fmt: skip
+    reply = robot.send(
+        c.ServoStart,
+        period=case.period,
+        velocity=case.velocity,
+        acceleration=case.acceleration,
+        jerk=case.jerk,
+    )
+    assert not refused(reply), reply
+    way, every = case.towards - case.start, max(round(case.period / PERIOD), 1)
+    duration = float(np.abs(way).max()) / case.velocity * random.uniform(0.8, 2.0) + 0.1
+    reach = np.array(description.limits.position)
+    sent: list[Floats] = []
+    for tick in range(round(LENGTH / PERIOD)):
+        if tick == round(case.ends_at / PERIOD):
+            ENDS[case.end](robot)
+            if case.end == "silence":
+                break
+        if not robot.controller.motion.streaming:
+            break
+        if tick % every == 0 and random.random() >= case.lost:
+            time = tick * PERIOD
+            bump = case.wave * np.sin(20.0 * time) * min(5.0 * time, 1.0)
+            q = case.start + eased(time / duration) * way + bump
+            sent.append(np.clip(q, -reach, reach))
+            robot.setpoint(tick // every, sent[-1])
+        robot.tick()
+    robot.until_rest(5000)
+    robot.tick(20)
+    references = np.array(robot.references)
+    steps = (
+        np.abs(np.diff(sent, axis=0)).max(axis=1) / case.period if case.lost == 0.0 and len(sent) > 1 else []
+    )
+    rushed = np.count_nonzero(np.greater(steps, 1.5 * case.velocity)) > 10
+    collisions = CollisionModel(description, body(paper_payload(description, case.mass)))
+    return StreamOutcome(
+        case=case,
+        near=CLEARANCE - collisions.nearest(references),
+        beyond=float((np.abs(references) - reach).max()),
+        speeds=speeds(description, references),
+        counted=robot.controller.motion.streams.counters()[2] > 0 or not rushed,
+    )

@@ -1,0 +1,68 @@
+"""Numbers of the packages, with which those of the page for trying shaping are compared."""
+
+import numpy as np
+from tests.view.one_mass import swing
+
+from tvist_controller.api.line import DrivenLine, respond
+from tvist_lab.one_joint.closed_form import FlexibleShoulder
+from tvist_lab.study.line import RESTING, Unchanged, point_to_point
+from tvist_plant.description import load
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_shaping import Fixed, TvistFilter, residual, shaper
+from tvist_shaping.catalogue import SHAPERS
+
+MODES = ((1.0, 0.0), (6.7, 0.034), (14.3, 0.11), (4.2, 0.19))
+"""Modes at which every shaper is compared: f_d [Hz] and ζ [-], within the range of all."""
+RATIOS = (0.5, 0.8, 0.93, 1.0, 1.1, 1.37)
+"""True frequencies over assumed ones at which the residual is compared [-]."""
+AFTER = 350
+"""Ticks at rest at the end of a motion of the arm."""
+MOTIONS = (
+    ("none", "following", (-1.3, 2.6), (0.0, 0.52)),
+    ("zv", "following", (-1.3, 2.6), (0.0, 0.52)),
+    ("zv", "fixed", (0.4, 0.5), (-0.7, 2.4)),
+    ("ei", "following", (0.0, 2.6), (1.0, 1.57)),
+    ("um_zv", "following", (0.2, 1.0), (0.25, 0.9)),
+)
+"""Shaper, estimator, and the angles at which a motion begins and ends [rad]."""
+SWING = (4.3, 0.05), (5.0, 0.05)
+"""f_d [Hz] and ζ of the mass, and those for which its shaper is designed."""
+
+
+def of_shaper(name, f_d, zeta):
+    """Impulses, and the residual at some true frequencies, which come first."""
+    made, true = SHAPERS[name].impulses(f_d, zeta), f_d * np.array(RATIOS)
+    return true.tolist(), {"A": made.A, "tau": made.tau, "residual": residual(true, zeta, made)}
+
+
+def filtered():
+    """Samples of two joints, and the same shaped by a filter whose mode follows them."""
+    description = load("one-joint")
+    estimator = FlexibleShoulder.of(description, description.payload).estimator()
+    tvist = TvistFilter(shaper("zvd"), estimator, joints=2)
+    tvist.reset([0.1, 2.5])
+    time = np.linspace(0.0, 1.0, 200)
+    samples = np.stack([0.1 + np.sin(3.0 * time), 2.5 - 2.0 * time**2], axis=1)
+    return samples.tolist(), [tvist.filter(sample).tolist() for sample in samples]
+
+
+def swung():
+    """Reference and deflection of the mass."""
+    one = swing(*SWING[0], SWING[1])
+    return {"reference": one.reference, "deflection": one.deflection}
+
+
+def moved(name, estimator, start, target):
+    """Angles of the arm's links in one of `MOTIONS`."""
+    description = load("one-joint")
+    arm = FlexibleArm(description, description.payload)
+    formula = FlexibleShoulder.of(description, description.payload)
+    f_d, zeta = formula.mode(float(np.pi / 2.0))
+    mode = formula.estimator() if estimator == "following" else Fixed([f_d], [zeta])
+    tvist = TvistFilter(shaper(name), mode, joints=2)
+    tvist.reset(start)
+    reference = point_to_point(np.array(start), np.array(target))
+    rest = np.tile(reference[-1], (AFTER, 1))
+    shaped = tvist.filter_all(np.concatenate([reference, rest]))
+    line = DrivenLine(description, Unchanged(2), np.array(start), description.payload)
+    return respond(arm, line.drive(np.array(start), shaped, RESTING + len(shaped), RESTING), 0).measured.q
