@@ -7,10 +7,11 @@ from tests.plant.arms import frames
 
 from tvist_controller.line.differentiator import Differentiator, Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.joint_controllers import JointControllers
+from tvist_controller.line.joint_controllers import JointControllers, command_drives
 from tvist_controller.line.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import Payload
+from tvist_plant.drives import DriveCommand
 
 from .robots import Q1, Q2, Q3, UR5E, H, cut
 
@@ -131,13 +132,19 @@ def test_torques_are_the_callers_own():
 # ---------------------------------------------------------------- joint controllers
 
 
+def command_of(controllers, target, torque, gravity):
+    command = np.empty((3, len(torque)))
+    command_drives(target.q, np.array([target.qd, target.qdd]), torque, gravity, controllers.rows, command)
+    return DriveCommand(*command)
+
+
 def commanded(description, *targets):
     """Last of several drive commands, with torque and gravity as inverse dynamics gives them."""
     dynamics = InverseDynamics(description, body(paper_payload(description)))
     controllers = JointControllers(description, H)
     for target in targets:
         torque, gravity = dynamics.torque(target.q, target.qd, target.qdd), dynamics.gravity(target.q)
-        command = controllers.command(target, torque, gravity)
+        command = command_of(controllers, target, torque, gravity)
     return command, torque, gravity
 
 
@@ -181,9 +188,9 @@ def test_at_rest_the_command_is_the_position_and_gravity():
 
 def test_a_reset_forgets_the_wind_up():
     controllers, still = JointControllers(UR5E, H), np.zeros(6)
-    controllers.command(Target(Q1, still, still), np.full(6, 50.0), still)
+    command_of(controllers, Target(Q1, still, still), np.full(6, 50.0), still)
     controllers.reset(still)
-    assert not controllers.command(Target(Q1, still, still), still, still).qd.any()
+    assert not command_of(controllers, Target(Q1, still, still), still, still).qd.any()
 
 
 # ---------------------------------------------------------------- kinematics

@@ -23,7 +23,11 @@ def angles(description, drive):
 
 def other_angles(description, drive, timestep):
     other = second_opinion(description, description.payload, timestep)
-    return np.array([other.reset(drive[0]), *(other.step(command) for command in drive[1:])])
+    angles = [other.reset(drive[0])]
+    for command in drive[1:]:
+        other.step(command)
+        angles.append(other.q)
+    return np.array(angles)
 
 
 @pytest.mark.parametrize("kind", ["friction", "clean"])

@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.friction import LAWS, friction_at
 from tvist_plant.description import RobotDescription
-from tvist_plant.drives import DriveCommand
 
 ROTOR, COMPLIANCE, YIELDING, COULOMB, VISCOUS, WIDTH, PER_SECOND, WINDUP, LAW = range(9)
 """Rows of the parameters of each joint: rotor inertia B [kg m^2], c_w/K_g [rad/(N m)], 1/K_g if the sag is compensated
@@ -106,15 +105,3 @@ class JointControllers:
     def sag(self, gravity: Floats) -> Floats | None:
         """Lead by which the motors compensate the twist under gravity, shape (n,) [rad]; None if they do not."""
         return np.asarray(self.rows[YIELDING] * gravity) if self._sags else None
-
-    def command(self, target: Target, torque: Floats, gravity: Floats) -> DriveCommand:
-        """Drive command for a target.
-
-        Args:
-            target: Shaped reference and its derivatives.
-            torque: τ* of the rigid arm, shape (n,) [N m].
-            gravity: The part of the torque that balances gravity, shape (n,) [N m].
-        """
-        command = np.empty((3, len(torque)))
-        command_drives(target.q, np.array([target.qd, target.qdd]), torque, gravity, self.rows, command)
-        return DriveCommand(*command)

@@ -52,7 +52,7 @@ class MujocoArm:
         Raises:
             PlantError: The state is no longer finite.
         """
-        self._arm.step_compiled(command)
+        self._arm.step(command)
         measured = self._measure()
         if not math.isfinite(self._force.dot(self._force)):
             raise PlantError("the state of the arm in MuJoCo is no longer finite")

@@ -97,12 +97,11 @@ class SecondOpinion:
         self._integral_gain = (
             self._velocity_gain * np.array(drives.position_gain) * np.array(drives.integral_gain)
         )
-        self._friction = np.array(drives.coulomb_friction) * (not drives.linear_friction)
-        self._friction_width = drives.friction_width
+        friction = np.array(drives.coulomb_friction) * (not drives.linear_friction)
         self._gear_stiffness = np.array(drives.gear_stiffness)
-        width = np.full(description.joints, self._friction_width)
+        width = np.full(description.joints, drives.friction_width)
         self._laws = np.array(
-            [self._velocity_gain, self._position_gain, self._integral_gain, self._friction, width]
+            [self._velocity_gain, self._position_gain, self._integral_gain, friction, width]
         )
         self._model = arm_spec(description, payload, timestep).compile() if model is None else model
         self.data = data = mujoco.MjData(self._model)
@@ -141,8 +140,8 @@ class SecondOpinion:
         self._s = (gravity[self._joints] - command.torque) / self._integral_gain
         return self.q
 
-    def step_compiled(self, command: DriveCommand) -> None:
-        """Simulate 2 ms as `step` does, with the drives' law in compiled code: half of the time."""
+    def step(self, command: DriveCommand) -> None:
+        """Simulate 2 ms while the drives approach the command linearly."""
         self._move(np.array([command.q, command.qd, command.torque]))
 
     def _move(self, end: Floats) -> None:
@@ -159,7 +158,7 @@ class SecondOpinion:
         self._command = end
 
     def play(self, commands: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
-        """Simulate many periods, each as `step_compiled` does.
+        """Simulate many periods, each as `step` does.
 
         Args:
             commands: Rows q_r, q̇_r and τ_ff of each command, shape (T, 3, n).
@@ -181,26 +180,6 @@ class SecondOpinion:
         moments = self._moments(commands, angles[:, self._motors], speeds[:, self._motors], sums)
         q, qd = angles[:, self._joints], speeds[:, self._joints]
         return q, qd, moments, force, position, turned.reshape(T, 3, 3)
-
-    def step(self, command: DriveCommand) -> Floats:
-        """Simulate 2 ms while the drives approach the command linearly; return link-side q, shape (n,) [rad]."""
-        start, end = self._command, np.array([command.q, command.qd, command.torque])
-        data, self._evaluated = self.data, False
-        for k in range(self._steps):
-            q_r, qd_r, torque = start + (k + 0.5) / self._steps * (end - start)
-            angle, speed = data.qpos[self._motors], data.qvel[self._motors]
-            slack = self._friction * (speed / self._friction_width - np.tanh(speed / self._friction_width))
-            data.qfrc_applied[self._motors] = (
-                torque
-                + self._velocity_gain * qd_r
-                + self._position_gain * (q_r - angle)
-                + self._integral_gain * self._s
-                + slack
-            )
-            self._s += self._timestep * (q_r - angle)
-            mujoco.mj_step(self._model, data)
-        self._command = end
-        return self.q
 
     def flange(self) -> tuple[Floats, Floats]:
         """Specific force in the flange frame [m/s^2], shape (3,), and its orientation, shape (3, 3)."""
