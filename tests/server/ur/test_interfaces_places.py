@@ -1,6 +1,7 @@
 """Who gets a place at the interfaces, over real sockets: those who say nothing keep nobody out."""
 
 import asyncio
+import re
 import struct
 
 import pytest
@@ -126,7 +127,8 @@ async def test_for_a_newcomer_the_one_that_has_been_silent_for_longest_goes(late
     await readers(desk, 228)
     await connect(desk, "realtime")  # of 256 places 231 are taken
     assert await is_cut_off(old)
-    assert "silent for 70 s, was closed to make room for the client 127.0.0.1" in caplog.text
+    # Seventy seconds that it jumped, and what the 231 connections took.
+    assert re.search(r"silent for 7\d s, was closed to make room for the client 127.0.0.1", caplog.text)
     await desk.tick()
     assert await package(served) == b"U"
     assert await lines(recent, writer, "robotmode") == ["Robotmode: RUNNING"]
