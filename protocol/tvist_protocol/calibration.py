@@ -24,16 +24,14 @@ class PolynomialModel(_Part, frozen=True, kw_only=True):
 
     joints: Annotated[tuple[Annotated[int, Meta(ge=0, le=6)], ...], Meta(min_length=1, max_length=7)]
     """Indices of the joints that they depend on, 0 for the first."""
-    basis: Literal["angles", "trigonometric"]
-    """Monomials in the scaled angles, or trigonometric polynomials, which repeat with every turn."""
+    basis: Literal["trigonometric"] = "trigonometric"
+    """Trigonometric polynomials, which repeat with every turn."""
     degree: Annotated[int, Meta(ge=0, le=12)]
     """Highest total degree."""
     centre: Annotated[tuple[Angle, ...], Meta(min_length=1, max_length=7)] | None = None
     """Angles that are subtracted from the joint angles [rad]; null: zeros."""
-    scale: (
-        Annotated[tuple[Annotated[float, Meta(gt=0, le=1e3)], ...], Meta(min_length=1, max_length=7)] | None
-    ) = None
-    """Divisors of the angles after that [rad]; null: ones."""
+    scale: None = None
+    """Null: the angles are not scaled. Recordings have it."""
     f_d_coefficients: Coefficients
     """Coefficients of f_d, one per term [Hz]."""
     zeta_coefficients: Coefficients

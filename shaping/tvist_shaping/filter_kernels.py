@@ -84,9 +84,7 @@ def shape(
 def weigh(
     q: Floats,
     joints: Integers,
-    trigonometric: bool,
     centre: Floats,
-    scale: Floats,
     multiples: Integers,
     coefficients: Floats,
     ranges: Floats,
@@ -106,9 +104,7 @@ def weigh(
     Args:
         q: Joint angles that this sample represents, shape (n,) [rad].
         joints: Indices of the joints that the estimator knows, shape (k,).
-        trigonometric: Whether its basis is trigonometric.
         centre: Its centre [rad], shape (k,).
-        scale: Its scale [rad], shape (k,).
         multiples: Multiples of the angles in each term, shape (rows, k).
         coefficients: Coefficients of f_d and ζ, shape (2, terms).
         ranges: Range of f_d and range of ζ, shape (2, 2).
@@ -126,7 +122,7 @@ def weigh(
     Returns:
         1 if the estimate was clamped, 0 if not; the same minus 2 if the mode is out of range.
     """
-    clamped = evaluate(q, joints, trigonometric, centre, scale, multiples, coefficients, ranges, modes)
+    clamped = evaluate(q, joints, centre, multiples, coefficients, ranges, modes)
     found = 1 if clamped else 0
     shaped = shape(
         modes[0], modes[1], zeta_max, longest, period, train, impulses, ring, head, scratch, q_star
@@ -138,9 +134,7 @@ def weigh(
 def shape_all(
     samples: Floats,
     joints: Integers,
-    trigonometric: bool,
     centre: Floats,
-    scale: Floats,
     multiples: Integers,
     coefficients: Floats,
     ranges: Floats,
@@ -160,10 +154,8 @@ def shape_all(
 
     Args:
         samples: References, shape (T, joints) [rad].
-        joints: See `weigh`, as for the next fifteen, of which `ring` is changed.
-        trigonometric: Whether the basis is trigonometric.
+        joints: See `weigh`, as for the next thirteen, of which `ring` is changed.
         centre: Centre.
-        scale: Scale.
         multiples: Multiples of the angles.
         coefficients: Coefficients.
         ranges: Ranges.
@@ -188,7 +180,7 @@ def shape_all(
         for j in range(samples.shape[1]):
             ring[head, j] = samples[i, j]
         found = weigh(
-            q_star, joints, trigonometric, centre, scale, multiples, coefficients, ranges, zeta_max, longest, period,
+            q_star, joints, centre, multiples, coefficients, ranges, zeta_max, longest, period,
             train, impulses, ring, head, scratch, q_star, modes,
         )  # fmt: skip
         if found < 0:

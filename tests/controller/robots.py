@@ -52,7 +52,6 @@ def each(struct):
 
 POLYNOMIAL = {
     "joints": (1, 2),
-    "basis": "trigonometric",
     "degree": 1,
     # 1, then cos and sin of shoulder and elbow: 6.7 Hz at Q1 and Q2, 15 Hz at Q3, and back on the way.
     "f_d_coefficients": (10.0, 1.5, 0.0, -1.8, 3.0),

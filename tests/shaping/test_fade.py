@@ -19,10 +19,9 @@ names = st.sampled_from([n for n, entry in SHAPERS.items() if entry.zeta_max > 0
 seeds = st.integers(0, 2**32 - 1)
 VARYING = Polynomial(
     joints=[0],
-    basis="angles",
     degree=1,
-    f_d_coefficients=[6.7, 3.32],
-    zeta_coefficients=[0.34, -0.08],
+    f_d_coefficients=[11.0, -4.3, 0.0],
+    zeta_coefficients=[0.24, 0.1, 0.0],
     f_d_range=(5.0, 17.0),
     zeta_range=(0.05, 0.5),
 )

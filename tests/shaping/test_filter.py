@@ -196,7 +196,6 @@ def test_numbers_out_of_range_are_refused_by_name(numbers):
 def test_an_estimator_of_more_joints_than_there_are_is_refused_at_construction():
     elbow = Polynomial(
         joints=[2],
-        basis="angles",
         degree=0,
         f_d_coefficients=[9.0],
         zeta_coefficients=[0.2],

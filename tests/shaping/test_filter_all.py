@@ -15,7 +15,7 @@ from tvist_shaping.named import make_filter
 def estimator():
     random = np.random.default_rng(3)
     return Polynomial(
-        joints=(1, 2), basis="trigonometric", degree=2,
+        joints=(1, 2), degree=2,
         f_d_coefficients=[9.0, *random.uniform(-0.6, 0.6, 12)],
         zeta_coefficients=[0.1, *random.uniform(-0.02, 0.02, 12)],
         f_d_range=(5.0, 15.0), zeta_range=(0.01, 0.18),

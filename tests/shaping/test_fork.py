@@ -27,7 +27,7 @@ def fixed(modes):
 
 def polynomial(_modes):
     return Polynomial(
-        joints=[0], basis="angles", degree=1, f_d_coefficients=[8.0, 3.0], zeta_coefficients=[0.3, -0.1],
+        joints=[0], degree=1, f_d_coefficients=[11.0, -3.0, 2.0], zeta_coefficients=[0.25, 0.05, -0.1],
         f_d_range=(5.0, 17.0), zeta_range=(0.05, 0.5),
     )  # fmt: skip
 

@@ -24,14 +24,14 @@ def double_s():
 
 @pytest.fixture
 def modes():
-    """f_d and ζ linear in q between the paper's two configurations."""
+    """From the paper's f_d and ζ of the stretched arm to those of the bent one, with the cosine of q."""
+    bent = 1.0 - np.cos(STROKE)
+    f_d, zeta = (15.0 - 6.7) / bent, (0.14 - 0.34) / bent
     return Polynomial(
         joints=[0],
-        basis="angles",
         degree=1,
-        scale=[STROKE],
-        f_d_coefficients=[6.7, 15.0 - 6.7],
-        zeta_coefficients=[0.34, 0.14 - 0.34],
+        f_d_coefficients=[6.7 + f_d, -f_d, 0.0],
+        zeta_coefficients=[0.34 + zeta, -zeta, 0.0],
         f_d_range=(5.0, 17.0),
         zeta_range=(0.05, 0.45),
     )

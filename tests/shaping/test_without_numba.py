@@ -12,7 +12,7 @@ if sys.argv[1] == "without":
     sys.modules["numba"] = None
 import numpy as np
 from tvist_shaping import Polynomial, TvistFilter, shaper
-modes = Polynomial(joints=(0, 1), basis="trigonometric", degree=1, f_d_coefficients=[10, 1, 2, 1, 1],
+modes = Polynomial(joints=(0, 1), degree=1, f_d_coefficients=[10, 1, 2, 1, 1],
     zeta_coefficients=[0.2, 0.05, 0, 0.05, 0], f_d_range=(6, 15), zeta_range=(0.05, 0.4))
 tvist = TvistFilter(shaper("ei2"), modes, joints=2)
 t = 0.002 * np.arange(500)

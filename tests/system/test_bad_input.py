@@ -77,7 +77,7 @@ def calibration(**changes):
         "name": "mine", "robot": "UR5e",
         "payload": {"mass": 5.0, "com": [0.0, 0.0, 0.05], "inertia": [0.01, 0.0, 0.0, 0.01, 0.0, 0.01]},
         "polynomial": {
-            "joints": [1], "basis": "angles", "degree": 0, "f_d_coefficients": [10.0], "zeta_coefficients": [0.2],
+            "joints": [1], "degree": 0, "f_d_coefficients": [10.0], "zeta_coefficients": [0.2],
             "f_d_range": [5.0, 20.0], "zeta_range": [0.1, 0.4],
         },
         "provenance": {

@@ -4,8 +4,6 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-import msgspec
-
 from tvist_plant.user_file import parsed, read_bytes
 from tvist_protocol.calibration import Calibration, CalibrationError, calibration_from_json
 from tvist_protocol.values import Payload
@@ -69,7 +67,16 @@ def estimator_of(calibration: Calibration) -> Polynomial:
     """
     if calibration.polynomial is None:
         raise EstimatorError("polynomial", None, "there; this calibration is for the estimator modal alone")
-    return Polynomial(**msgspec.structs.asdict(calibration.polynomial))
+    model = calibration.polynomial
+    return Polynomial(
+        joints=model.joints,
+        degree=model.degree,
+        centre=model.centre,
+        f_d_coefficients=model.f_d_coefficients,
+        zeta_coefficients=model.zeta_coefficients,
+        f_d_range=model.f_d_range,
+        zeta_range=model.zeta_range,
+    )
 
 
 def fits(calibration: Calibration, payload: Payload, estimator: str = "polynomial") -> bool:

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -10,8 +9,6 @@ from tvist_lab.recordings import Floats
 from tvist_protocol.calibration import PolynomialModel, Spread
 from tvist_shaping import terms
 
-BASIS: Literal["trigonometric"] = "trigonometric"
-"""Polynomials in the sines and cosines of the joint angles, which are periodic and therefore bounded."""
 FOLDS = 10
 """Number of parts that the measurements are divided into for cross-validation."""
 
@@ -42,7 +39,7 @@ def check_count(configurations: int, joints: tuple[int, ...], degree: int) -> No
     Raises:
         FitError: There are fewer than one and a half times as many as coefficients.
     """
-    size = terms(np.zeros((1, max(joints) + 1)), joints=joints, basis=BASIS, degree=degree).shape[1]
+    size = terms(np.zeros((1, max(joints) + 1)), joints=joints, degree=degree).shape[1]
     needed = math.ceil(1.5 * size)
     if configurations < needed:
         raise FitError(
@@ -68,7 +65,7 @@ def fit_polynomials(
         FitError: There are fewer than one and a half times as many measurements as coefficients.
     """
     check_count(len(q), joints, degree)
-    design = terms(q, joints=joints, basis=BASIS, degree=degree)
+    design = terms(q, joints=joints, degree=degree)
     count = len(design)
     coefficients = [_solve(design, y, weights) for y in (f_d, zeta)]
     fold = np.arange(count) % FOLDS
@@ -79,7 +76,6 @@ def fit_polynomials(
             row[~seen] = design[~seen] @ _solve(design[seen], y[seen], weights[seen])
     model = PolynomialModel(
         joints=joints,
-        basis=BASIS,
         degree=degree,
         f_d_coefficients=tuple(coefficients[0].tolist()),
         zeta_coefficients=tuple(coefficients[1].tolist()),

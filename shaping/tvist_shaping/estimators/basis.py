@@ -1,24 +1,19 @@
-"""Basis functions of the joint angles for polynomial estimators.
+"""Trigonometric basis functions of the joint angles for polynomial estimators.
 
-`angles`: monomials Π u_k^{p_k} of total degree Σ p_k <= degree.
-`trigonometric`: 1, and cos(m·u), sin(m·u) for integer m ≠ 0 with Σ |m_k| <= degree; of each pair m and -m, only the
-one whose first non-zero entry is positive. It is periodic in every joint, as the arm is.
+These are 1, and cos(m·u), sin(m·u) for integer m ≠ 0 with Σ |m_k| <= degree; of each pair m and -m, only the one whose
+first non-zero entry is positive. They are periodic in every joint, as the arm is.
 
-Both use u = (q - centre)/scale of the selected joints. The order is by degree and fixed, since coefficients refer to
-it.
+u = q - centre of the selected joints. The order is by degree and fixed, since coefficients refer to it.
 """
 
 from collections.abc import Iterator, Sequence
 from math import comb
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import EstimatorError
-
-Kind = Literal["trigonometric", "angles"]
 
 MAX_JOINTS = 7
 MAX_TERMS = 1000
@@ -30,34 +25,21 @@ class BasisFunctions:
 
     Attributes:
         joints: Indices of the selected joints, from 0.
-        kind: `trigonometric` or `angles`.
         degree: Highest total degree.
         centre: Angles that are subtracted [rad], shape (len(joints),), read-only.
-        scale: Divisor of the differences [rad], shape (len(joints),), read-only.
     """
 
     joints: tuple[int, ...]
-    kind: Kind
     degree: int
     centre: Floats
-    scale: Floats
 
-    def __init__(
-        self,
-        joints: Sequence[int],
-        kind: Kind,
-        degree: int,
-        centre: npt.ArrayLike | None = None,
-        scale: npt.ArrayLike | None = None,
-    ) -> None:
+    def __init__(self, joints: Sequence[int], degree: int, centre: npt.ArrayLike | None = None) -> None:
         """Create the basis.
 
         Args:
             joints: Different indices from 0, at most 7.
-            kind: `trigonometric` or `angles`.
             degree: Highest total degree, an integer >= 0.
             centre: Centre of the angles, see above; None for zeros.
-            scale: Scale of the angles, see above, > 0; None for ones, which makes `trigonometric` periodic in 2π.
 
         Raises:
             EstimatorError: A parameter is invalid, or there are more than MAX_TERMS terms.
@@ -65,42 +47,30 @@ class BasisFunctions:
         n = len(joints)
         if not 1 <= n <= MAX_JOINTS or len(set(joints)) != n or not set(joints) <= set(range(MAX_JOINTS)):
             raise EstimatorError("joints", joints, f"1 to {MAX_JOINTS} different indices below {MAX_JOINTS}")
-        if kind not in ("trigonometric", "angles"):
-            raise EstimatorError("basis", kind, "'trigonometric' or 'angles'")
         if degree not in range(MAX_TERMS):
             raise EstimatorError("degree", degree, "a whole number of at least 0")
         self.joints = tuple(int(j) for j in joints)
-        self.kind = kind
         self.degree = int(degree)
         if len(self) > MAX_TERMS:
             raise EstimatorError("degree", degree, f"lower: {len(self)} terms, but {MAX_TERMS} are the most")
         self.centre = np.zeros(n) if centre is None else np.array(centre, dtype=float)
-        self.scale = np.ones(n) if scale is None else np.array(scale, dtype=float)
         if self.centre.shape != (n,) or not np.isfinite(self.centre).all():
             raise EstimatorError("centre", centre, f"{n} finite angles")
-        if self.scale.shape != (n,) or not np.isfinite(self.scale).all() or not (self.scale > 0.0).all():
-            raise EstimatorError("scale", scale, f"{n} finite numbers above 0")
-        if kind == "trigonometric" and not (self.scale == 1.0).all():
-            raise EstimatorError("scale", scale, "1 for a trigonometric basis, or it is not periodic in 2π")
         self.centre.setflags(write=False)
-        self.scale.setflags(write=False)
 
     def __len__(self) -> int:
         """Number of terms."""
         n, degree = len(self.joints), self.degree
-        if self.kind == "angles":
-            return comb(n + degree, degree)
         return sum(2**i * comb(n, i) * comb(degree, i) for i in range(n + 1))
 
     def multiples(self) -> npt.NDArray[np.int64]:
-        """Powers p (angles) or combinations m ≠ 0 (trigonometric), one per row, shape (rows, len(joints))."""
+        """Combinations m ≠ 0, one per row, shape (rows, len(joints))."""
         n = len(self.joints)
-        signed = self.kind == "trigonometric"
         rows = [
             row
-            for total in range(int(signed), self.degree + 1)
-            for row in _rows(n, total, signed=signed)
-            if not signed or next(m for m in row if m) > 0
+            for total in range(1, self.degree + 1)
+            for row in _rows(n, total)
+            if next(m for m in row if m) > 0
         ]
         return np.array(rows, dtype=np.int64).reshape(len(rows), n)
 
@@ -111,7 +81,7 @@ class BasisFunctions:
             q: Configurations [rad], shape (N, n), with n above the largest index used.
 
         Returns:
-            Values [-], shape (N, len(self)); trigonometric: 1, then cos and sin of each combination in turn.
+            Values [-], shape (N, len(self)): 1, then cos and sin of each combination in turn.
 
         Raises:
             EstimatorError: q has another shape.
@@ -119,46 +89,35 @@ class BasisFunctions:
         angles = np.asarray(q, dtype=float)
         if angles.ndim != 2 or angles.shape[1] <= max(self.joints):
             raise EstimatorError("q", angles.shape, f"of shape (N, n), n > {max(self.joints)}")
-        u = (angles[:, self.joints] - self.centre) / self.scale
-        if self.kind == "angles":
-            return np.asarray(np.prod(u[:, None, :] ** self.multiples(), axis=2))
-        phase = u @ self.multiples().T
-        pairs = np.stack((np.cos(phase), np.sin(phase)), axis=2).reshape(len(u), -1)
-        return np.hstack((np.ones((len(u), 1)), pairs))
+        phase = (angles[:, self.joints] - self.centre) @ self.multiples().T
+        pairs = np.stack((np.cos(phase), np.sin(phase)), axis=2).reshape(len(phase), -1)
+        return np.hstack((np.ones((len(phase), 1)), pairs))
 
 
-def _rows(n: int, total: int, *, signed: bool) -> Iterator[tuple[int, ...]]:
-    """Yield the integer vectors of length n with Σ|m| = total, without negative entries unless `signed`."""
+def _rows(n: int, total: int) -> Iterator[tuple[int, ...]]:
+    """Yield the integer vectors of length n with Σ|m| = total."""
     if n == 1:
         yield (total,)
-        if signed and total:
+        if total:
             yield (-total,)
         return
     for size in range(total, -1, -1):
-        for rest in _rows(n - 1, total - size, signed=signed):
+        for rest in _rows(n - 1, total - size):
             yield (size, *rest)
-            if signed and size:
+            if size:
                 yield (-size, *rest)
 
 
 def terms(
-    q: npt.ArrayLike,
-    *,
-    joints: Sequence[int],
-    basis: Kind,
-    degree: int,
-    centre: npt.ArrayLike | None = None,
-    scale: npt.ArrayLike | None = None,
+    q: npt.ArrayLike, *, joints: Sequence[int], degree: int, centre: npt.ArrayLike | None = None
 ) -> Floats:
     """Return the design matrix for fitting the coefficients of a `Polynomial` with these parameters.
 
     Args:
         q: Configurations [rad], shape (N, n).
         joints: Selected joints; all further arguments are as in `Polynomial`.
-        basis: `trigonometric` or `angles`.
         degree: Highest total degree.
         centre: Centre of the angles [rad], shape (len(joints),).
-        scale: Scale of the angles [rad], shape (len(joints),).
 
     Returns:
         Values [-], shape (N, terms), in the order of the coefficients.
@@ -166,4 +125,4 @@ def terms(
     Raises:
         EstimatorError: A parameter is invalid.
     """
-    return BasisFunctions(tuple(joints), basis, degree, centre, scale).terms(q)
+    return BasisFunctions(tuple(joints), degree, centre).terms(q)

@@ -1,4 +1,4 @@
-"""The paper's estimator: two multivariate polynomials f_d(q) and ζ(q), sec. 3.3."""
+"""The paper's estimator: two multivariate trigonometric polynomials f_d(q) and ζ(q), sec. 3.3."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.base import Estimator
-from tvist_shaping.estimators.basis import BasisFunctions, Kind
+from tvist_shaping.estimators.basis import BasisFunctions
 from tvist_shaping.impulse_train import F_D_RANGE
 
 MARGIN = 0.1
@@ -43,9 +43,7 @@ def saturate(x: float, low: float, high: float) -> float:
 def evaluate(
     q: Floats,
     joints: npt.NDArray[np.int64],
-    trigonometric: bool,
     centre: Floats,
-    scale: Floats,
     multiples: npt.NDArray[np.int64],
     coefficients: Floats,
     ranges: Floats,
@@ -56,9 +54,7 @@ def evaluate(
     Args:
         q: Joint angles [rad], shape (n,).
         joints: Indices of the selected joints, shape (k,).
-        trigonometric: Whether the basis is trigonometric.
         centre: Centre [rad], shape (k,).
-        scale: Scale [rad], shape (k,).
         multiples: `BasisFunctions.multiples`, shape (rows, k).
         coefficients: Coefficients of f_d and ζ, shape (2, terms).
         ranges: Range of f_d and range of ζ, shape (2, 2).
@@ -67,32 +63,18 @@ def evaluate(
     Returns:
         Whether one of them was clamped to its range.
     """
-    f_d = 0.0
-    zeta = 0.0
-    term = 0
-    if trigonometric:
-        f_d = coefficients[0, 0]
-        zeta = coefficients[1, 0]
-        term = 1
+    f_d = coefficients[0, 0]
+    zeta = coefficients[1, 0]
+    term = 1
     for row in range(multiples.shape[0]):
-        if trigonometric:
-            phase = 0.0
-            for k in range(joints.shape[0]):
-                phase += multiples[row, k] * (q[joints[k]] - centre[k])
-            c = math.cos(phase)
-            s = math.sin(phase)
-            f_d += coefficients[0, term] * c + coefficients[0, term + 1] * s
-            zeta += coefficients[1, term] * c + coefficients[1, term + 1] * s
-            term += 2
-        else:
-            monomial = 1.0
-            for k in range(joints.shape[0]):
-                u = (q[joints[k]] - centre[k]) / scale[k]
-                for _ in range(multiples[row, k]):
-                    monomial *= u
-            f_d += coefficients[0, term] * monomial
-            zeta += coefficients[1, term] * monomial
-            term += 1
+        phase = 0.0
+        for k in range(joints.shape[0]):
+            phase += multiples[row, k] * (q[joints[k]] - centre[k])
+        c = math.cos(phase)
+        s = math.sin(phase)
+        f_d += coefficients[0, term] * c + coefficients[0, term + 1] * s
+        zeta += coefficients[1, term] * c + coefficients[1, term + 1] * s
+        term += 2
     inside = ranges[0, 0] <= f_d <= ranges[0, 1] and ranges[1, 0] <= zeta <= ranges[1, 1]
     modes[0, 0] = saturate(f_d, ranges[0, 0], ranges[0, 1])
     modes[1, 0] = saturate(zeta, ranges[1, 0], ranges[1, 1])
@@ -103,9 +85,7 @@ class Coefficients(NamedTuple):
     """Arguments of `evaluate` between the configuration and the result."""
 
     joints: npt.NDArray[np.int64]
-    trigonometric: bool
     centre: Floats
-    scale: Floats
     multiples: npt.NDArray[np.int64]
     coefficients: Floats
     ranges: Floats
@@ -128,32 +108,28 @@ class Polynomial(Estimator):
         self,
         *,
         joints: Sequence[int],
-        basis: Kind,
         degree: int,
         f_d_coefficients: npt.ArrayLike,
         zeta_coefficients: npt.ArrayLike,
         f_d_range: tuple[float, float],
         zeta_range: tuple[float, float],
         centre: npt.ArrayLike | None = None,
-        scale: npt.ArrayLike | None = None,
     ) -> None:
         """Create the estimator from its coefficients.
 
         Args:
             joints: Indices of the selected joints, from 0.
-            basis: `trigonometric` or `angles`.
             degree: Highest total degree.
             f_d_coefficients: a [Hz], shape (terms,), in the order of `terms`.
             zeta_coefficients: b [-], shape (terms,).
             f_d_range: Lowest and highest result for f_d [Hz], 1e-6 to 1e6.
             zeta_range: Lowest and highest result for ζ [-], 0 <= ζ < 1.
             centre: Angles that are subtracted [rad], shape (len(joints),); None for zeros.
-            scale: Divisor of the differences [rad], shape (len(joints),); None for ones, which `trigonometric` needs.
 
         Raises:
             EstimatorError: A parameter is invalid; the error names it.
         """
-        self.basis = BasisFunctions(tuple(joints), basis, degree, centre, scale)
+        self.basis = BasisFunctions(tuple(joints), degree, centre)
         self.saturating = False
         self._coefficients: Floats = np.stack(
             (
@@ -170,8 +146,7 @@ class Polynomial(Estimator):
         self._ranges: Floats = np.array([[f_low, f_high], [z_low, z_high]])
         joints_used = np.array(self.basis.joints, dtype=np.int64)
         self.coefficients = Coefficients(
-            joints_used, basis == "trigonometric", self.basis.centre.copy(), self.basis.scale.copy(),
-            self.basis.multiples(), self._coefficients, self._ranges,
+            joints_used, self.basis.centre.copy(), self.basis.multiples(), self._coefficients, self._ranges,
         )  # fmt: skip
         """What `evaluate` needs, as arrays that can be written: numba takes those alone by its fast way."""
         self._joints_needed = max(self.basis.joints) + 1
@@ -179,7 +154,7 @@ class Polynomial(Estimator):
     def __repr__(self) -> str:
         (f_low, f_high), (z_low, z_high) = self._ranges.tolist()
         return (
-            f"Polynomial(joints={self.basis.joints}, basis={self.basis.kind!r}, degree={self.basis.degree}, "
+            f"Polynomial(joints={self.basis.joints}, degree={self.basis.degree}, "
             f"{len(self.basis)} terms, f_d_range=({f_low}, {f_high}), zeta_range=({z_low}, {z_high}))"
         )
 
