@@ -85,7 +85,7 @@ def _stop(name: str) -> tuple[Floats, Floats, Floats]:
     force, left = [], []
     for _ in range(stop + round(SHOWN[1] / PERIOD)):
         sample = cycle.step()
-        force.append(truth_of(cycle.line.plant).specific_force)
+        force.append(truth_of(cycle.plant).specific_force)
         left.append(float(end[0] - sample.target.q[0]))
     felt = np.array(force)
     time = 1e3 * PERIOD * np.arange(-stop, len(felt) - stop, dtype=np.float64)

@@ -25,7 +25,7 @@ def info_of(controller: Controller) -> Info:
     watched = controller.watching is not None
     place = None if setup.plant is None else setup.plant.place
     own = (setup.calibration.name,) if setup.calibration is not None else ()
-    tvist = controller.cycle.line.filter.tvist
+    tvist = controller.cycle.tvist
     return Info(
         name=setup.name,
         protocol=PROTOCOL_VERSION,
@@ -71,7 +71,7 @@ def info_of(controller: Controller) -> Info:
         arm=controller.arm,
         programs=controller.programs.kept.names,
         poses=setup.description.poses,
-        geometry=geometry_of(setup.description, _world_of(controller.cycle.line.plant)),
+        geometry=geometry_of(setup.description, _world_of(controller.cycle.plant)),
         watched=place if watched else None,
         moved=place if controller.supervision is not None else None,
     )

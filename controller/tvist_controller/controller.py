@@ -91,9 +91,9 @@ class Controller(WholeRobot):
         first = planner.filters.first()
         self.cycle = _cycle(setup, first, plant)
         if setup.truth:
-            truth_of(self.cycle.line.plant)  # raises now, not at the first tick, if the plant has no truth
+            truth_of(self.cycle.plant)  # raises now, not at the first tick, if the plant has no truth
         self._seed = setup.seed
-        self._reporter = Reporter(setup.description, self.cycle.line.plant)
+        self._reporter = Reporter(setup.description, self.cycle.plant)
         collisions = CollisionModel(setup.description, body(setup.payload))
         # What only watches has no power to move anything, whatever is asked of it.
         mode = "POWER_OFF" if isinstance(plant, Watched) else setup.mode
@@ -118,7 +118,7 @@ class Controller(WholeRobot):
         self.cell = (
             None
             if setup.cell is None
-            else LiveCell(setup.cell, setup.description, self.cycle.line.plant, self.peripherals, self._emit)
+            else LiveCell(setup.cell, setup.description, self.cycle.plant, self.peripherals, self._emit)
         )
         """What stands around the robot; None for nothing."""
         self._force_control = ForceControl(
@@ -295,9 +295,9 @@ class Controller(WholeRobot):
         try:
             if failed is not None:
                 raise failed
-            sample = self.motion.step()
+            sample = self.motion.step(self._force_control.external.next())
             self._safety.watch(sample)
-            sample = self._force_control.watch(sample)
+            self._force_control.watch(sample)
             if self.cell is not None:
                 self.cell.tick(self.tick_number + 1, sample.measured.q)
         except PlantError as error:
@@ -325,9 +325,9 @@ class Controller(WholeRobot):
         return self.report, events
 
     def _report(self, sample: Sample) -> Report:
-        motion, line = self.motion, self.cycle.line
+        motion, cycle = self.motion, self.cycle
         return self._reporter.report(
-            self.tick_number, sample, line.filter.tvist, line.drives.delay, self.modes.now,
+            self.tick_number, sample, cycle.tvist, cycle.drives.delay, self.modes.now,
             motion.motions.speed if self.watching is None else self.watching.speed,
             motion.streams.sequence, self.counters.missed_ticks,
         )  # fmt: skip
@@ -432,13 +432,13 @@ class Controller(WholeRobot):
 
     def place(self, call: Call[SimulationReset]) -> Reply:
         """Place the simulated arm somewhere at rest."""
-        command, chosen, plant = call.command, call.planned(), self.cycle.line.plant
+        command, chosen, plant = call.command, call.planned(), self.cycle.plant
         if not isinstance(plant, Placeable):
             name = type(plant).__name__
             raise RefusalError(
                 "unknown_type", "type", f"the plant {name} cannot be put anywhere: it has no reset"
             )
-        q = self.cycle.line.shaped.position if command.q is None else np.array(command.q, dtype=float)
+        q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
         carried = None if command.payload is None else body(command.payload)
         if self.cell is not None:
             carried = carried or self.cell.empty

@@ -209,7 +209,7 @@ class Host:
     def tell_raised(self) -> None:
         """Pass on what methods of the plant and functions of programs have raised."""
         raised = self.controller.programs.raised
-        for error in (*told(self.controller.cycle.line.plant), *raised):
+        for error in (*told(self.controller.cycle.plant), *raised):
             for sink in self._sinks:
                 sink.raised(error)
         raised.clear()

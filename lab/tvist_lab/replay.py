@@ -62,7 +62,7 @@ def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> R
         ValueError: The setup is invalid, or its plant gives the tick.
     """
     controller, presence, done, names = Controller(setup), Presence(), Replay(), known_fields(states)
-    check_unpaced(controller.cycle.line.plant)
+    check_unpaced(controller.cycle.plant)
     entries = iter(journal)
     entry = next(entries, None)
     for recorded in states:

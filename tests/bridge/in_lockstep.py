@@ -139,7 +139,7 @@ class Port:
 
     def __init__(self, robot, setpoints, link, seed):
         self.robot, self.setpoints = robot, setpoints
-        self.payload = robot.controller.cycle.line.plant.payload
+        self.payload = robot.controller.cycle.plant.payload
         self.counts = Counts()
         self.wanted = np.array(robot.controller.latest.target_q)
         """Position that the line wanted last, shape (n,) [rad]."""

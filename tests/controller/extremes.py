@@ -94,7 +94,7 @@ class Extreme:
             self.send(c.SetEstimator, name="fixed", f_d=(8.0,), zeta=(0.1,))
             self.known = not isinstance(self.send(c.SetShaper, name=shaper), Refused)
         """Whether the arm can have this shaper."""
-        self.references = [self.controller.cycle.line.shaped.position]
+        self.references = [self.controller.cycle.position]
         self.events = []
 
     def send(self, kind, **fields):
@@ -106,12 +106,12 @@ class Extreme:
         """Put it somewhere at rest."""
         assert not isinstance(self.send(SimulationReset, q=q), Refused)
         self.start = np.array(q)
-        self.references = [self.controller.cycle.line.shaped.position]
+        self.references = [self.controller.cycle.position]
 
     def tick(self) -> None:
         _, events = self.controller.tick()
         self.events += events
-        self.references.append(self.controller.cycle.line.shaped.position)
+        self.references.append(self.controller.cycle.position)
 
     def until_rest(self, most: int = 20_000) -> None:
         for _ in range(most):

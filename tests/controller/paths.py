@@ -89,9 +89,9 @@ class Progress:
         cycle = self.robot.controller.cycle
         for _ in range(ticks):
             self.robot.tick()
-            path = getattr(cycle.line.shaped.posture_of, "__self__", None)
+            path = getattr(cycle.shaped.posture_of, "__self__", None)
             begun = self._begun.get(id(path))
-            now = self.covered[-1] if begun is None else float(begun + cycle.line.shaped.along.position[0])
+            now = self.covered[-1] if begun is None else float(begun + cycle.along.position[0])
             self.covered.append(max(now, self.covered[-1]) if begun is None else now)
 
     def until_rest(self, most: int = 500_000) -> None:

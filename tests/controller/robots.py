@@ -97,20 +97,14 @@ class Line(ControlCycle):
     """A control line with short names for what tests look at."""
 
     at_rest = property(lambda self: self.mode.at_rest)
-    tvist = property(lambda self: self.line.filter.tvist)
-    dynamics = property(lambda self: self.line.dynamics)
-    plant = property(lambda self: self.line.plant)
     reference = property(lambda self: self.sample.reference)
-    along = property(lambda self: self.line.shaped.along)
-    position = property(lambda self: self.line.shaped.position)
-    newest = property(lambda self: self.line.shaped.newest)
 
     def plan(self, target, limits: MotionLimits, speed: float = 1.0):
         return quickest_motion(JointLine(self.reference, target), limits, H, speed)
 
     def stream(self, stream_period: float, limits: MotionLimits) -> SetpointStream:
         """Follow set-points from rest; no guard watches."""
-        spared, reach = self.line.filter.spared(limits), np.array(self.description.limits.position)
+        spared, reach = self.filter.spared(limits), np.array(self.description.limits.position)
         torque = StreamTorqueRoom(self.description, self.dynamics)
         return self.begin(
             SetpointStream(self.reference, stream_period, spared, H, reach=reach, torque=torque)

@@ -113,7 +113,7 @@ def test_a_shaper_that_exceeds_more_slows_down_a_guided_motion(kind):
         if tick == 100:
             assert not isinstance(robot.send(c.SetShaper, name="zvddd"), Refused)
             cycle, arms = robot.controller.cycle, arm_limits(robot.description)
-            limits, spared = cycle.trajectory.limits, cycle.line.filter.spared(arms)
+            limits, spared = cycle.trajectory.limits, cycle.filter.spared(arms)
             assert cycle.mode.shaped
             assert limits.velocity == spared.velocity < arms.velocity
             assert limits.acceleration == spared.acceleration < arms.acceleration

@@ -20,7 +20,7 @@ FIELDS = {"mass": LIGHT.mass, "com": LIGHT.com, "inertia": LIGHT.inertia}
 
 def ringing(robot: Robot) -> float:
     """Largest true acceleration of the tool later than 10 ms after the reference has stopped [m/s²]."""
-    arm = robot.controller.cycle.line.plant
+    arm = robot.controller.cycle.plant
     robot.tick(5)
     felt = []
     for _ in range(300):
@@ -62,7 +62,7 @@ def test_to_know_the_end_is_to_be_there_sooner_and_a_stream_is_followed_all_the_
         ticks[name] = robot.until_rest().tick
         assert robot.states[-1].estimated_f_d[0] == pytest.approx(14.8, abs=1.0)
     assert ticks["auto-target"] < ticks["auto"]
-    at_rest = robot.controller.cycle.line.filter.tvist.f_d.copy()
+    at_rest = robot.controller.cycle.tvist.f_d.copy()
     robot.send(c.ServoStart)
     for k in range(400):
         robot.setpoint(k, Q3 - 0.2 * (1.0 - np.cos(2.0 * k * H)) * np.array([0, 1, 1, 0, 0, 0]))
@@ -146,7 +146,7 @@ def test_a_filter_that_cannot_do_what_it_should_says_so_once():
 
 def test_a_clipped_filter_is_a_bit_in_every_state_and_one_event():
     robot = Robot()
-    estimator = robot.controller.cycle.line.filter.tvist.estimator
+    estimator = robot.controller.cycle.tvist.estimator
     for now in (False, True, False, True):
         estimator.clipped = now
         robot.tick(3)

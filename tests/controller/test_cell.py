@@ -31,7 +31,7 @@ WIRES = (
 
 
 def carried(robot):
-    return robot.controller.cycle.line.plant.payload
+    return robot.controller.cycle.plant.payload
 
 
 def warnings(robot):

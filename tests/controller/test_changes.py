@@ -135,7 +135,7 @@ def test_a_change_that_has_not_begun_to_count_gives_way_to_the_next():
         line.step()
     line.use(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
     line.use(newest := TvistFilter(shaper("ei3"), Fixed([6.7], [0.1]), joints=6))
-    assert line.line.filter._fade.new is newest
+    assert line.filter._fade.new is newest
 
 
 def test_a_stream_at_its_limit_keeps_it_through_a_change():
@@ -158,7 +158,7 @@ def test_a_stream_at_its_limit_keeps_it_through_a_change():
     shaped = np.array(shaped)
     own = np.abs(np.diff(shaped, 2, axis=0)) / H**2
     assert (own / alone.bound(2, PAPER.acceleration, len(shaped))).max() < 1.0 + TOLERANCE
-    assert line.line.filter._fade is None
+    assert line.filter._fade is None
     line.begin(stream.end)
     while not line.at_rest:
         line.step()
@@ -175,11 +175,11 @@ def test_paused_a_change_is_made_where_nothing_moves():
     robot.tick(5)
     held = robot.column("target_q")[-100:]
     assert (held == held[0]).all()
-    assert robot.controller.cycle.line.filter._fade is None
+    assert robot.controller.cycle.filter._fade is None
     robot.send(c.Resume)
     robot.until_rest()
     assert robot.kinds()[-1] == "motion_done"
-    assert robot.controller.cycle.line.shaped.position == pytest.approx(Q2, abs=STILL)
+    assert robot.controller.cycle.position == pytest.approx(Q2, abs=STILL)
 
 
 def test_a_stop_during_a_change_is_a_stop_and_the_new_filter_is_in_force_after_it():
@@ -190,7 +190,7 @@ def test_a_stop_during_a_change_is_a_stop_and_the_new_filter_is_in_force_after_i
         if tick == 500:
             line.use(new)
         line.step()
-    assert 0.0 < line.line.filter._fade.share < 1.0
+    assert 0.0 < line.filter._fade.share < 1.0
     before = line.newest
     stop(line, None)
     line.step()
@@ -198,7 +198,7 @@ def test_a_stop_during_a_change_is_a_stop_and_the_new_filter_is_in_force_after_i
     while not line.at_rest:
         line.step()
     assert line.tvist is new
-    assert line.line.filter._fade is None
+    assert line.filter._fade is None
     assert (line.tvist.filter(line.reference) == line.reference).all()
 
 

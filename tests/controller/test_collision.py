@@ -175,9 +175,9 @@ def test_a_reset_into_a_meeting_is_refused_with_the_posture_and_the_bodies(name,
     refused = 0
     for number in range(40):
         q = turned_wrists(number)
-        before, met = robot.controller.cycle.line.shaped.position, model.meeting(q)
+        before, met = robot.controller.cycle.position, model.meeting(q)
         # The carried payload is the robot file's, a short disc.
-        plain = CollisionModel(arm, robot.controller.cycle.line.plant.payload).meeting(q)
+        plain = CollisionModel(arm, robot.controller.cycle.plant.payload).meeting(q)
         reply = robot.send(SimulationReset, q=tuple(q), seed=number)
         if met is None and plain is None:
             assert isinstance(reply, Done)
@@ -186,7 +186,7 @@ def test_a_reset_into_a_meeting_is_refused_with_the_posture_and_the_bodies(name,
         assert (reply.code, reply.where, reply.limit) == ("collision", "q", CLEARANCE)
         for part in (str(met or plain), f"[{q[0]:.4g}, {q[1]:.4g}"):
             assert part in reply.why
-        assert (robot.controller.cycle.line.shaped.position == before).all()
+        assert (robot.controller.cycle.position == before).all()
     assert 1 < refused < 39
 
 
@@ -235,7 +235,7 @@ def test_an_arm_in_a_meeting_may_be_put_at_rest_again_and_move_out_of_it_and_not
     assert (reply.code, "payload and floor would overlap" in reply.why) == ("collision", True)
     assert robot.send(c.MoveJ, q=(0.0, -0.9, 0.0, -1.57, 0.0, 0.0)) == Accepted(id=1)
     robot.until_rest()
-    assert robot.controller.motion.collisions.meeting(robot.controller.cycle.line.shaped.position) is None
+    assert robot.controller.motion.collisions.meeting(robot.controller.cycle.position) is None
 
 
 def test_a_robot_file_without_bodies_never_meets_anything():

@@ -146,7 +146,7 @@ def test_a_payload_is_declared_and_the_arm_keeps_what_it_carries():
     moments = robot.tick().target_moment
     assert robot.send(c.SetPayload, mass=1.0, com=DISC.com, inertia=DISC.inertia) == Done()
     assert abs(robot.tick().target_moment[1]) < abs(moments[1])
-    assert robot.controller.cycle.line.plant.payload.mass == 5.0
+    assert robot.controller.cycle.plant.payload.mass == 5.0
     assert info_of(robot.controller).payload.mass == 1.0
 
 
@@ -216,7 +216,7 @@ def test_a_reset_changes_what_is_carried_and_not_what_is_declared():
     robot.send(SimulationReset, payload=HEAVY)
     state = robot.tick()
     assert state.target_moment == declared
-    assert robot.controller.cycle.line.plant.payload.mass == HEAVY.mass
+    assert robot.controller.cycle.plant.payload.mass == HEAVY.mass
     assert robot.controller.declared == DISC
 
 

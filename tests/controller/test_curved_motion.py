@@ -102,7 +102,7 @@ def test_to_filter_the_joints_would_cut_the_corner():
     """What the parameter is shaped for: the same filter, joint by joint, leaves the curve by far more than rounding."""
     curve = tool_circle()
     robot = moving(curve, "zv", PAPER)
-    tvist, motion, off = robot.controller.cycle.line.filter.tvist.fork(), quickest_motion(curve, PAPER, H), []
+    tvist, motion, off = robot.controller.cycle.tvist.fork(), quickest_motion(curve, PAPER, H), []
     tvist.reset(curve.posture(curve.start))
     while not motion.finished:
         off.append(tvist.filter(curve.posture(motion.next())))

@@ -76,7 +76,7 @@ def test_a_stop_keeps_every_joint_within_the_deceleration_that_it_tells(wanted):
         while cycle.trajectory.share < 0.5:
             robot.tick()
         plan = robot.controller.motion.outlook.plan_stop(wanted)
-        x = [cycle.line.shaped.along.published.q, cycle.line.shaped.along.position]
+        x = [cycle.along.published.q, cycle.along.position]
         while not plan.trajectory.finished:
             x.append(plan.trajectory.next())
         q = np.array([curve.posture(each) for each in x])
@@ -121,7 +121,7 @@ def test_a_payload_that_would_meet_something_on_the_rest_of_the_curve_is_refused
     robot = Subject(UR5E, curve.posture(curve.start), paper_payload(UR5E, 0.0))
     start(robot, curve)
     robot.tick(100)
-    q, x = robot.references[-1], robot.controller.cycle.line.shaped.along.position
+    q, x = robot.references[-1], robot.controller.cycle.along.position
     for far in np.linspace(0.05, 0.9, 40):
         fields = {"mass": 1.0, "com": (0.0, 0.0, float(far)), "inertia": (0.01, 0, 0, 0.01, 0, 0.01)}
         reply = robot.send(c.SetPayload, **fields)

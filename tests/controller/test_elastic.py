@@ -46,11 +46,11 @@ def line(shaper: str, q=Q1, *, mass=5.0, believed=None, description=UR5E, plant=
 def move(cycle: Line, target, limits=PAPER):
     """Make a motion, and return its samples with 0.6 s of rest and the plant's truth for each."""
     cycle.begin(quickest_motion(JointLine(cycle.sample.reference, np.array(target)), limits, H))
-    cycle.line.filter.tvist.aim(np.array(target))
+    cycle.tvist.aim(np.array(target))
     samples, truths, rest = [], [], 0
     while rest < 300:
         samples.append(cycle.step())
-        truths.append(cycle.line.plant.truth())
+        truths.append(cycle.plant.truth())
         rest = rest + 1 if cycle.mode.at_rest else 0
     return samples, truths
 
@@ -175,7 +175,7 @@ def left_with(change) -> float:
     for name in ("none", "elastic"):
         cycle = line(name, Q1, description=description)
         if name == "elastic":
-            change(cycle.line.drives.wanted)
+            change(cycle.drives.wanted)
         left[name] = ringing(move(cycle, Q3)[1])
     return left["elastic"] / left["none"]
 
@@ -204,7 +204,7 @@ def test_the_acceleration_of_bending_links_counts_where_the_smoothing_is_short(m
     left = {}
     for smooth in (True, False):
         cycle = line("elastic-16", np.array(start), mass=mass, description=UR5E.clean())
-        elastic = cycle.line.drives.wanted
+        elastic = cycle.drives.wanted
         command = elastic.command
         elastic.command = lambda *what, smooth, counts=smooth, command=command: command(
             *what, smooth=smooth and counts
@@ -254,7 +254,7 @@ def test_without_springs_it_is_refused_with_the_way_to_get_them():
 
 def test_the_drives_tick_counts_in_the_delay_that_is_published():
     robot = Robot(calibration=calibration(), shaper="elastic")
-    state, tvist = robot.tick(), robot.controller.cycle.line.filter.tvist
+    state, tvist = robot.tick(), robot.controller.cycle.tvist
     assert state.shaper_delay == pytest.approx(tvist.delay + H)
 
 
@@ -375,13 +375,13 @@ def test_friction_that_is_less_at_breakaway_takes_as_much_of_the_torque_as_in_mo
 
 def watched_commands(robot):
     """Commands that the drives get from now on."""
-    commands, step = [], robot.controller.cycle.line.plant.step
+    commands, step = [], robot.controller.cycle.plant.step
 
     def watched(command):
         commands.append(command)
         return step(command)
 
-    robot.controller.cycle.line.plant.step = watched
+    robot.controller.cycle.plant.step = watched
     return commands
 
 

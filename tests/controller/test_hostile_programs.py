@@ -68,9 +68,7 @@ def test_no_tick_spends_more_than_the_budget_whatever_the_programs_do(seed, monk
     """All programs of the robot together; a statement that a tick began late is borne by the next one."""
     robot, beside, _ = begin(seed)
     spent = spending(monkeypatch)
-    solved = Counts(
-        monkeypatch, type(robot.controller.programs.arm._access.motion.cycle.line.dynamics), "inertia"
-    )
+    solved = Counts(monkeypatch, type(robot.controller.programs.arm._access.motion.cycle.dynamics), "inertia")
     total = 0
     for tick in range(150):
         spent[0] = 0
@@ -89,7 +87,7 @@ def test_a_statement_that_waited_for_its_budget_is_borne_by_the_tick_that_carrie
         f"thread t{k}():\n  while True:\n    x = get_mass_matrix()\n    sync()\n  end\nend" for k in range(50)
     ]
     robot = a_robot()
-    calls = Counts(monkeypatch, type(robot.controller.cycle.line.dynamics), "inertia")
+    calls = Counts(monkeypatch, type(robot.controller.cycle.dynamics), "inertia")
     start(robot, *"\n".join(threads).splitlines(), *(f"h{k} = run t{k}()" for k in range(50)), "sleep(1)")
     seen = []
     for _ in range(200):

@@ -51,9 +51,9 @@ def test_a_pause_and_a_change_of_the_filter_are_foreseen_too():
     ahead = robot.controller.motion.outlook.foresee()
     for expected in ahead[2:]:
         robot.tick()
-        assert cycle_.line.shaped.position == pytest.approx(expected, abs=1e-12)
+        assert cycle_.position == pytest.approx(expected, abs=1e-12)
     assert not cycle_.mode.at_rest
-    assert np.abs(cycle_.line.shaped.position - ahead[-1]).max() < 1e-6
+    assert np.abs(cycle_.position - ahead[-1]).max() < 1e-6
 
 
 def test_a_motion_that_will_get_stuck_is_not_foreseen_and_a_stop_on_it_is_reported():

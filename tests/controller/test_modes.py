@@ -119,7 +119,7 @@ def test_the_state_says_the_modes_of_what_it_does(activity):
 def test_it_starts_in_any_mode(mode):
     robot = Robot(mode=mode, carried=Payload(mass=1.0, com=(0, 0, 0), inertia=(0.0,) * 6))
     assert robot.tick().robot_mode == RobotMode[mode]
-    assert robot.controller.cycle.line.plant.payload.mass == 1.0
+    assert robot.controller.cycle.plant.payload.mass == 1.0
     assert robot.controller.declared.mass == 5.0
     assert robot.send(c.MoveJ, q=Q2_).code == "wrong_mode"
     assert robot.send(c.PowerOn) == Done()

@@ -346,7 +346,7 @@ def test_whatever_a_method_of_somebody_s_own_arm_raises_stops_that_robot_alone_a
     stops = [event for event in robot.events if event.kind == "safety_stop"]
     assert [(event.category, "OSError: no cable" in event.why) for event in stops] == [(0, True)]
     assert modes(robot) == (RobotMode.POWER_OFF, SafetyMode.FAULT)
-    raised = told(robot.controller.cycle.line.plant)
+    raised = told(robot.controller.cycle.plant)
     assert raised
     assert all(isinstance(error, OSError) and error.__traceback__ for error in raised)
     arm.cut = ()

@@ -56,7 +56,7 @@ class Watched:
 
     def carry(self, payload):
         """Grip a part: the arm moves on as it was, with another body on its flange."""
-        arm = self.cycle.line.plant
+        arm = self.cycle.plant
         before = parts(arm.memory)
         kept = [before[number].copy() for number in range(2)]  # state and commands
         arm._load(payload)
@@ -153,11 +153,11 @@ def test_a_part_picked_up_is_told_with_its_whole_mass_and_what_to_declare(declar
 def test_a_new_declaration_starts_anew():
     watched = Watched(PAPER[0], 2.0, 5.0)
     assert watched.move(PAPER[1])
-    watched.cycle.line.dynamics.declare(disc(5.0))
+    watched.cycle.dynamics.declare(disc(5.0))
     watched.monitor.declare(disc(5.0))
     assert watched.monitor.excess == (0.0, np.inf)
     assert not watched.move(PAPER[2])
-    watched.cycle.line.dynamics.declare(disc(1.0))
+    watched.cycle.dynamics.declare(disc(1.0))
     watched.monitor.declare(disc(1.0))
     assert watched.move(PAPER[3]) or watched.move(PAPER[0])
 

@@ -48,14 +48,14 @@ def test_a_given_flexible_arm_is_the_default_to_the_last_bit():
         assert robot.send(SimulationInject, **PUSH) == Done()
         robot.until_rest()
     assert robots[0].states == robots[1].states
-    assert robots[1].controller.cycle.line.plant is given
+    assert robots[1].controller.cycle.plant is given
     assert given.payload == body(paper_payload(UR5E))
 
 
 def test_a_plant_cannot_be_exchanged_from_outside():
     robot = Robot()
     with pytest.raises(AttributeError):
-        robot.controller.cycle.line.plant = NoArm()
+        robot.controller.cycle.plant = NoArm()
 
 
 def test_a_plant_of_ones_own_is_what_moves():
@@ -113,7 +113,7 @@ def test_true_modes_that_the_plant_does_not_know_are_empty():
         def truth(self):
             return flexible.truth()
 
-    flexible = Controller(setup()).cycle.line.plant
+    flexible = Controller(setup()).cycle.plant
     robot = Robot(plant=Knows(), truth=True)
     robot.tick()
     truth = robot.controller.truth()

@@ -359,7 +359,7 @@ def test_set_tcp_set_payload_and_their_getters():
     assert said(robot)[:3] == ["p[0, 0, 0.1, 0, 0, 0]", "1", "[0, 0, 0.05]"]
     assert float(said(robot)[3]) == pytest.approx(0.1, abs=1e-6)
     assert robot.controller.declared.mass == 1.0
-    assert robot.controller.cycle.line.dynamics.changing  # for a second
+    assert robot.controller.cycle.dynamics.changing  # for a second
 
 
 def test_kinematics_of_programs_agree_with_each_other():

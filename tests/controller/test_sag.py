@@ -36,13 +36,13 @@ def line(description=UR5E, mass=5.0, q=Q1, *, compensated=True, name="none", **c
 
 def commands_of(cycle):
     """Commands to the drives from now on, and the references that they belong to."""
-    found, made = [], cycle.line.drives.command
+    found, made = [], cycle.drives.command
 
     def watched(signals, *arguments, **options):
         found.append((made(signals, *arguments, **options), signals[Q]))
         return found[-1][0]
 
-    cycle.line.drives.command = watched
+    cycle.drives.command = watched
     return found
 
 
@@ -73,7 +73,7 @@ def test_a_resting_arm_is_on_its_target_in_any_posture_with_any_payload(arm):
     for _ in range(40):
         q, payload = random.uniform(-3.1, 3.1, 6), random_payload(random)
         for cycle in (compensated, plain):
-            cycle.line.dynamics.declare(payload)
+            cycle.dynamics.declare(payload)
             cycle.reset(q, carried=payload)
         assert off_target(compensated.sample) < CLOSE
         for _ in range(50):
@@ -140,7 +140,7 @@ def test_in_motion_the_lead_moves_without_steps_and_as_little_as_the_twist_that_
 def test_a_payload_that_is_declared_at_rest_moves_the_motors_gently_to_their_new_lead():
     cycle = line(mass=0.0)
     found = commands_of(cycle)
-    cycle.line.dynamics.declare(body(paper_payload(UR5E, 5.0)))
+    cycle.dynamics.declare(body(paper_payload(UR5E, 5.0)))
     for _ in range(SLEW + 20):
         cycle.step()
     lead, velocity, acceleration = leads(found)

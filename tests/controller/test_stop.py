@@ -205,7 +205,7 @@ def test_with_negative_impulses_a_motion_is_done_only_where_nothing_more_comes_o
     robot.send(c.SetShaper, name=name)
     robot.send(c.MoveJ, q=tuple(Q3 + way * (Q1 - Q3)) if way > 0.5 else tuple(Q1 + way))
     robot.until_rest()
-    rested = robot.controller.cycle.line.shaped.position
+    rested = robot.controller.cycle.position
     robot.tick(300)
     assert np.abs(robot.column("target_q")[-250:] - rested).max() < 1e-7
 
@@ -245,7 +245,7 @@ def test_a_stop_is_not_ahead_of_a_motion_that_negative_impulses_let_turn_back(na
         stopped = []
         for _ in free:
             robot.tick()
-            stopped.append(robot.controller.cycle.line.shaped.position[0])
+            stopped.append(robot.controller.cycle.position[0])
         assert (np.array(stopped) - free).max() <= 1e-9, moment
     assert moment > 20
 
@@ -258,8 +258,8 @@ def test_a_move_that_has_barely_begun_stands_as_soon_as_it_is_stopped(shaper):
         robot = Robot(shaper=shaper, calibration=calibration())
         robot.send(c.MoveJ, q=tuple(Q3.tolist()))
         robot.tick(ticks)
-        before = robot.controller.cycle.line.shaped.position
+        before = robot.controller.cycle.position
         robot.send(c.Stop, deceleration=deceleration)
         stopped = robot.controller.tick_number
         assert robot.until_rest().tick - stopped <= 25
-        assert np.abs(robot.controller.cycle.line.shaped.position - before).max() < 1e-3
+        assert np.abs(robot.controller.cycle.position - before).max() < 1e-3

@@ -35,11 +35,11 @@ def by_ticks(description, recipe, move, seed):
         elastic=recipe.elastic(description, tvist),
     )  # fmt: skip
     samples = [cycle.step() for _ in range(RESTING)]
-    forces = [cycle.line.plant.truth().specific_force] * RESTING
+    forces = [cycle.plant.truth().specific_force] * RESTING
     cycle.begin(quickest_motion(JointLine(start, np.array(move.target)), PAPER, PERIOD))
     while not cycle.mode.at_rest:
         samples.append(cycle.step())
-        forces.append(cycle.line.plant.truth().specific_force)
+        forces.append(cycle.plant.truth().specific_force)
     return samples, np.array(forces)
 
 

@@ -145,7 +145,7 @@ class Sequence:
         if len(q) == 3 and not self._braked:
             if (np.abs(q[-1]) > np.array(limits.position) + ROUNDING).any():
                 raise self._broken(f"a reference is at {q[-1].tolist()}, beyond a joint's range")
-            shaper = robot.controller.cycle.line.filter.tvist.name
+            shaper = robot.controller.cycle.tvist.name
             for what, share in zip(("velocity", "acceleration"), speeds(self.description, q), strict=True):
                 if share > WITHIN:
                     raise self._broken(f"a reference with {shaper} has {share:.4f} of the limit of {what}")

@@ -115,7 +115,7 @@ class Subject:
     def tick(self, count=1):
         for _ in range(count):
             _, events = self.controller.tick()
-            self.references.append(self.controller.cycle.line.shaped.position)
+            self.references.append(self.controller.cycle.position)
             self.events += events
 
     def until_rest(self, most=20_000):

@@ -115,7 +115,7 @@ def test_each_arm_has_its_own_calibration_and_every_shaper_is_tried():
         q = np.array(next(iter(arm.poses.values())))
         for name in names:
             robot = Subject(arm, q, paper_payload(arm), shaper=name)
-            assert robot.controller.cycle.line.filter.tvist.name == name
+            assert robot.controller.cycle.tvist.name == name
     assert set(names) < set(draws.SHAPERS) == set(BUILT_IN.names())
 
 

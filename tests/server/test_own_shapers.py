@@ -253,7 +253,7 @@ class TestOnARobot:
         one = Robot(calibration=calibration(), own_shapers=(load_own(place),))
         assert info_of(one.controller).shapers[-1] == "thirds"
         assert one.send(c.SetShaper, name="thirds") == Done()
-        assert one.controller.cycle.line.filter.tvist.name == "thirds"
+        assert one.controller.cycle.tvist.name == "thirds"
         for name in (f"{file}:mine"[-64:], "mine.py:mine", "mine"):
             for refused in (one.send(c.SetShaper, name=name), one.send(SimulationReset, shaper=name)):
                 assert isinstance(refused, Refused)

@@ -148,7 +148,7 @@ def test_an_arm_that_would_stand_in_a_wall_is_one_sentence(tmp_path):
 def test_a_reset_into_the_world_is_refused_and_changes_nothing(given, tmp_path):
     """Where the arm stands it is clear by less than it would bend under another payload."""
     clear, light = (-2.7, -1.8, -1.8, -1.1, 1.57, 0.0), msgspec.structs.replace(HEAVY, mass=0.1)
-    x, y, z = Robot(q=clear, carried=light).controller.cycle.line.plant.truth().flange_position
+    x, y, z = Robot(q=clear, carried=light).controller.cycle.plant.truth().flange_position
     (tmp_path / "scene.xml").write_text(
         '<mujoco><worldbody><body name="tool"><geom type="sphere" size="0.01" pos="0 0 0.1"/></body><geom name="plate" '
         f'type="box" size="0.1 0.1 0.01" pos="{x} {y} {z - 0.12 - 4e-4}"/></worldbody></mujoco>'

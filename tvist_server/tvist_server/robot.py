@@ -116,7 +116,7 @@ class ServedRobot:
             self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience,
             survives=True,
         )  # fmt: skip
-        plant = self.controller.cycle.line.plant  # also where the setup has none
+        plant = self.controller.cycle.plant  # also where the setup has none
         knows = isinstance(plant, Truthful) and plant.truth() is not None
         self.want_truth = self.publisher.want_truth if knows and not setup.truth else None
         """To be told whether a client on this machine wants the truth; None if it is published anyway, or unknown."""

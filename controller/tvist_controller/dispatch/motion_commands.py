@@ -60,11 +60,10 @@ class MotionCommands:
         self._motion, self._safety, self._programs = motion, safety, programs
 
     def _move(self, call: Call[Any]) -> Reply:
-        trigger = tag(type(call.command))
-        self._motion.check(trigger)
+        self._motion.check(tag(type(call.command)))
         planned: PlannedMove = call.planned()
         limited = None if planned.limited is None else planned.limited[1]
-        return Accepted(id=self._motion.move(planned, trigger), limited=limited)
+        return Accepted(id=self._motion.move(planned), limited=limited)
 
     def _servo_start(self, call: Call[c.ServoStart]) -> None:
         command = call.command

@@ -1,6 +1,6 @@
 """Check of the remaining motion: whether it stays clear, and how long it lasts."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -31,16 +31,14 @@ class WayAhead:
     def __init__(self, cycle: ControlCycle, outlook: Outlook, collisions: CollisionModel) -> None:
         self._cycle, self._collisions = cycle, collisions
         self._outlook = outlook
-        self.coming: Callable[[], Sequence[PlannedMotion]] = tuple
-        """Returns the parts of the present motion that have not begun."""
-        room = StreamTorqueRoom(cycle.description, cycle.line.dynamics)
+        room = StreamTorqueRoom(cycle.description, cycle.dynamics)
         self._guard = LookAhead(collisions, outlook.stops, room)
         reach = np.array(cycle.description.limits.position)
         self._guide_guard = LookAhead(collisions, outlook.stops, room, reach=reach)
 
     def guard_of_stream(self) -> LookAhead:
         """Return the guard of a stream that begins from rest."""
-        self._guard.begin(self._cycle.line.shaped.newest)
+        self._guard.begin(self._cycle.newest)
         return self._guard
 
     def guard_of_guided(self) -> LookAhead:
@@ -50,7 +48,7 @@ class WayAhead:
             RefusalError: There is no clear stop from here, as on a narrow path; nothing has changed.
         """
         cycle, guard, stops = self._cycle, self._guide_guard, self._outlook.stops
-        state = cycle.line.shaped.newest
+        state = cycle.newest
         guard.begin(state)
         if not cycle.mode.at_rest:
             stop = stops.by_joints(state, None, guard.clear)
@@ -62,7 +60,7 @@ class WayAhead:
 
     def rehearse(self) -> None:
         """Judge the arm's standing once, since the first look ahead loads compiled code, which takes some ticks."""
-        state = self._cycle.line.shaped.newest
+        state = self._cycle.newest
         self._guard.begin(state)
         self._guard(state)
 
@@ -93,48 +91,50 @@ class WayAhead:
             return None
         return self._on(self._outlook.foresee(trajectory=end))
 
-    def rest_of_way(self, tvist: Filter | None) -> Meeting | None:
+    def rest_of_way(self, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> Meeting | None:
         """Return the meeting that would occur on the rest of the motion, if any; if that is unknown, in a stop.
 
         Args:
             tvist: A new filter; None for the present one.
+            parts: The parts of the present motion that have not begun.
         """
         cycle = self._cycle
-        coming = [part.path.whole for part in self.coming()]
+        coming = [part.path.whole for part in parts]
         if cycle.mode.at_rest:
             return self._first(coming)
         trajectory = cycle.trajectory
         if (forecast := trajectory.forecast) is not None:
-            return self._first([forecast.path.way(cycle.line.shaped.along.position, forecast.end), *coming])
+            return self._first([forecast.path.way(cycle.along.position, forecast.end), *coming])
         if trajectory.foreseeable and (ahead := self._outlook.foresee(tvist)) is not None:
             return self._on(ahead)
         guard = self._guide_guard if cycle.guard is self._guide_guard else self._guard
-        stop = self._outlook.stops.by_joints(cycle.line.shaped.newest, None, guard.clear)
+        stop = self._outlook.stops.by_joints(cycle.newest, None, guard.clear)
         if stop is None:
             return guard.met
-        guard.take(cycle.line.shaped.newest, stop)
+        guard.take(cycle.newest, stop)
         return None
 
     def _first(self, ways: Sequence[Way]) -> Meeting | None:
         """Return the first meeting on several ways, one after the other."""
         return next((found[1] for way in ways if (found := self._collisions.on_way(way))), None)
 
-    def check_payload(self, payload: Payload, tvist: Filter | None) -> None:
+    def check_payload(self, payload: Payload, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> None:
         """Check the rest of the motion with another payload, and put the payload into the collision model.
 
         Args:
             payload: New declared payload.
             tvist: New filter for it; None for the present one.
+            parts: See `rest_of_way`.
 
         Raises:
             RefusalError: There would be a collision; nothing has changed.
         """
-        collisions, q = self._collisions, self._cycle.line.shaped.position
+        collisions, q = self._collisions, self._cycle.position
         before = collisions.declared
         escaping = self._cycle.mode.at_rest or collisions.meeting(q) is not None
         collisions.declare(payload)
         met = None if escaping else collisions.meeting(q)
-        met = met or self.rest_of_way(tvist)
+        met = met or self.rest_of_way(tvist, parts)
         if met is not None:
             collisions.declare(before)
             why = f"{met} on the rest of the path with this payload"
@@ -149,17 +149,17 @@ class WayAhead:
         cycle = self._cycle
         if not (cycle.mode.guarded and cycle.trajectory.foreseeable):
             return
-        met = self.rest_of_way(tvist)
+        met = self.rest_of_way(tvist, ())  # a stream or a guided motion has no parts
         if met is not None:
             raise RefusalError("collision", "name", f"{met} on the rest of the way", CLEARANCE)
 
     def _tail_is_spacious(self, end: JointStop) -> bool:
         """Return whether there is room for any output of a filter from the references that it may still use."""
         cycle = self._cycle
-        if cycle.line.filter.tvist.peak > 1.0:
+        if cycle.tvist.peak > 1.0:
             return False
-        q = cycle.line.shaped.position
-        window = np.abs(cycle.line.filter.window() - q).max(axis=0)
+        q = cycle.position
+        window = np.abs(cycle.filter.window() - q).max(axis=0)
         _, qd, qdd = end.at(0.0)
         return self._collisions.is_spacious(
             q, window + self._guard.turned(qd, qdd, end.acceleration, end.jerk)

@@ -34,7 +34,7 @@ class Outlook:
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
-        self.stops = StopPlanner(cycle.description, cycle.line.dynamics, PERIOD)
+        self.stops = StopPlanner(cycle.description, cycle.dynamics, PERIOD)
         """Planner of stops."""
         self._wanted = math.inf
 
@@ -49,19 +49,10 @@ class Outlook:
             The last two shaped references played and the future ones until they come to rest, one for each tick,
             shape (k, n) [rad]; None if that takes more than `MAX_AHEAD` ticks, or the trajectory cannot go on.
         """
-        ahead = self._ahead(tvist, trajectory)
+        ahead = Ahead(*self._cycle.fork(tvist, trajectory))
         with suppress(StuckError):
             ahead.until(MAX_AHEAD)
         return np.array(ahead.references) if ahead.rests else None
-
-    def _ahead(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Ahead:
-        """Start a simulation as in `foresee`, which the caller runs as far as needed."""
-        cycle, line = self._cycle, self._cycle.line
-        trajectory = (trajectory or cycle.trajectory).fork()
-        line_filter = line.filter.fork() if cycle.mode.shaped else None
-        if tvist is not None and line_filter is not None:
-            line_filter.use(tvist.fork())
-        return Ahead(trajectory, line_filter, line.shaped.fork())
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
         """Come to rest as quickly as permitted.
@@ -101,28 +92,26 @@ class Outlook:
 
     def _by_joints(self, deceleration: float | None) -> StopPlan | None:
         cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
-        stop = self.stops.by_joints(
-            cycle.line.shaped.newest, deceleration, _anywhere if guard is None else guard.clear
-        )
+        stop = self.stops.by_joints(cycle.newest, deceleration, _anywhere if guard is None else guard.clear)
         # A stop that goes on is replaced by a harder one only: each new one begins with a ramp of its own.
         braking = cycle.mode is LineMode.STOPPING or present.acceleration > 0.0
         if braking and (stop is None or stop.acceleration <= present.acceleration):
             return None
         if stop is None:  # no stop is clear and within the torque limits
             hardest = self.stops.highest
-            stop = self.stops.stop(cycle.line.shaped.newest, hardest) if guard is None else guard.fallback()
+            stop = self.stops.stop(cycle.newest, hardest) if guard is None else guard.fallback()
         return self._plan(stop, deceleration, stop.duration, stop.end)
 
     def _on_path(self, forecast: Forecast, deceleration: float | None) -> StopPlan | None:
         cycle, forecast = self._cycle, self._shaped(forecast)
         # Stops on a path are sought in the order of their cost: by bounds alone, then beside the motion simulated for
         # as long as a stop lasts, then beside the whole of it.
-        state, newest = cycle.line.shaped.along.published, cycle.line.shaped.along.position
+        state, newest = cycle.along.published, cycle.along.position
         stop = self.stops.on_path(state, newest, forecast, deceleration)
         lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
         ahead = None
         if stop is None:
-            ahead = self._ahead()
+            ahead = Ahead(*cycle.fork())
             # A motion that cannot turn back has to be simulated only for as long as a stop lasts.
             ahead.until(MAX_AHEAD if forecast.turns else 0)
             stop = self.stops.under(ahead, state, forecast, deceleration)
@@ -153,7 +142,7 @@ class Outlook:
         end: Floats,
     ) -> StopPlan:
         kept = None if stop is None else stop.acceleration
-        way = float(np.abs(end - self._cycle.line.shaped.position).max())
+        way = float(np.abs(end - self._cycle.position).max())
         return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
 
     def _shaped(self, forecast: Forecast) -> Forecast:
@@ -161,10 +150,10 @@ class Outlook:
         cycle = self._cycle
         if cycle.mode is LineMode.STOPPING:
             return forecast
-        peak, direction = cycle.line.filter.peak, forecast.path.direction
-        known = peak == 1.0 and not cycle.line.filter.fading and forecast.steady > 0.0
+        peak, direction = cycle.filter.peak, forecast.path.direction
+        known = peak == 1.0 and not cycle.filter.fading and forecast.steady > 0.0
         if known:  # the filter's output is delayed, so it still contains earlier decelerations
-            steps = np.diff(cycle.line.filter.window() @ direction)
+            steps = np.diff(cycle.filter.window() @ direction)
             known = bool((np.diff(steps) >= -EVEN * float(direction @ direction)).all())
         return replace(
             forecast,

@@ -64,8 +64,8 @@ class ToolForces:
     def felt(self, sample: Sample) -> Floats:
         """Return the same as `wrench` for a tick whose signals are known, shape (6,), with the arm driven."""
         measured, zero = sample.measured, self._peripherals.wrench_zero
-        if measured.wrench is not None:
-            return self._sensed(measured.wrench, measured.q)
+        if sample.wrench is not None:
+            return self._sensed(sample.wrench, measured.q)
         found = self._estimated(sample, sample.signals[TORQUE])
         return found if zero is None else found - zero
 

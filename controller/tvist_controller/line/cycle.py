@@ -4,19 +4,24 @@ from typing import TypeVar
 
 import numpy as np
 
-from tvist_controller.line.boxes import Boxes
-from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.differentiator import Differentiator, Floats, Target
+from tvist_controller.line.drive_feed_forward import DriveFeedForward
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.guard import Guard, Obstacle
+from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.line.limits import arm_limits
+from tvist_controller.line.line_filter import LineFilter
 from tvist_controller.line.line_mode import LineMode, check_change
+from tvist_controller.line.line_tick import SIGNALS, to_drives
 from tvist_controller.line.sample import Sample
-from tvist_controller.trajectory import Rest, StuckError, Trajectory
+from tvist_controller.line.shaped_reference import ShapedReference
+from tvist_controller.trajectory import PlannedMotion, Rest, StuckError, Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import PERIOD, Measurement, Placeable, Plant
+from tvist_plant.plant import PERIOD, Measurement, Placeable, Plant, Supervised
 from tvist_plant.plant_checks import check_measurement, measured_standing
-from tvist_shaping.base import Filter
+from tvist_shaping.base import Filter, Posture
 
 T = TypeVar("T", bound=Trajectory)
 
@@ -55,13 +60,24 @@ class ControlCycle:
         law: Floats | None = None,
     ) -> None:
         self.description = description
-        arm = FlexibleArm(description, carried) if plant is None else plant
-        self.line = Boxes.of(description, tvist, q, declared, arm, compensate_sag=compensate_sag)
-        """The boxes after the trajectory generator."""
-        self.line.drives.use(elastic)
-        self.line.drives.compensate(law)
+        self.plant: Plant = FlexibleArm(description, carried) if plant is None else plant
+        """The arm."""
         self.trajectory: Trajectory = Rest(q)
         """Trajectory generator."""
+        self.filter = LineFilter(tvist, arm_limits(description))
+        """TVIST: shaper, estimator and fractional-delay filter, from the reference to the shaped one."""
+        self.shaped = ShapedReference(q, PERIOD)
+        """Shaped reference and its derivatives."""
+        self.dynamics = dynamics = InverseDynamics(description, declared)
+        """Torques of the rigid arm with its declared payload."""
+        self.drives = drives = DriveFeedForward(
+            description, PERIOD, compensate_sag=compensate_sag, positions=isinstance(self.plant, Supervised)
+        )
+        """Joint controllers: what the drives are sent for a target."""
+        self.drives.use(elastic)
+        self.drives.compensate(law)
+        self.kernel_parts = dynamics.chain, dynamics.gravitation, dynamics.scratch, drives.rows
+        """Links, gravity, scratch and joint controllers, as `line_tick` takes them."""
         self.mode = LineMode.REST
         """What the line does."""
         self.placements = 0
@@ -70,28 +86,34 @@ class ControlCycle:
         """What checks the references and the stops of a guarded motion; None without one."""
         self.sample = self.reset(q, carried=carried, seed=seed)
         """Signals of the last tick, or of the arm where it was put at rest since."""
-        check_measurement(self.sample.measured, description.joints, self.line.plant)
+        check_measurement(self.sample.measured, description.joints, self.plant)
 
-    def step(self) -> Sample:
-        """Compute one tick."""
-        line = self.line
+    def step(self, external: Floats | None = None) -> Sample:
+        """Compute one tick; takes what an external force sensor feels, see `Sample.external`."""
         # Trajectory generator: the reference x is q, or the parameter of a path. Filter: the shaped reference x*.
         x, x_star, refused = self._references()
-        reference, mode = line.shaped.take(x, x_star), self.mode
-        line.dynamics.advance()  # a newly declared payload is phased in
+        reference, mode = self.shaped.take(x, x_star), self.mode
+        self.dynamics.advance()  # a newly declared payload is phased in
         # Differentiator, inverse dynamics and joint controllers: q*, q̇*, q̈* a tick earlier, τ* and the plain command
-        signals = line.to_drives(reference)
-        command = line.drives.command(
-            signals, line.dynamics.payload_parameters,
-            may_begin=mode.shaped and not line.filter.fading, may_go_on=mode is not LineMode.BYPASSED,
+        signals = self._to_drives(reference)
+        command = self.drives.command(
+            signals, self.dynamics.payload_parameters,
+            may_begin=mode.shaped and not self.filter.fading, may_go_on=mode is not LineMode.BYPASSED,
         )  # fmt: skip
-        measured = line.plant.step(command)
+        measured = self.plant.step(command)
         self.sample = Sample(
-            mode, reference, line.shaped.references, line.shaped.joints.window, signals, command, measured,
-            line.drives.reference, refused,
+            mode, reference, self.shaped.references, self.shaped.joints.window, signals, command, measured,
+            self.drives.reference, refused, external,
         )  # fmt: skip
         self._settle()  # last, so that the tick that comes to rest is still reported as one of the motion
         return self.sample
+
+    def _to_drives(self, reference: Floats) -> Floats:
+        """Signals from the shaped reference to the drives and the reference before, shape (9, n), see `line_tick`."""
+        signals = np.empty((SIGNALS, len(reference)))
+        before, middle, last = self.shaped.joints.window
+        to_drives(before, middle, last, reference, PERIOD, *self.kernel_parts, signals)
+        return signals
 
     def follow(self, target: Floats, measured: Measurement) -> Sample:
         """Take what another controller asked of the arm in a tick, and what that measured; the arm gets no command.
@@ -116,10 +138,10 @@ class ControlCycle:
         except StuckError as error:
             assert guard is not None, "what may be stuck is guarded"
             return self._stopped(guard, guard.give_up(str(error)))
-        x_star = self.line.filter.filter(x) if self.mode.shaped else x
+        x_star = self.filter.filter(x) if self.mode.shaped else x
         # Judged after the filter, since it is the shaped reference from which the arm must be able to stop.
         if self.mode.guarded and guard is not None:
-            stop = guard(self.line.shaped.joints.after(x_star))
+            stop = guard(self.shaped.joints.after(x_star))
             if stop is not None:
                 return self._stopped(guard, stop)
         return x, x_star, None
@@ -140,19 +162,24 @@ class ControlCycle:
         Raises:
             ValueError: The mode cannot follow the present one, or it is guarded, and there is no guard.
         """
-        guard, path, line = guard or self.guard, trajectory.path, self.line
+        guard, path = guard or self.guard, trajectory.path
         check_change(self.mode, mode, guarded=guard is not None)
         if not mode.shaped:
             # What the delay line still holds would carry the arm on after the stop: it is never played.
             if path is None:
-                line.shaped.enter(None, line.shaped.position)
-            line.filter.cut()
-        elif path is not None and path.posture_of != line.shaped.posture_of:
-            line.enter(path.start, path.posture_of)
+                self.shaped.enter(None, self.position)
+            self.filter.cut()
+        elif path is not None and path.posture_of != self.shaped.posture_of:
+            self._enter(path.start, path.posture_of)
         if mode.shaped and trajectory.limits is not None:
-            line.filter.limits = trajectory.limits
+            self.filter.limits = trajectory.limits
         self.trajectory, self.mode, self.guard = trajectory, mode, guard
         return trajectory
+
+    def _enter(self, sample: Floats, posture_of: Posture | None = None) -> None:
+        """Change between samples of the joints and of a path's parameter, at rest; see `ShapedReference.enter`."""
+        self.shaped.enter(posture_of, sample)
+        self.filter.begin(self.tvist, sample, posture_of)
 
     def use(self, tvist: Filter, elastic: ElasticFeedForward | None = None) -> None:
         """Change the filter: at once if the arm is at rest, else within the limits of the motion.
@@ -163,23 +190,62 @@ class ControlCycle:
             tvist: New filter, with the joints and the period of the present one.
             elastic: Elastic feed-forward to use with it; None for that of the paper's controller.
         """
-        line_filter, drives = self.line.filter, self.line.drives
-        drives.use(elastic)
+        self.drives.use(elastic)
         if self.mode.at_rest:  # both kinds of feed-forward are equal there, so that none has to fade
-            drives.rest()
+            self.drives.rest()
         if self.mode.at_rest or not self.mode.shaped:
-            line_filter.begin(tvist, self.sample.reference)
+            self.filter.begin(tvist, self.sample.reference)
         else:
-            line_filter.use(tvist)
-            self.trajectory.adapt(line_filter.spared)
+            self.filter.use(tvist)
+            self.trajectory.adapt(self.filter.spared)
+
+    def go_on(self, longer: PlannedMotion) -> None:
+        """Let the present planned motion go on to the end of a longer one, which is the same until now."""
+        assert isinstance(self.trajectory, PlannedMotion)
+        self.trajectory.go_on(longer)
+        self.filter.limits = self.trajectory.limits
+
+    def fork(
+        self, tvist: Filter | None = None, trajectory: Trajectory | None = None
+    ) -> tuple[Trajectory, LineFilter | None, ShapedReference]:
+        """Return independent copies of all that shapes the reference: generator, filter if it is in use, and output.
+
+        Args:
+            tvist: A filter to change to now; None for no change.
+            trajectory: A trajectory to follow from now on; None for the present one.
+        """
+        line_filter = self.filter.fork() if self.mode.shaped else None
+        if tvist is not None and line_filter is not None:
+            line_filter.use(tvist.fork())
+        return (trajectory or self.trajectory).fork(), line_filter, self.shaped.fork()
+
+    @property
+    def tvist(self) -> Filter:
+        """The latest chosen filter."""
+        return self.filter.tvist
+
+    @property
+    def newest(self) -> Target:
+        """State of motion of the newest shaped reference."""
+        return self.shaped.newest
+
+    @property
+    def position(self) -> Floats:
+        """The newest shaped reference, shape (n,) [rad]."""
+        return self.shaped.position
+
+    @property
+    def along(self) -> Differentiator:
+        """State of motion of the filter's samples, which are a path's parameters or else joint positions."""
+        return self.shaped.along
 
     @property
     def stands_still(self) -> bool:
         """Whether the shaped reference rests on a reference that stands: the motion is over, or it is paused."""
-        line, sample = self.line, self.sample
+        sample = self.sample
         return (
             self.trajectory.standing
-            and (not self.mode.shaped or line.filter.settled)
+            and (not self.mode.shaped or self.filter.settled)
             and sample.target.rests_at(sample.reference, PERIOD)
         )
 
@@ -188,14 +254,14 @@ class ControlCycle:
         trajectory, mode = self.trajectory, self.mode
         if mode.at_rest or not ((trajectory.finished or mode is LineMode.RUNNING_OUT) and self.stands_still):
             return
-        line, reference = self.line, self.sample.reference
-        on_path = line.shaped.posture_of is not None
+        reference = self.sample.reference
+        on_path = self.shaped.posture_of is not None
         if on_path or not mode.shaped:  # the delay line restarts from where the motion ended
-            line.enter(reference)
+            self._enter(reference)
         if on_path or not trajectory.finished:  # a motion that ran out while paused ends here
             self.trajectory = Rest(reference)
         self.mode, self.guard = LineMode.REST, None
-        line.drives.rest()
+        self.drives.rest()
 
     def reset(
         self, q: Floats, *, carried: Payload | None = None, seed: int = 0, measured: Measurement | None = None
@@ -211,17 +277,21 @@ class ControlCycle:
         Raises:
             ValueError: An arm that cannot be placed does not tell where it stands. Nothing has changed.
         """
-        line, plant = self.line, self.line.plant
+        plant = self.plant
         if measured is None and not isinstance(plant, Placeable):
             measured = measured_standing(plant, len(q))
             q = measured.q.copy()
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
         self.placements += 1
-        signals = line.rest_at(q)
-        command = line.drives.command(signals, line.dynamics.payload_parameters)
+        self.dynamics.settle()
+        self.shaped.reset(q)
+        self.filter.begin(self.tvist, q)
+        self.drives.reset(self.dynamics.gravity(q))
+        signals = self._to_drives(q)
+        command = self.drives.command(signals, self.dynamics.payload_parameters)
         if measured is None and isinstance(plant, Placeable):
             measured = plant.reset(command, payload=carried, seed=seed)
         assert measured is not None, "what cannot be placed is measured"
-        still = line.shaped.references
+        still = self.shaped.references
         self.sample = Sample(self.mode, q, still, still, signals, command, measured)
         return self.sample

@@ -43,18 +43,18 @@ class Still:
 
 def rehearse(cycle: ControlCycle) -> None:
     """Make some ticks with a line like this one, whose arm is not touched."""
-    description, line, q = cycle.description, cycle.line, cycle.sample.reference
-    carried = line.plant.payload
-    flexible = isinstance(line.plant, FlexibleArm)
+    description, plant, q = cycle.description, cycle.plant, cycle.sample.reference
+    carried = plant.payload
+    flexible = isinstance(plant, FlexibleArm)
     other = ControlCycle(
-        description, line.filter.tvist.fork(), q=q, declared=line.dynamics.payload, carried=carried, seed=0,
+        description, cycle.tvist.fork(), q=q, declared=cycle.dynamics.payload, carried=carried, seed=0,
         plant=FlexibleArm(description, carried) if flexible else Still(description.joints),
     )  # fmt: skip
-    other.line.filter.rehearse(q)  # a transition between filters has kernels of its own
+    other.filter.rehearse(q)  # a transition between filters has kernels of its own
     for _ in range(3):
         other.step()
-    _ = other.line.shaped.joints.published  # as a state of a shaped motion needs it
-    limits, room = arm_limits(description), StreamTorqueRoom(description, other.line.dynamics)
+    _ = other.shaped.joints.published  # as a state of a shaped motion needs it
+    limits, room = arm_limits(description), StreamTorqueRoom(description, other.dynamics)
     # Curves through set-points at the line's own rate and at a lower one.
     for period in (PERIOD, 4.0 * PERIOD):
         stream = SetpointStream(q, period, limits, PERIOD, torque=room)

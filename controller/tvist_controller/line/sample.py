@@ -33,6 +33,14 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
     refused: Obstacle | None = None
     """Why a reference was not played, so that a stop was made instead; None if it was played."""
 
+    external: Floats | None = None
+    """Force and torque that a sensor of the user's feels in place of the arm's own, see `wrench`; None without one."""
+
+    @property
+    def wrench(self) -> Floats | None:
+        """Force and torque at the flange by the sensor that counts, shape (6,) [N, N m]; None without a sensor."""
+        return self.measured.wrench if self.external is None else self.external
+
     @property
     def target(self) -> Target:
         """q* and its derivatives at the previous tick, since central differences cost one tick of delay."""

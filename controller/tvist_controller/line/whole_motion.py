@@ -98,9 +98,9 @@ class DrivenLine:
             elastic: Elastic feed-forward for the drives; None for that of the paper's controller.
         """
         cycle = self._cycle
-        cycle.use(cycle.line.filter.tvist, elastic)
+        cycle.use(cycle.tvist, elastic)
         cycle.reset(start)
-        rest, delay = self._drives.last, cycle.line.drives.delay
+        rest, delay = self._drives.last, cycle.drives.delay
         if elastic is not None:
             return Driven(rest, *self._tick_by_tick(shaped, ticks, resting), delay)
         whole = np.empty((ticks, len(start)))
@@ -108,7 +108,7 @@ class DrivenLine:
         moving = min(len(shaped), ticks - resting)
         whole[resting : resting + moving] = shaped[:moving]
         targets, commands = np.empty((2, ticks, 3, len(start)))
-        all_to_drives(start, whole, PERIOD, *cycle.line.kernel_parts, targets, commands)
+        all_to_drives(start, whole, PERIOD, *cycle.kernel_parts, targets, commands)
         return Driven(rest, targets, commands, delay)
 
     def _tick_by_tick(self, shaped: Floats, ticks: int, resting: int) -> tuple[Floats, Floats]:

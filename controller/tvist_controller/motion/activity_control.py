@@ -60,11 +60,10 @@ class MotionControl:
         """Forecast of the control line's motion."""
         self.ahead = WayAhead(cycle, self.outlook, collisions)
         """Collision check of that motion."""
-        self.power = ArmPower.of(cycle.line.plant)
+        self.power = ArmPower.of(cycle.plant)
         """Power of an arm that has one."""
         self.motions = Motions(cycle, self.safety, emit)
         """Motions by number, and their speed."""
-        self.ahead.coming = lambda: self.motions.coming
         self.streams = Streaming()
         """The present stream of set-points, if there is one."""
         self.tcp: tuple[float, ...] = (0.0,) * 6
@@ -118,25 +117,17 @@ class MotionControl:
             q=q,
             speed=self.motions.wanted_speed,
             slowest=self.motions.slowest,
-            excess=cycle.line.filter.tvist.excess,
-            surplus=cycle.line.filter.tvist.surplus,
+            excess=cycle.tvist.excess,
+            surplus=cycle.tvist.surplus,
             tcp=self.tcp,
             declared_body=self.collisions.declared,
-            bodies=cycle.line.dynamics.bodies,
+            bodies=cycle.dynamics.bodies,
             filter=on,
         )
 
-    def move(self, planned: PlannedMove, trigger: str = "move_j") -> int:
-        """Start a motion whose plan holds for the present state; return its number.
-
-        Args:
-            planned: The plan.
-            trigger: `type` of the command that it carries out.
-
-        Raises:
-            RefusalError: See `check`.
-        """
-        self.go(trigger)
+    def move(self, planned: PlannedMove) -> int:
+        """Start a motion that `check` permits, with a plan that holds for the present state; return its number."""
+        self.activity = Activity.MOVING
         return self.motions.begin(planned)
 
     def pause(self) -> None:
@@ -212,15 +203,15 @@ class MotionControl:
 
     def _stream(self, period: float, limits: MotionLimits) -> SetpointStream:
         """Let the line follow set-points, which come every `period` seconds, from rest."""
-        cycle, line = self.cycle, self.cycle.line
-        line.filter.tvist.aim(None)
+        cycle = self.cycle
+        cycle.tvist.aim(None)
         stream = SetpointStream(
             cycle.sample.reference,
             period,
-            line.filter.spared(limits),
+            cycle.filter.spared(limits),
             PERIOD,
             reach=np.array(cycle.description.limits.position),
-            torque=StreamTorqueRoom(cycle.description, line.dynamics),
+            torque=StreamTorqueRoom(cycle.description, cycle.dynamics),
         )
         return cycle.begin(stream, LineMode.GUARDED, self.ahead.guard_of_stream())
 
@@ -290,9 +281,14 @@ class MotionControl:
             self._emit("warning", code="limit_acceleration", why=why)
 
     def tell_end(
-        self, plan: StopPlan | None, why: str, code: Code | None, kind: EventKind | None, category: int
+        self,
+        plan: StopPlan | None,
+        why: str,
+        code: Code | None,
+        kind: EventKind | None = None,
+        category: int = 2,
     ) -> None:
-        """Report a stop and what it has ended."""
+        """Report a stop and what it has ended; `plan` is None if the line makes one already."""
         if kind is None and not self.motions.running and not self.streaming:
             return
         duration, way = (0.0, 0.0) if self.cycle.mode.at_rest else self.ahead.until_rest(plan)
@@ -313,17 +309,20 @@ class MotionControl:
         if silence is not None:
             self.interrupt(silence)
 
-    def step(self) -> Sample:
-        """Compute one tick of the line.
+    def step(self, wrench: Floats | None = None) -> Sample:
+        """Compute one tick of the line; takes what an external force sensor feels, see `Sample.external`.
 
         Raises:
             PlantError: The arm's state is no longer finite; call `recover`.
         """
         if self.power is not None:
             self.power.follow(self.robot_mode)
-        sample = self.cycle.step()
-        if sample.refused is not None and self.activity is not Activity.STOPPING:
-            self.end("interruption", *sample.refused)
+        sample = self.cycle.step(wrench)
+        # The line has begun a stop by itself, in the tick in which its guard refused a reference.
+        interrupted = None if sample.refused is None else after(self.activity, "interruption")
+        if sample.refused is not None and interrupted is not None:
+            self.activity = interrupted
+            self.tell_end(None, *sample.refused)
         if self._moving and self.cycle.mode.at_rest and (target := after(self.activity, "at_rest")):
             goes_on = self.activity is Activity.MOVING and self.motions.go_on()
             if not goes_on:

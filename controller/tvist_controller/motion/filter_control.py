@@ -39,14 +39,14 @@ class Filters:
     @property
     def basis(self) -> FilterBasis:
         """The present state that a new filter depends on."""
-        tvist = self._cycle.line.filter.tvist
+        tvist = self._cycle.tvist
         return FilterBasis(tvist.name, tvist.estimator.modes, self.source, self._declared, self._given)
 
     def use(self, chosen: PlannedFilter) -> None:
         """Shape with a filter from now on."""
         before, idle = self.source, self._idle
         self.source, tvist = chosen.source, chosen.tvist
-        self._cycle.line.drives.compensate(chosen.law)
+        self._cycle.drives.compensate(chosen.law)
         self._cycle.use(tvist, chosen.elastic)
         self._motion.motions.keep_rate()
         self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
@@ -75,14 +75,14 @@ class Filters:
         self._declared = payload
         self._given = self._given if found else payload
         if tvist is not None:
-            self._cycle.use(tvist, self._cycle.line.drives.wanted)
+            self._cycle.use(tvist, self._cycle.drives.wanted)
             self._motion.motions.keep_rate()
         self._warn_of_payload()
 
     @property
     def _idle(self) -> bool:
         """True if there is no shaper, so that the modes do not matter."""
-        return self._cycle.line.filter.tvist.name == "none"
+        return self._cycle.tvist.name == "none"
 
     def _warn_of_payload(self) -> None:
         """Warn if a shaper uses modes that belong to another payload."""
@@ -114,9 +114,9 @@ class Filters:
         Args:
             sample: Signals of the latest tick.
         """
-        clipped = self._cycle.line.filter.tvist.clipped
+        clipped = self._cycle.tvist.clipped
         if clipped and not self._clipped:
-            name = self._cycle.line.filter.tvist.name
+            name = self._cycle.tvist.name
             why = (
                 f"{name} cannot meet its specification here: it needs a longer delay line, or leaves more vibration. "
                 "Choose another shaper for these poses, or a pose in which the arm is stiffer"

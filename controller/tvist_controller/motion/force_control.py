@@ -1,11 +1,9 @@
 """Force mode and freedrive: guided motions that give way to the force at the tool, and what ends them."""
 
 from collections.abc import Sequence
-from copy import copy
 from typing import Protocol
 
 import numpy as np
-from msgspec.structs import replace
 
 from tvist_controller.commands.events import Emit
 from tvist_controller.commands.refusal import RefusalError
@@ -79,7 +77,7 @@ class ForceControl:
         self._motion, self._cycle = guidance.motion, guidance.motion.cycle
         self._smooth = np.zeros(6)
         self._by_hand, self._beyond, self._contact = False, 0, ContactWatch()
-        self._source = self._source_of(self._cycle.sample, None)
+        self._source = self._source_of(self._cycle.sample)
         self._qd = self._cycle.sample.measured.qd
         self._basis: object = None
 
@@ -114,7 +112,7 @@ class ForceControl:
         Raises:
             RefusalError: The present activity does not allow it, or its motion cannot be taken over.
         """
-        if isinstance(self._cycle.line.plant, Supervised):
+        if isinstance(self._cycle.plant, Supervised):
             why = "this arm follows positions with a lag, and its force is a guess: forces cannot move it"
             raise RefusalError("wrong_mode", "", why)
         self.check_sensor()
@@ -126,7 +124,7 @@ class ForceControl:
 
     def free(self, axes: Floats, feature: Feature) -> int:
         """Let the arm be moved by hand along and about some axes, shape (6,), each 0 or 1; else as `begin`."""
-        mass, damping = HEAVY if self._cycle.sample.measured.wrench is None else LIGHT
+        mass, damping = HEAVY if self._cycle.sample.wrench is None else LIGHT
         speeds = np.where(axes > 0.0, HAND_SPEED, np.inf)
         task = ForceTask(axes, np.zeros(6), speeds, (damping / FREE_DAMPING) ** 4, 1.0, mass, damping)
         return self.begin(task, feature, 2, "freedrive")
@@ -157,7 +155,7 @@ class ForceControl:
         Args:
             direction: Direction in which it meets that, base frame, shape (3,); zeros for any.
         """
-        estimated = self._cycle.sample.measured.wrench is None
+        estimated = self._cycle.sample.wrench is None
         return self._contact.steps(direction, *(ESTIMATED_TOUCH if estimated else TOUCH))
 
     def _new(self) -> Compliant:
@@ -181,28 +179,19 @@ class ForceControl:
         """Force and torque of the last tick."""
         sample = self._cycle.sample
         found = self._forces.felt(sample)
-        if sample.measured.wrench is None:
+        if sample.wrench is None:
             found = self._smooth = self._smooth + PERIOD / (PERIOD + SMOOTHED) * (found - self._smooth)
         return found
 
-    def watch(self, sample: Sample) -> Sample:
-        """Make a protective stop if the arm presses too hard, or leaves its way in an axis that does not give way.
-
-        Returns:
-            The signals, with the wrench of the sensor that counts.
-        """
-        own, external = sample.measured.wrench, self.external.next()
-        if external is not None:
-            measured = copy(sample.measured)
-            measured.wrench = external
-            self._cycle.sample = sample = replace(sample, measured=measured)
-        self._follow_source(self._source_of(sample, external))
+    def watch(self, sample: Sample) -> None:
+        """Make a protective stop if the arm presses too hard, or leaves its way in an axis that does not give way."""
+        self._follow_source(self._source_of(sample))
         basis = self._forces.basis
         if basis != self._basis:
             self._basis, self._contact = basis, ContactWatch()
         pressed = [
-            self._forces.unexplained(sample, wrench, zeroed=wrench is sample.measured.wrench)
-            for wrench in (external, own)
+            self._forces.unexplained(sample, wrench, zeroed=wrench is sample.wrench)
+            for wrench in (sample.external, sample.measured.wrench)
             if wrench is not None
         ]
         if self._contact.awake:
@@ -215,13 +204,12 @@ class ForceControl:
         if why is not None and self._beyond > TICKS:
             self._beyond = 0
             self._motion.protect(why, "limit_force")
-        return sample
 
     @staticmethod
-    def _source_of(sample: Sample, external: Floats | None) -> str:
-        if external is not None:
+    def _source_of(sample: Sample) -> str:
+        if sample.external is not None:
             return "the external force sensor"
-        return "the drives' torques" if sample.measured.wrench is None else "the arm's force sensor"
+        return "the drives' torques" if sample.wrench is None else "the arm's force sensor"
 
     def _follow_source(self, source: str) -> None:
         """End what relies on the force if it comes from elsewhere; what was taken as zero then means nothing."""

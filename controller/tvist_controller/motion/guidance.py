@@ -35,7 +35,7 @@ class Guidance:
         """Limits of every joint."""
         self.reach = np.array(motion.cycle.description.limits.position)
         """Largest position of each joint in either direction, shape (n,) [rad]."""
-        self.torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.line.dynamics)
+        self.torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.dynamics)
         """Motion that the torque permits."""
         self._tcp, self._kinematics = motion.tcp, ToolKinematics(motion.cycle.description)
         self._kinematics.rehearse(PERIOD)
@@ -113,7 +113,7 @@ class Guidance:
             angular_acceleration: Angular deceleration [rad/s^2].
         """
         cycle = self._cycle
-        state, present, tool = cycle.line.shaped.newest, cycle.trajectory, self.tool
+        state, present, tool = cycle.newest, cycle.trajectory, self.tool
         fastest, twist = float(np.abs(state.qd).max()), tool.jacobian(state.q) @ state.qd
         duration = max(
             float(np.linalg.norm(twist[:3])) / acceleration,
@@ -139,7 +139,7 @@ class Guidance:
 
     def _most(self, shaped: bool) -> MotionLimits:
         """Limits of a reference."""
-        return self._cycle.line.filter.spared(self.limits) if shaped else self.limits
+        return self._cycle.filter.spared(self.limits) if shaped else self.limits
 
     def check(self, trigger: str, *, shaped: bool = False) -> None:
         """Refuse a command that the present activity does not allow."""
@@ -211,9 +211,9 @@ class Guidance:
         if lead is not None:  # its inner reference stands
             return lead.nominal, np.zeros_like(lead.nominal), np.zeros_like(lead.nominal)
         if cycle.mode.at_rest:
-            q = cycle.sample.reference if shaped else cycle.line.shaped.position
+            q = cycle.sample.reference if shaped else cycle.position
             return q, np.zeros_like(q), np.zeros_like(q)
-        newest = cycle.line.shaped.newest
+        newest = cycle.newest
         return newest.q, newest.qd, newest.qdd
 
     def follow(self, trigger: str, trajectory: Guided, *, shaped: bool = False) -> int:
@@ -234,7 +234,7 @@ class Guidance:
             cycle.begin(trajectory, LineMode.BYPASSED, guard)
         elif trajectory is not cycle.trajectory:
             if cycle.mode.at_rest:
-                cycle.line.filter.tvist.aim(None)
+                cycle.tvist.aim(None)
             cycle.begin(trajectory, LineMode.GUARDED, guard)
         motion.go(trigger)
         return motion.motions.guide(trajectory)

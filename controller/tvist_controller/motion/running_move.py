@@ -80,8 +80,7 @@ class RunningMove:
             self._velocity = max(self._velocity, planned.velocity)
             self._window = min(self._window, planned.window)
         else:
-            self._trajectory.go_on(longer)
-            self._cycle.line.filter.limits = self._trajectory.limits
+            self._cycle.go_on(longer)
             self._velocity, self._window, self.coming = planned.velocity, planned.window, tuple(coming)
         self._peak, self._course = planned.peak, planned.course
         self._parts += len(coming)
@@ -89,11 +88,11 @@ class RunningMove:
 
     def _begin(self) -> None:
         self._cycle.begin(self._trajectory)
-        self._cycle.line.filter.tvist.aim(self._trajectory.path.end)
+        self._cycle.tvist.aim(self._trajectory.path.end)
 
     def _rate(self, speed: float, slowest: float | None) -> float:
         """Rate of its time [-]: lower if it was planned for a shaper that is less slow, peaked or uneven."""
-        tvist = self._cycle.line.filter.tvist
+        tvist = self._cycle.tvist
         room = min(_fitting(self._window, tvist.delay), _fitting(self._peak, tvist.peak))
         if tvist.surplus != self._surplus:
             (velocity, acceleration), (more_velocity, more_acceleration) = self._room, tvist.surplus
@@ -107,7 +106,7 @@ class RunningMove:
         """Number of its present part, from 0, and the length covered on it [m]; None on a part without length."""
         if self._trajectory.path.posture_of is None:
             return None
-        return self._parts - 1 - len(self.coming), float(self._cycle.line.shaped.along.newest.q[0])
+        return self._parts - 1 - len(self.coming), float(self._cycle.along.newest.q[0])
 
     @property
     def stops_at(self) -> tuple[int, float] | None:
@@ -135,14 +134,14 @@ class RunningMove:
             return
         trajectory, cycle = self._trajectory, self._cycle
         most = trajectory.agility.acceleration
-        newest = cycle.line.shaped.along.newest
+        newest = cycle.along.newest
         speed = max(trajectory.velocity, float(np.abs(newest.qd).max()))
         left = trajectory.path.end - newest.q
         farthest = float(np.abs(left).max())
         way = left * min(speed * speed / (most * max(farthest, STILL)), 1.0)
         limits = np.array(cycle.description.limits.torque)
         room = PAUSE_SHARE * acceleration_on_way(
-            cycle.line.dynamics, trajectory.path, newest.q, way, speed, limits
+            cycle.dynamics, trajectory.path, newest.q, way, speed, limits
         )
         if not trajectory.steady:  # the slider is changing its speed already, and may use all
             room = most

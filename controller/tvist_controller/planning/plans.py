@@ -15,7 +15,9 @@ Order = Callable[[Command, PlanBasis], Callable[[], Plan]]
 class MakesPlans(Protocol):
     """A `Planner`, which lies above all that uses plans."""
 
-    def plan(self, command: Command, basis: PlanBasis, *, within_tick: bool = False) -> Plan:
+    def plan(
+        self, command: Command, basis: PlanBasis, *, within_tick: bool = False, checked: bool = False
+    ) -> Plan:
         """Plan a command on a state."""
 
 
@@ -62,7 +64,7 @@ class Plans:
         return plan.holds(self._basis(0.0 if goes_on else None))
 
     def found(self, command: Command, plan: Plan | None = None) -> Any:
-        """Return what was planned for a command.
+        """Return what was planned for a command that has passed its row's check.
 
         Args:
             command: The command.
@@ -71,7 +73,9 @@ class Plans:
         Raises:
             RefusalError: The command cannot be carried out.
         """
-        found = (plan if plan is not None and self.hold(plan) else self.now(command)).found
+        if plan is None or not self.hold(plan):
+            plan = self._planner.plan(command, self._basis(None), checked=True)
+        found = plan.found
         if isinstance(found, RefusalError):
             raise found
         return found

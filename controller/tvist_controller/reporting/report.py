@@ -80,7 +80,7 @@ class Report(Struct, gc=False):
         key = (
             width(tick), None if sequence is None else width(sequence), self.modes, self.missed, self.clipped,
             unshaped is None, motors is not None and motors.limited, motors is None, len(f_d),
-            measured.wrench is None,
+            sample.wrench is None,
         )  # fmt: skip
         template, places, integers = self.layouts.of(key, self)
         before, middle, last = unshaped or (NOWHERE, NOWHERE, NOWHERE)
@@ -89,7 +89,7 @@ class Report(Struct, gc=False):
             out, places, integers, tick, sequence or 0, PERIOD, self.speed, self.delay, sample.signals,
             before, middle, last, measured.q, measured.qd, measured.moment, measured.accelerometer,
             self.kinematics.chain, self.kinematics.offset, f_d, self.zeta,
-            NOTHING if motors is None else motors.rows, NOWHERE if measured.wrench is None else measured.wrench,
+            NOTHING if motors is None else motors.rows, NOWHERE if sample.wrench is None else sample.wrench,
         )  # fmt: skip
         return out.tobytes()
 
@@ -130,5 +130,5 @@ class Report(Struct, gc=False):
             motor_qdd=None if motors is None else motors.rows[1].tolist(),
             motor_moment=None if motors is None else motors.rows[2].tolist(),
             motor_limited=motors is not None and motors.limited,
-            flange_wrench=None if measured.wrench is None else measured.wrench.tolist(),
+            flange_wrench=None if sample.wrench is None else sample.wrench.tolist(),
         )

@@ -13,6 +13,7 @@ from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import Planning
 from tvist_controller.safety.payload_monitor import PayloadMonitor
 from tvist_controller.setup import body
+from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import SetPayload
@@ -75,13 +76,17 @@ class DeclaredPayload:
         payload = _payload_of(call.command)
         tvist = call.planned()
         carried = body(payload)
-        self._motion.ahead.check_payload(carried, tvist)
+        self._clear_with(carried, tvist)
         self.payload = payload
         self._assume(payload, tvist, max(round(call.command.transition_time / PERIOD), SLEW))
 
+    def _clear_with(self, carried: Body, tvist: Filter | None) -> None:
+        """Put a payload into the collision model, unless the rest of the motion would not be clear with it."""
+        self._motion.ahead.check_payload(carried, tvist, self._motion.motions.coming)
+
     def forget(self, tvist: Filter | None) -> None:
         """Assume the declared payload again; `tvist` is the filter for it."""
-        self._motion.ahead.check_payload(body(self.payload), tvist)
+        self._clear_with(body(self.payload), tvist)
         self.learn(self.payload, tvist, f"the declared {self.payload.mass:g} kg are assumed again")
 
     def learn(self, payload: Payload, tvist: Filter | None, why: str, *, beyond: bool = False) -> None:
@@ -100,7 +105,7 @@ class DeclaredPayload:
 
     def _assume(self, payload: Payload, tvist: Filter | None, ticks: int, *, beyond: bool = False) -> None:
         self.assumed, carried = payload, body(payload)
-        self._motion.cycle.line.dynamics.declare(carried, ticks)
+        self._motion.cycle.dynamics.declare(carried, ticks)
         found = payload is not self.payload
         self._filters.declare(payload, tvist, found=found)
         self._monitor.declare(carried, found=found, told=beyond)

@@ -67,7 +67,7 @@ class Faults:
             "fault": lambda: safety.cut_power("the safety system failed", "fault"),
         }
         """Functions for the faults that have no duration."""
-        plant = motion.cycle.line.plant
+        plant = motion.cycle.plant
         self._pushable = plant if isinstance(plant, Pushable) else None
         if isinstance(plant, Breakable):
             self._momentary["nan"] = plant.make_nan
@@ -126,7 +126,7 @@ class Faults:
         if (fault == "torque" and self._pushable is None) or (
             fault == "nan" and fault not in self._momentary
         ):
-            plant = type(self._motion.cycle.line.plant).__name__
+            plant = type(self._motion.cycle.plant).__name__
             missing = "push" if fault == "torque" else "make_nan"
             why = (
                 f"fault is {fault!r}: the plant {plant} cannot simulate it, since it has no method {missing}"

@@ -78,7 +78,7 @@ class Protection:
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
-        self._own = isinstance(cycle.line.plant, Supervised)
+        self._own = isinstance(cycle.plant, Supervised)
         """Whether the arm's own controller watches its torques, which may be guessed here from currents."""
         self._overload = Overload(cycle.description.limits.torque)
 
@@ -89,7 +89,7 @@ class Protection:
             sample: Signals along the control line.
         """
         joint = None if self._own else self._overload.joint(sample.measured.moment)
-        fault = self._cycle.line.filter.fault
+        fault = self._cycle.filter.fault
         if joint is None and fault is None:
             return ()
         found: list[Danger] = []

@@ -136,8 +136,8 @@ class SafetyControl:
             ValueError: It does not tell where that is.
         """
         cycle = self._motion.cycle
-        if not isinstance(cycle.line.plant, Placeable):
-            cycle.reset(cycle.line.shaped.position)
+        if not isinstance(cycle.plant, Placeable):
+            cycle.reset(cycle.position)
 
     def cut_power(self, why: str, latched: Latched | None = None) -> None:
         """Stop with category 0: the power is off, and the brakes close at once.
@@ -154,9 +154,8 @@ class SafetyControl:
         target = after(motion.activity, "brakes")
         motion.activity = target or motion.activity
         if target is not None and not cycle.mode.at_rest:
-            joints = cycle.line.shaped.joints
-            stop = brake(cycle.description, cycle.line.plant.payload, joints.newest, PERIOD)
-            way = float(np.abs(stop.end - joints.position).max())
+            stop = brake(cycle.description, cycle.plant.payload, cycle.newest, PERIOD)
+            way = float(np.abs(stop.end - cycle.position).max())
             plan = StopPlan(None, None, limited=False, duration=stop.duration, way=way)
             motion.outlook.brake(stop)
         motion.tell_end(plan, why, None, "safety_stop", 0)
@@ -215,8 +214,8 @@ class SafetyControl:
             Signals with the new state.
         """
         motion, cycle = self._motion, self._motion.cycle
-        placed = isinstance(cycle.line.plant, Placeable)
-        why, position = str(error), cycle.line.shaped.position
+        placed = isinstance(cycle.plant, Placeable)
+        why, position = str(error), cycle.position
         try:
             sample = cycle.reset(position, seed=seed)
             if placed:

@@ -171,7 +171,7 @@ def largest_deflection(description: RobotDescription) -> Bent:
     gears, links = [], []
     for _ in range(stop + 4 * after):
         cycle.step()
-        truth = truth_of(cycle.line.plant)
+        truth = truth_of(cycle.plant)
         gears.append(truth.gear_deflection)
         links.append(truth.link_deflection)
     g, s = np.array(gears) - gears[-1], np.array(links) - links[-1]

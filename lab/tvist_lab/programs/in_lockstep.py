@@ -50,7 +50,7 @@ def run_in_lockstep(
     """
     try:
         controller = Controller(setup)
-        check_unpaced(controller.cycle.line.plant)
+        check_unpaced(controller.cycle.plant)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     waiting: list[Command] = []

@@ -171,7 +171,7 @@ class ProgramWatch(Sink):
         """What came in this tick, and whose line is not known yet."""
         self._rest = 0
         """Ticks for which the shaped reference has rested after the last move."""
-        self.plant = plant = controller.cycle.line.plant
+        self.plant = plant = controller.cycle.plant
         """The arm."""
         self._world = plant if isinstance(plant, InWorld) else None
         self._truthful = isinstance(plant, Truthful) and plant.truth() is not None
@@ -255,7 +255,7 @@ class ProgramWatch(Sink):
             if self._rest == SEEN:
                 move.held = None
             if self._rest > AFTER_STOP and self._truthful:
-                truth = truth_of(self._controller.cycle.line.plant)
+                truth = truth_of(self._controller.cycle.plant)
                 seen = float(acceleration(truth.specific_force, truth.flange_rotation))
                 move.peak_so_far = max(move.peak_so_far or 0.0, seen)
 

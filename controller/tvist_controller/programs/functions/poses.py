@@ -25,7 +25,7 @@ class PoseFunctions:
     def __init__(self, access: Access, kinematics: ProgramKinematics) -> None:
         self._access, self._kinematics = access, kinematics
         self._joints = access.description.joints
-        self._dynamics = InverseDynamics(access.description, access.motion.cycle.line.dynamics.payload)
+        self._dynamics = InverseDynamics(access.description, access.motion.cycle.dynamics.payload)
 
     @costs(150)
     def get_inverse_kin(
@@ -85,7 +85,7 @@ class PoseFunctions:
     @costs(280)
     def get_mass_matrix(self, q: object = None, include_rotors_inertia: object = True) -> Array:
         """Return the inertia matrix of the joints with the declared payload [kg m^2]."""
-        self._dynamics.believe(self._access.motion.cycle.line.dynamics.bodies)
+        self._dynamics.believe(self._access.motion.cycle.dynamics.bodies)
         matrix = self._dynamics.inertia(self._posture(q))
         matrix = np.triu(matrix) + np.triu(matrix, 1).T
         if include_rotors_inertia:
