@@ -4,7 +4,7 @@ It puts the rooms together: each part knows those below it, and the controller w
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cached_property, partial
 from typing import Any, Unpack
@@ -12,19 +12,18 @@ from typing import Any, Unpack
 import numpy as np
 
 from tvist_controller.authority.rights import Authority
-from tvist_controller.authority.session import NoControlError, Session
+from tvist_controller.authority.session import NoControlError
 from tvist_controller.cell.live_cell import LiveCell
 from tvist_controller.commands.counters import Counters
 from tvist_controller.commands.events import Fields
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.dispatch.force_commands import ForceCommands
-from tvist_controller.dispatch.guided_commands import GuidedCommands
-from tvist_controller.dispatch.lessons import Lessons
+from tvist_controller.dispatch.guided_commands import ForceCommands, GuidedCommands
 from tvist_controller.dispatch.motion_commands import MotionCommands
+from tvist_controller.dispatch.payload_control import PayloadControl
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.dispatch.program_commands import ProgramCommands
 from tvist_controller.dispatch.setpoints import Setpoints, Unreadable
-from tvist_controller.dispatch.table import COMMANDS, HARMLESS, CommandTable, WholeRobot
+from tvist_controller.dispatch.table import COMMANDS, HARMLESS, WholeRobot
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.tool_forces import ToolForces
@@ -34,6 +33,7 @@ from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.filter_control import Filters
 from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
+from tvist_controller.motion.monitor import Monitor
 from tvist_controller.planning.basis import PlanBasis, ToolBasis
 from tvist_controller.planning.command_row import Call
 from tvist_controller.planning.filter_planner import PlannedFilter
@@ -43,12 +43,11 @@ from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.reporting.report import Report
 from tvist_controller.reporting.reporter import Reporter, truth_of
-from tvist_controller.safety.declared_payload import DeclaredPayload
 from tvist_controller.safety.faults import Faults
+from tvist_controller.safety.monitors import Overload, ShaperMonitor
+from tvist_controller.safety.own_controller import REFUSED, Supervision, Watching
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
-from tvist_controller.safety.supervision import Supervision
-from tvist_controller.safety.watching import REFUSED, Watching
 from tvist_controller.setup import Setup, body
 from tvist_plant.fingerprint import fingerprint
 from tvist_plant.plant import PERIOD, InWorld, Placeable, Plant, PlantError, Supervised, Watched
@@ -90,21 +89,19 @@ class Controller(WholeRobot):
         """The way to plans."""
         first = planner.filters.first()
         self.cycle = _cycle(setup, first, plant)
-        if setup.truth:
-            truth_of(self.cycle.plant)  # raises now, not at the first tick, if the plant has no truth
         self._seed = setup.seed
         self._reporter = Reporter(setup.description, self.cycle.plant)
-        collisions = CollisionModel(setup.description, body(setup.payload))
         # What only watches has no power to move anything, whatever is asked of it.
         mode = "POWER_OFF" if isinstance(plant, Watched) else setup.mode
+        collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, mode)
         self.modes = RobotModes(self.motion)
         """Robot mode, safety mode and runtime state."""
-        self.session = Session(timeouts=setup.clock == "realtime", instance=setup.instance)
-        self._authority = Authority(
-            self.session, self._interrupt, self._emit, steppable=setup.clock != "realtime"
+        self.session = Authority(
+            self._interrupt, self._emit, realtime=setup.clock == "realtime", instance=setup.instance
         )
-        self.stepping = self._authority.stepping
+        """Rights to control the robot and to advance time."""
+        self.stepping = self.session.stepping
         self._setpoints = Setpoints(self.session, self.motion, self.counters)
         self._safety = safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
@@ -122,32 +119,32 @@ class Controller(WholeRobot):
         )
         """What stands around the robot; None for nothing."""
         self._force_control = ForceControl(
-            Guidance(self.motion), self.forces, self._emit, timeouts=setup.clock == "realtime"
+            Guidance(self.motion), self.forces, timeouts=setup.clock == "realtime"
         )
         self.programs = ProgramPlayer(self._access(), safety)
         self._told_program = self.programs.progress
         self.filters = Filters(self.motion, first.source, setup.payload, self._emit)
-        self._payload = DeclaredPayload(
-            setup.payload, self.motion, self.filters, self._emit, follows=setup.adapt == "payload"
-        )
-        self.lessons = Lessons(
-            self.motion, self.filters, self._payload, self.peripherals, planner.for_lesson, self._emit
-        )
-        """What it has learnt from its motions."""
-        parts = (
-            self._authority, MotionCommands(self.motion, safety, self.programs),
-            GuidedCommands(self._force_control.guidance, self.programs),
-            ForceCommands(self._force_control, self.forces), self.filters, self._payload, self.peripherals,
-            self._faults, self.lessons, ProgramCommands(self.programs, self.motion), self,
+        self.payload = PayloadControl(
+            setup.payload, self.motion, self.filters, self.peripherals, planner.for_lesson, self._emit,
+            follows=setup.adapt == "payload",
         )  # fmt: skip
-        self._commands = CommandTable(parts, setup.description)
+        """What it carries."""
+        safety.monitors = self._monitors()
+        parts = (
+            self.session, MotionCommands(self.motion, safety, self.programs),
+            GuidedCommands(self._force_control.guidance, self.programs),
+            ForceCommands(self._force_control, self.forces), self.filters, self.payload, self.peripherals,
+            self._faults, ProgramCommands(self.programs, self.motion), self,
+        )  # fmt: skip
+        self._parts: dict[type[c.Command], Any] = {row.message: part for part in parts for row in part.rows}
+        """The part that carries out each command."""
         self.report = self._report(self.cycle.sample)
         """Report of the last tick, or of the arm at rest if it has not ticked yet or was placed somewhere since."""
 
     @property
     def declared(self) -> Payload:
         """Declared payload; that of a robot that is watched, if it says so."""
-        declared = self._payload.payload
+        declared = self.payload.declared
         return declared if self.watching is None else self.watching.declared(declared)
 
     @property
@@ -212,17 +209,23 @@ class Controller(WholeRobot):
         session: str | None = None,
         origin: str | None = None,
     ) -> Reply | None:
-        """Carry out a command of a client, or of a program; see `CommandTable.carry_out`."""
+        """Carry out a command of a client, or of a program; return None if its reply is `Done`.
+
+        Raises:
+            RefusalError: It cannot be carried out, and has changed nothing.
+            NoControlError: Its sender may not send it.
+        """
         if self.watching is not None and type(command) not in HARMLESS:
             raise RefusalError("wrong_mode", "", REFUSED)
         if self.supervision is not None:
             self.supervision.check(command)
         self._look_again()
-        planned = partial(self.plans.found, command, plan)
-        reply = self._commands.carry_out(
-            Call(command, self.tick_number + 1, self.now, session, planned, origin)
-        )
-        self.peripherals.changed |= COMMANDS[type(command)].changes_io
+        row, planned = COMMANDS[type(command)], partial(self.plans.found, command, plan)
+        if row.check is not None:
+            row.check(command, self.setup.description)
+        call = Call(command, self.tick_number + 1, self.now, session, planned, origin)
+        reply = row.handle(self._parts[type(command)], call)
+        self.peripherals.changed |= row.changes_io
         return reply
 
     def receive_setpoint(
@@ -243,7 +246,7 @@ class Controller(WholeRobot):
     def client_gone(self, client: str, session: str) -> None:
         """Handle the end of a client's session, which ends the rights it held."""
         self._look_again()
-        self._authority.client_gone(client, session)
+        self.session.end_rights(client, session)
 
     def missed(self, ticks: int) -> None:
         """Count ticks that began too late."""
@@ -295,20 +298,17 @@ class Controller(WholeRobot):
         try:
             if failed is not None:
                 raise failed
-            sample = self.motion.step(self._force_control.external.next())
-            self._safety.watch(sample)
-            self._force_control.watch(sample)
+            sensor = self._force_control.external
+            sample = self.motion.step(None if sensor.latest is None else sensor.next())
+            self._safety.watch_power(sample)
             if self.cell is not None:
                 self.cell.tick(self.tick_number + 1, sample.measured.q)
         except PlantError as error:
             with suppress(PlantError):
                 self._faults.clear()
             sample = self._safety.recover(error, self._seed)
-            self._payload.begin_anew()
             self.modes.changed = True
-        if self._force_control.compliant is None:  # else what it touches would be taken for a payload
-            self._payload.watch(sample)
-        self.filters.watch(sample)
+        self._safety.watch(sample)
         self.modes.update()
         self.tick_number += 1
         events, self._events = self._events, []
@@ -346,11 +346,11 @@ class Controller(WholeRobot):
         estimated = wrench and said is None
         io = self.peripherals.io(
             self.tick_number + 1,
-            self._payload.payload,
+            self.payload.declared,
             self.motion.motions.asked_speed,
             self.programs,
             self.forces.wrench() if estimated else None,
-            None if self._payload.assumed == self._payload.payload else self._payload.assumed,
+            None if self.payload.assumed == self.payload.declared else self.payload.assumed,
         )
         return io if said is None else said.io(io, force=wrench)
 
@@ -388,7 +388,7 @@ class Controller(WholeRobot):
     def _watch_time(self) -> None:
         """End what has timed out or run its course, and note when something will next."""
         self._faults.end(self.tick_number + 1)
-        self._authority.watch(self.now)
+        self.session.watch(self.now)
         self._next_timeout = min(PERIOD * (self._faults.next_end - 1), self.session.ends)
         if self.setup.clock == "realtime":
             self.motion.watch(self.now)
@@ -408,6 +408,14 @@ class Controller(WholeRobot):
         if isinstance(plant, Supervised):
             return None, Supervision(plant, self.motion, self._safety, tools, tools.set_tcp, self._emit)
         return None, None
+
+    def _monitors(self) -> Sequence[Monitor]:
+        """Return all that judges the signals of a tick, in this order."""
+        description = self.setup.description
+        overload = Overload(description.robot.joints, description.limits.torque)
+        # An arm with a controller of its own is watched by that; here its torques may be guessed from currents.
+        drives = () if isinstance(self.cycle.plant, Supervised) else (overload,)
+        return *drives, ShaperMonitor(self.cycle), self._force_control, self.payload.monitor
 
     def _access(self) -> Access:
         """What programs may use of the robot."""
@@ -466,14 +474,13 @@ class Controller(WholeRobot):
         self._reporter.forget_modes()
         self.modes.update()
         self.report = self._report(self.cycle.sample)
-        self._payload.begin_anew()
         self._force_control.begin_anew()
         self.programs.steadiness.forget()
         return Done(tick=self.tick_number)
 
     def check_step(self, call: Call[SimulationStep]) -> Reply:
         """Check that a client may advance time; the host then does so."""
-        self._authority.check_step(call.command, call.now)
+        self.session.check_step(call.command, call.now)
         self._setpoints.check(call.command)
         return Done(tick=self.tick_number + call.command.ticks)
 
@@ -482,13 +489,16 @@ def _cycle(setup: Setup, first: PlannedFilter, plant: Plant | None) -> ControlCy
     """The control line with its arm.
 
     Raises:
-        ValueError: The arm cannot be where it is to begin.
+        ValueError: The arm cannot be where it is to begin, or has no truth to report.
     """
     try:
-        return ControlCycle(
+        cycle = ControlCycle(
             setup.description, first.tvist, elastic=first.elastic, q=np.array(setup.q, dtype=float),
             declared=body(setup.payload), carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
             compensate_sag=setup.compensate_sag, law=first.law,
         )  # fmt: skip
     except PlantError as error:
         raise ValueError(str(error)) from error
+    if setup.truth:
+        truth_of(cycle.plant)  # raises now, not at the first tick
+    return cycle

@@ -10,8 +10,7 @@ import msgspec
 
 from tvist_controller.about import info_of
 from tvist_controller.authority.session import is_holders
-from tvist_controller.authority.standing import Standing
-from tvist_controller.authority.stepping import may_step
+from tvist_controller.authority.stepping import Standing, may_step
 from tvist_controller.cell.urcap import changes
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
@@ -70,7 +69,7 @@ class Host:
         admitted = admit(data, self.standing.lease, self.standing.clock)
         if isinstance(admitted, Refused):
             return self._turned_away(admitted)
-        return self.carry_out(admitted._replace(origin=origin))
+        return self.carry_out(admitted if origin is None else admitted._replace(origin=origin))
 
     def carry_out(self, admitted: Admitted, plan: Plan | None = None, attend: Attend | None = None) -> Reply:
         """Carry out a command.
@@ -159,8 +158,8 @@ class Host:
         if experience is not None:
             experience.watch(
                 report.sample,
-                controller.lessons.beliefs,
-                held=controller.lessons.held,
+                controller.payload.beliefs,
+                held=controller.payload.held,
                 placements=controller.cycle.placements,
             )
         for sink in self._sinks:
@@ -176,11 +175,11 @@ class Host:
 
     def _take(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
         self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
-        self.controller.lessons.learn(lesson, plan)
+        self.controller.payload.learn(lesson, plan)
 
     def _learn(self, experience: Experience) -> None:
         for beliefs, lesson, plan in experience.lessons():
-            if beliefs.payload != self.controller.lessons.beliefs().payload:
+            if beliefs.payload != self.controller.payload.beliefs().payload:
                 continue  # it is void: another payload was declared, learnt or forgotten since
             self._take(lesson, plan)
         for error in experience.raised():

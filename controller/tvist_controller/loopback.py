@@ -3,8 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from tvist_controller.controller import Controller
-from tvist_controller.experience.lesson import Student
-from tvist_controller.experience.own_students import experience_of
+from tvist_controller.experience.experience import Student, experience_of
 from tvist_controller.host import Host
 from tvist_controller.reporting.report import Report
 from tvist_controller.reporting.sink import Sink, Topic

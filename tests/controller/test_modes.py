@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from tvist_controller.authority.session import NoControlError, Session
 from tvist_controller.line.limits import REDUCED_SHARE
-from tvist_controller.safety.protection import TICKS, Overload
+from tvist_controller.safety.monitors import TICKS, Overload
+from tvist_plant.plant import Measurement
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
@@ -15,7 +17,7 @@ from tvist_protocol.transitions import TRANSITIONS, Activity, Control, after
 from tvist_protocol.values import Payload
 from tvist_shaping.catalogue import SHAPERS
 
-from .robots import Q1, Q2, Q3, UR5E, H, Robot
+from .robots import Q1, Q2, Q3, UR5E, H, Robot, cycle
 
 Q1_, Q2_, Q3_ = tuple(Q1), tuple(Q2), tuple(Q3)
 FASTEST = REDUCED_SHARE * min(UR5E.limits.velocity)
@@ -244,15 +246,24 @@ def test_no_move_of_the_arm_s_own_is_beyond_a_drive_s_limit_for_long():
 
 
 def test_overload_counts_each_joint_and_only_without_a_gap():
-    watch = Overload([10.0, 5.0])
+    watch, cycle_ = Overload(["base", "shoulder"], [10.0, 5.0]), cycle()
+
+    def joint(*moment):
+        measured = Measurement(Q1[:2], Q1[:2], np.array(moment), np.zeros(3))
+        found = watch.look(replace(cycle_.sample, measured=measured))
+        return None if found is None else found.why.split()[3]
+
     for _ in range(TICKS):
-        assert watch.joint(np.array([11.0, 0.0])) is None
-    assert watch.joint(np.array([0.0, -6.0])) is None
+        assert joint(11.0, 0.0) is None
+    assert joint(0.0, -6.0) is None
     for _ in range(TICKS - 1):
-        assert watch.joint(np.array([0.0, -6.0])) is None
-    assert watch.joint(np.array([0.0, -6.0])) == 1
-    watch.forget()
-    assert watch.joint(np.array([0.0, -6.0])) is None
+        assert joint(0.0, -6.0) is None
+    assert joint(0.0, -6.0) == "shoulder"
+    for _ in range(TICKS):
+        assert joint(0.0, -6.0) is None, "it is told once"
+    assert joint(0.0, -6.0) == "shoulder"
+    watch.restart()
+    assert joint(0.0, -6.0) is None
 
 
 # ---------------------------------------------------------------- a plant that fails

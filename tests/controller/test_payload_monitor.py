@@ -1,6 +1,7 @@
 """What the drives add to the feed-forward tells a wrong payload, and nothing else does."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from tests.controller.robots import Line
 
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.line.line_mode import LineMode
 from tvist_controller.safety.payload_monitor import TOLERATED, PayloadMonitor
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
@@ -47,12 +49,11 @@ class Watched:
         self.worst = 0.0
 
     def step(self):
-        sample = self.cycle.step()
-        said = self.monitor.update(sample.signals, sample.command.torque, sample.measured.moment)
+        said = self.monitor.look(self.cycle.step())
         mass, bound = self.monitor.excess
         if self.monitor._time > 1.0 and np.isfinite(bound):
             self.worst = max(self.worst, abs(mass) / (TOLERATED + bound))
-        return said
+        return None if said is None else said.why
 
     def carry(self, payload):
         """Grip a part: the arm moves on as it was, with another body on its flange."""
@@ -189,8 +190,14 @@ def test_no_warning_names_an_interval_that_holds_what_is_declared(seed):
             q, felt = random.uniform(-np.pi, np.pi, 6), float(random.choice([0.0, 10.0 * random.normal()]))
             per_kg = with_a_kilogram.gravity(q) - dynamics.gravity(q)
         signals = np.array([q, q, *[still] * 7])
-        said = monitor.update(signals, still, felt * per_kg + 3.0 * random.normal(size=6), at_rest=True)
-        if said:
+        moment = felt * per_kg + 3.0 * random.normal(size=6)
+        sample = SimpleNamespace(
+            signals=signals, command=SimpleNamespace(torque=still), measured=SimpleNamespace(moment=moment),
+            mode=LineMode.REST,
+        )  # fmt: skip
+        found = monitor.look(sample)
+        if found is not None:
+            said = found.why
             declared, holds, less, within = re.search(
                 r"^([\d.e-]+) kg are .* hold (?:about )?([\d.]+) kg( less)? \(within ([\d.]+) kg\)", said
             ).groups()

@@ -6,8 +6,7 @@ The modules behind it may change.
 from tvist_controller.about import info_of
 from tvist_controller.authority.presence import Presence
 from tvist_controller.controller import Controller
-from tvist_controller.experience.lesson import Student
-from tvist_controller.experience.own_students import experience_of
+from tvist_controller.experience.experience import Student, experience_of
 from tvist_controller.host import Host
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.programs.compiling import ScriptCompiler

@@ -21,32 +21,32 @@ def _check_version(command: TakeControl | TakeClock, _: RobotDescription) -> Non
         raise RefusalError("unsupported_version", "protocol", why, PROTOCOL_VERSION)
 
 
-class Authority:
-    """Grants, renews and ends the lease, with which motion ends, and the right to advance time.
+class Authority(Session):
+    """The lease of a robot, with which motion ends, and the right to advance time.
 
     Args:
-        session: The lease.
-        steppable: Whether a client may advance time.
         interrupt: Ends motion; takes the reason.
         emit: Emits events.
+        realtime: Whether time passes by itself, so that a lease times out and no client may advance time.
+        instance: See `Session`.
     """
 
     def __init__(
-        self, session: Session, interrupt: Callable[[str], None], emit: Emit, *, steppable: bool
+        self, interrupt: Callable[[str], None], emit: Emit, *, realtime: bool, instance: str = ""
     ) -> None:
-        self.session, self.stepping = session, ClockLease()
-        self._steppable = steppable
+        super().__init__(timeouts=realtime, instance=instance)
+        self.stepping = ClockLease()
         self._interrupt, self._emit = interrupt, emit
 
     def watch(self, now: float) -> None:
         """End a lease that was not renewed in time."""
-        if self.session.expired(now):
+        if self.expired(now):
             self._lose("the lease expired: no command renewed it")
 
-    def client_gone(self, client: str, session: str) -> None:
+    def end_rights(self, client: str, session: str) -> None:
         """End the rights of a client whose session has ended: motion ends with control, and the clock becomes free."""
         self.stepping.client_gone(client, session)
-        if self.session.client_gone(client, session):
+        if self.client_gone(client, session):
             self._lose(f"client {client!r} is gone")
 
     def check_step(self, step: SimulationStep, now: float) -> None:
@@ -56,13 +56,13 @@ class Authority:
             NoControlError: The sender has no such right.
             RefusalError: Time passes by itself with this clock.
         """
-        check_step(self.stepping.hold, self.session.lease, step)
+        check_step(self.stepping.hold, self.lease, step)
         if self.stepping.hold is None:
-            self.session.renew(step.token, now)
+            self.renew(step.token, now)
         self._check_steppable()
 
     def _check_steppable(self) -> None:
-        if not self._steppable:
+        if self._timeouts:
             why = "the robot runs in real time: start it with --clock lockstep to step"
             raise RefusalError("wrong_mode", "type", why)
 
@@ -71,21 +71,21 @@ class Authority:
         return Accepted(token=self.stepping.take(call.command.client, call.session).token)
 
     def _lose(self, why: str) -> None:
-        self.session.release()
+        self.release()
         self._emit("lease_lost", why=why)
         self._interrupt(why)
 
     def _take(self, call: Call[TakeControl]) -> Reply:
         command = call.command
-        lease = self.session.take(command.client, command.lease_s, call.now, call.session)
+        lease = self.take(command.client, command.lease_s, call.now, call.session)
         return Accepted(token=lease.token, lease_s=lease.seconds)
 
     def _hand_over(self, call: Call[HandOver]) -> None:
         """Give the lease to another client, which then takes control and gets a token of its own."""
-        self.session.hand_over(call.command.client, call.now, call.session)
+        self.hand_over(call.command.client, call.now, call.session)
 
     def _release(self, _: Call[ReleaseControl]) -> None:
-        self.session.release()
+        self.release()
         self._interrupt("control was released")
 
     rows: ClassVar[tuple[Row, ...]] = (

@@ -1,16 +1,21 @@
-"""Commands that guide the arm, and the stops of URScript."""
+"""Commands that guide the arm, those that let it give way to forces, and the stops of URScript."""
 
 from typing import ClassVar
 
 import numpy as np
 
-from tvist_controller.commands.refusal import check_acceleration, check_joints, check_speeds
+from tvist_controller.commands.refusal import RefusalError, check_acceleration, check_joints, check_speeds
+from tvist_controller.instruments.tool_forces import ToolForces
+from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.programs.player import ProgramPlayer
+from tvist_controller.trajectory import ForceTask
 from tvist_plant.description import RobotDescription
+from tvist_protocol import forces as f
 from tvist_protocol import motions as m
 from tvist_protocol.replies import Accepted, Reply
+from tvist_protocol.transitions import Activity
 
 
 def _check_speed(command: m.SpeedJ, description: RobotDescription) -> None:
@@ -67,3 +72,51 @@ def _accelerations(command: m.SpeedL | m.StopL) -> tuple[float, float]:
     """Acceleration [m/s^2] and angular acceleration [rad/s^2] of the tool."""
     angular = command.angular_acceleration
     return command.acceleration, command.acceleration if angular is None else angular
+
+
+class ForceCommands:
+    """Handlers of these commands.
+
+    Args:
+        control: Begins and ends force mode.
+        forces: The force at the tool.
+    """
+
+    def __init__(self, control: ForceControl, forces: ToolForces) -> None:
+        self._control, self._forces = control, forces
+
+    def _force_mode(self, call: Call[f.ForceMode]) -> Reply:
+        command = call.command
+        task = ForceTask(
+            np.array(command.compliant, dtype=float),
+            np.array(command.wrench, dtype=float),
+            np.array(command.limits, dtype=float),
+            command.damping,
+            command.gain,
+        )
+        return Accepted(id=self._control.begin(task, command.frame or "base", command.frame_type))
+
+    def _freedrive(self, call: Call[f.Freedrive]) -> Reply:
+        return Accepted(id=self._control.free(np.array(call.command.free, dtype=float), call.command.frame))
+
+    def _end(self, _: Call[f.EndForceMode]) -> None:
+        if self._control.compliant is None:
+            activity = self._control.guidance.motion.activity
+            why = "neither force_mode nor freedrive is on"
+            raise RefusalError("busy" if activity is Activity.GUIDED else "wrong_mode", "", why)
+        self._control.end()
+
+    def _zero(self, _: Call[f.ZeroFtsensor]) -> None:
+        self._control.check_sensor()
+        self._forces.zero()
+
+    def _sense(self, call: Call[f.SetExternalWrench]) -> None:
+        self._control.external.sense(np.array(call.command.wrench, dtype=float))
+
+    rows: ClassVar[tuple[Row, ...]] = (
+        Row(f.ForceMode, _force_mode),
+        Row(f.Freedrive, _freedrive),
+        Row(f.EndForceMode, _end, stops=True),
+        Row(f.ZeroFtsensor, _zero, changes_io=True),
+        Row(f.SetExternalWrench, _sense),
+    )

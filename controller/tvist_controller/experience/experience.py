@@ -1,13 +1,29 @@
 """Records the motions of a robot, has them studied, and keeps the lessons until the arm rests."""
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
-from tvist_controller.experience.lesson import Later, Student, Work
-from tvist_controller.experience.motion_record import Beliefs, MotionRecorder
+from tvist_controller.experience.motion_record import Beliefs, MotionRecord, MotionRecorder
+from tvist_controller.experience.payload_student import PayloadStudent
 from tvist_controller.line.sample import Sample
+from tvist_controller.setup import Setup
 from tvist_plant.user_file import named
 from tvist_protocol.lessons import PayloadLesson
+
+Work = Callable[[], None]
+"""A study, which takes a fraction of a second and touches nothing that ticks use."""
+Later = Callable[[Work], Callable[[], bool]]
+"""Has a study made beside the ticks; returns what tells whether it has ended."""
+
+
+class Student(Protocol):
+    """Learns from motions.
+
+    One thread at a time uses it. What it learns is told by lessons alone, so that a replay needs no students.
+    """
+
+    def study(self, motion: MotionRecord) -> PayloadLesson | None:
+        """Return what a motion teaches; None if it teaches nothing."""
 
 
 def at_once(work: Work) -> Callable[[], bool]:
@@ -114,3 +130,19 @@ class Experience:
         new = [error for error in raised if named(error) not in self._said]
         self._said.update(map(named, new))
         return new
+
+
+def experience_of(
+    setup: Setup, students: Sequence[Student] = (), later: Later = at_once, plan: Planned | None = None
+) -> Experience | None:
+    """Return what a robot makes of its motions; None if nobody studies them.
+
+    Args:
+        setup: The robot's setup.
+        students: Who studies them besides those that the setup asks for.
+        later: Has a study made beside the ticks.
+        plan: Plans what a lesson changes, see `Experience`.
+    """
+    own = [PayloadStudent(setup.description)] if setup.adapt == "payload" else []
+    everyone = [*own, *students]
+    return Experience(everyone, later, plan) if everyone else None

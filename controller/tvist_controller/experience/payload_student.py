@@ -91,7 +91,7 @@ def along(chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Floats, ou
 
 
 class PayloadStudent:
-    """Follows the payload from motion to motion; see `tvist_controller.experience.lesson.Student`.
+    """Follows the payload from motion to motion; see `experience.Student`.
 
     A motion is first judged alone. If its mass is that of what was known before, both are combined, as a Kalman filter
     does; else the payload has changed, and what was known is void.

@@ -4,8 +4,6 @@ from typing import ClassVar
 
 from tvist_controller.calibrations import fits
 from tvist_controller.commands.events import Emit
-from tvist_controller.line.line_mode import LineMode
-from tvist_controller.line.sample import Sample
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.basis import FilterBasis
 from tvist_controller.planning.command_row import Call, Row
@@ -30,7 +28,6 @@ class Filters:
     def __init__(self, motion: MotionControl, source: ModeSource, declared: Payload, emit: Emit) -> None:
         self._motion, self._cycle, self._emit = motion, motion.cycle, emit
         self._declared = self._given = declared
-        self._clipped, self._limited = False, False
         self.source = source
         """Source of the filter's modes."""
         self._warn_of_payload()
@@ -107,31 +104,6 @@ class Filters:
                 "the shaper's frequencies will be wrong; measure this arm with tvist identify"
             )
             self._emit("warning", why=why)
-
-    def watch(self, sample: Sample) -> None:
-        """Warn when the filter or its feed-forward cannot work as intended; once, until it works again.
-
-        Args:
-            sample: Signals of the latest tick.
-        """
-        clipped = self._cycle.tvist.clipped
-        if clipped and not self._clipped:
-            name = self._cycle.tvist.name
-            why = (
-                f"{name} cannot meet its specification here: it needs a longer delay line, or leaves more vibration. "
-                "Choose another shaper for these poses, or a pose in which the arm is stiffer"
-            )
-            self._emit("warning", code="out_of_range", why=why)
-        self._clipped = clipped
-        limited = sample.motors is not None and sample.motors.limited
-        if limited and not self._limited and self._cycle.mode not in {LineMode.STOPPING, LineMode.REST}:
-            why = (
-                "the torque limits keep the motors from leading enough: the arm will vibrate more after this motion. "
-                "Move with less acceleration, or choose a shaper without feed-forward, such as auto"
-            )
-            self._emit("warning", code="limit_torque", why=why)
-            self._limited = True
-        self._limited = self._limited and not self._cycle.mode.at_rest
 
     rows: ClassVar[tuple[Row, ...]] = (
         Row(

@@ -5,14 +5,13 @@ from typing import Protocol
 
 import numpy as np
 
-from tvist_controller.commands.events import Emit
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.kinematics.tool import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
-from tvist_controller.motion.contact import ContactWatch
-from tvist_controller.motion.external_sensor import SILENT, ExternalSensor
+from tvist_controller.motion.force_sensing import SILENT, ContactWatch, ExternalSensor
 from tvist_controller.motion.guidance import Guidance
+from tvist_controller.motion.monitor import Finding, Monitor
 from tvist_controller.motion.task_frame import Feature, frame_of
 from tvist_controller.trajectory import Compliant, ForceTask, Guided, JointSpeed, Rest
 from tvist_controller.trajectory.compliant import CRAWL
@@ -28,6 +27,8 @@ LIGHT, HEAVY = (30.0, 150.0), (70.0, 700.0)
 more: with the light ones a hand that presses it against something hard would begin an oscillation."""
 MOST = 250.0
 """Force at the tool above which a protective stop begins, as the widest limit of UR's robots [N]."""
+DRIVES = "the drives' torques"
+"""Where the force is known from without a sensor."""
 TICKS = 5
 """Ticks for which a force or a deviation must last before it does."""
 TOUCH = 10.0, 4
@@ -58,25 +59,25 @@ class Forces(Protocol):
         """Take nothing as zero any longer."""
 
 
-class ForceControl:
+class ForceControl(Monitor):
     """Begins and ends force mode, and watches the limits that go with it.
 
     Args:
         guidance: Guided motions.
         forces: The force at the tool.
-        emit: Emits events.
         timeouts: See `ExternalSensor`.
     """
 
-    def __init__(self, guidance: Guidance, forces: Forces, emit: Emit, *, timeouts: bool) -> None:
+    def __init__(self, guidance: Guidance, forces: Forces, *, timeouts: bool) -> None:
         self.guidance = self._guidance = guidance
         """Guided motions."""
-        self._forces, self._emit = forces, emit
+        self._forces = forces
         self.external = ExternalSensor(timeouts=timeouts)
         """A force sensor of the user's own."""
         self._motion, self._cycle = guidance.motion, guidance.motion.cycle
         self._smooth = np.zeros(6)
-        self._by_hand, self._beyond, self._contact = False, 0, ContactWatch()
+        self._by_hand, self._beyond = False, 0
+        self._contact: ContactWatch | None = None
         self._source = self._source_of(self._cycle.sample)
         self._qd = self._cycle.sample.measured.qd
         self._basis: object = None
@@ -156,6 +157,9 @@ class ForceControl:
             direction: Direction in which it meets that, base frame, shape (3,); zeros for any.
         """
         estimated = self._cycle.sample.wrench is None
+        if self._contact is None:
+            self._contact = ContactWatch()
+            self._basis, self._qd = self._forces.basis, self._cycle.sample.measured.qd
         return self._contact.steps(direction, *(ESTIMATED_TOUCH if estimated else TOUCH))
 
     def _new(self) -> Compliant:
@@ -183,47 +187,64 @@ class ForceControl:
             found = self._smooth = self._smooth + PERIOD / (PERIOD + SMOOTHED) * (found - self._smooth)
         return found
 
-    def watch(self, sample: Sample) -> None:
-        """Make a protective stop if the arm presses too hard, or leaves its way in an axis that does not give way."""
-        self._follow_source(self._source_of(sample))
-        basis = self._forces.basis
-        if basis != self._basis:
-            self._basis, self._contact = basis, ContactWatch()
+    def look(self, sample: Sample) -> Finding | None:
+        """Find an arm that presses too hard, or leaves its way in an axis that does not give way."""
+        # Most arms have no sensor, and give way seldom.
+        leads = isinstance(self._cycle.trajectory, Compliant)
+        if sample.wrench is None and self._contact is None and self._source == DRIVES and not leads:
+            self._beyond = 0
+            return None
+        changed = self._follow_source(self._source_of(sample))
+        if changed is not None:
+            return changed
         pressed = [
             self._forces.unexplained(sample, wrench, zeroed=wrench is sample.wrench)
             for wrench in (sample.external, sample.measured.wrench)
             if wrench is not None
         ]
-        if self._contact.awake:
-            self._contact.note(pressed[0] if pressed else self._forces.estimated(sample, self._qd))
-        self._qd = sample.measured.qd
-        # NumPy's maximum, unlike Python's, is NaN if one of them is; most arms have no sensor, and are spared it.
+        if self._contact is not None:
+            self._note_contact(self._contact, sample, pressed)
+        # NumPy's maximum, unlike Python's, is NaN if one of them is.
         force = float(np.max([np.linalg.norm(one) for one in pressed])) if pressed else 0.0
         why = self._excess(sample, force)
         self._beyond = 0 if why is None else self._beyond + 1
-        if why is not None and self._beyond > TICKS:
-            self._beyond = 0
-            self._motion.protect(why, "limit_force")
+        if why is None or self._beyond <= TICKS:
+            return None
+        self._beyond = 0
+        return Finding(why, "limit_force", "protective_stop")
 
-    @staticmethod
-    def _source_of(sample: Sample) -> str:
-        if sample.external is not None:
+    def restart(self) -> None:
+        """Restart the count of ticks beyond a limit."""
+        self._beyond = 0
+
+    def _note_contact(self, contact: ContactWatch, sample: Sample, pressed: Sequence[Floats]) -> None:
+        """Tell the present watch of contacts the force; it begins anew where forces jump."""
+        basis = self._forces.basis
+        if basis != self._basis:
+            self._basis, self._contact = basis, None
+            return
+        contact.note(pressed[0] if pressed else self._forces.estimated(sample, self._qd))
+        self._qd = sample.measured.qd
+        if not contact.awake:
+            self._contact = None
+
+    def _source_of(self, sample: Sample) -> str:
+        if self.external.felt is not None:
             return "the external force sensor"
-        return "the drives' torques" if sample.wrench is None else "the arm's force sensor"
+        return DRIVES if sample.wrench is None else "the arm's force sensor"
 
-    def _follow_source(self, source: str) -> None:
+    def _follow_source(self, source: str) -> Finding | None:
         """End what relies on the force if it comes from elsewhere; what was taken as zero then means nothing."""
         if source == self._source:
-            return
-        self._source, self._contact = source, ContactWatch()
+            return None
+        self._source, self._contact = source, None
         self._forces.forget_zero()
         why = f"forces are now those of {source}"
         if self.external.awaited:
             why = f"the external force sensor has told nothing for {1e3 * SILENT:g} ms: {why}"
         if self.compliant is not None:
-            self._motion.interrupt(why)
-        elif self.external.awaited:
-            self._emit("warning", why=why)
+            return Finding(why, then="interruption")
+        return Finding(why) if self.external.awaited else None
 
     def _excess(self, sample: Sample, force: float) -> str | None:
         if not force <= MOST:

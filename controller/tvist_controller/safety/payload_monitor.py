@@ -1,5 +1,7 @@
 """Detection of a wrong payload, from the torque that the drives' feedback adds to the feed-forward."""
 
+from typing import ClassVar
+
 import numpy as np
 import pinocchio as pin
 
@@ -7,6 +9,8 @@ from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.inverse_dynamics import SLEW
 from tvist_controller.line.line_tick import QD, QDD, Q
+from tvist_controller.line.sample import Sample
+from tvist_controller.motion.monitor import Finding, Monitor
 from tvist_plant.chain import BODY, SCRATCH, chain_of, torques
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, carries_weight, rigid_model
@@ -100,7 +104,7 @@ class Patience:
         return self._rested < STUDIED and self._doubted < PATIENCE
 
 
-class PayloadMonitor:
+class PayloadMonitor(Monitor):
     """Compares the payload that the drives feel with the declared one, in motion and at rest.
 
     The torque that a drive's feedback adds to the feed-forward is what the model does not explain. A mass error μ
@@ -127,6 +131,8 @@ class PayloadMonitor:
         declared: Declared payload.
         follows: Whether the robot follows its payload.
     """
+
+    needs: ClassVar = "drives alone"  # else what the tool touches would be taken for a payload
 
     def __init__(self, description: RobotDescription, declared: Payload, *, follows: bool = False) -> None:
         self._patience = Patience() if follows else None
@@ -160,11 +166,11 @@ class PayloadMonitor:
         self._called = "assumed" if found else "declared"
         kilogram = pin.Inertia(1.0, np.array(payload.com), np.zeros((3, 3)))
         self._chain[-2, BODY:] = self._placement.act(kilogram).toDynamicParameters()
-        self.reset()
+        self.restart()
         self._wait, self._warned = SLEW, told
 
-    def reset(self) -> None:
-        """Discard past measurements, since the arm was placed elsewhere, its power was off, or something pushed it."""
+    def restart(self) -> None:
+        """Discard past measurements."""
         self._wait = 0
         self._ticks, self._sum[:] = 0, 0.0
         self._time = 0.0
@@ -183,33 +189,23 @@ class PayloadMonitor:
         square, product, bound = self._sums[:, memory].tolist()
         return (0.0, np.inf) if square <= 0.0 else (product / square, bound / square)
 
-    def update(
-        self, signals: Floats, expected: Floats, moment: Floats, *, at_rest: bool = False
-    ) -> str | None:
-        """Take one tick in which the drives hold the arm.
-
-        Args:
-            signals: Signals before the arm with the target, see `line_tick`, shape (9, n).
-            expected: Feed-forward torque for it, with rotors and friction, shape (n,) [N m].
-            moment: Motor torques measured at the end of the tick, shape (n,) [N m].
-            at_rest: Whether the shaped reference rests, on which a robot that follows its payload depends.
-
-        Returns:
-            Once, a sentence saying that the payload cannot be right; otherwise None, until another is set.
-        """
+    def look(self, sample: Sample) -> Finding | None:
+        """Return once that the payload cannot be right; then nothing until another is set."""
         if self._wait > 0:
             self._wait -= 1
             return None
-        add(self._sum, moment, expected)
+        add(self._sum, sample.measured.moment, sample.command.torque)
         self._ticks += 1
         if self._ticks < EVERY:
             return None
+        signals = sample.signals
         correlate(
             self._chain, signals[Q], signals[QD], signals[QDD], self._scratch, self._friction, self._sum,
             self._fade, self._sums,
         )  # fmt: skip
         self._ticks, self._time = 0, float(self._fade[0]) * self._time + EVERY * PERIOD
-        return self._judge(at_rest)
+        why = self._judge(sample.mode.at_rest)
+        return None if why is None else Finding(why, "payload_mismatch")
 
     def _judge(self, at_rest: bool) -> str | None:
         if not self._judges or self._warned or self._time < ENOUGH:

@@ -1,5 +1,7 @@
 """Actions of the safety system: reduced speed, stops of UR's categories 0, 1 and 2, power and protective stops."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from tvist_controller.commands.events import Emit
@@ -9,9 +11,10 @@ from tvist_controller.line.limits import REDUCED_SHARE
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.activities import PUT, at_rest
 from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.motion.monitor import Monitor
 from tvist_controller.motion.safety_system import Emergency, Latched
 from tvist_controller.safety.brakes import brake
-from tvist_controller.safety.protection import Protection
+from tvist_controller.trajectory import Compliant
 from tvist_plant.plant import PERIOD, Halt, Placeable, PlantError
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.transitions import Activity, after
@@ -28,7 +31,9 @@ class SafetyControl:
 
     def __init__(self, motion: MotionControl, emit: Emit) -> None:
         self._motion, self._emit = motion, emit
-        self._protection = Protection(motion.cycle)
+        self.monitors: Sequence[Monitor] = ()
+        """All that judges the signals of a tick, in the order in which it does."""
+        self._held = True
         self._resumes_by_itself = False
         """Whether the motion that a safeguard has paused resumes by itself when the safeguard is released."""
 
@@ -171,14 +176,37 @@ class SafetyControl:
             self._motion.check("unlock_protective_stop")
             self._hold()
         self._motion.go("unlock_protective_stop")
-        self._protection.forget()
 
     def watch(self, sample: Sample) -> None:
-        """Stop the arm if the latest tick has shown a danger, or the arm says that it cannot go on."""
+        """Warn or stop the arm by what the latest tick has shown."""
         motion = self._motion
-        if motion.robot_mode is RobotMode.RUNNING:
-            for danger in self._protection.dangers(sample):
-                motion.protect(danger.why, danger.code)
+        held = motion.robot_mode is RobotMode.RUNNING
+        if held and not self._held:
+            self._restart_monitors()
+        self._held = held
+        for monitor in self.monitors:
+            if monitor.needs != "nothing" and (
+                not held
+                or (monitor.needs == "drives alone" and isinstance(motion.cycle.trajectory, Compliant))
+            ):
+                continue
+            found = monitor.look(sample)
+            if found is None:
+                continue
+            if found.then == "protective_stop":
+                motion.protect(found.why, found.code)
+            elif found.then == "interruption":
+                motion.interrupt(found.why, found.code)
+            else:
+                self._emit("warning", code=found.code, why=found.why)
+
+    def _restart_monitors(self) -> None:
+        for monitor in self.monitors:
+            monitor.restart()
+
+    def watch_power(self, sample: Sample) -> None:
+        """Stop the arm if it says that it cannot go on, and let the line begin where it is about to be held."""
+        motion = self._motion
         if motion.power is not None:
             held = motion.power.halted is None
             trouble = motion.power.trouble(motion.robot_mode, sample.measured)
@@ -225,7 +253,7 @@ class SafetyControl:
         if placed:
             why = f"{why}: the simulation put the arm at rest at its reference"
         motion.abandon(why, "plant_failure")
-        self._protection.forget()
+        self._restart_monitors()
         if not placed:
             if motion.power is not None:
                 motion.power.stop()
@@ -247,4 +275,4 @@ class SafetyControl:
             motion.safety.clear()
         else:
             motion.activity = at_rest(motion.activity, emergency=bool(motion.safety.emergencies))
-        self._protection.forget()
+        self._restart_monitors()

@@ -1,0 +1,105 @@
+"""What stops the arm or warns by the signals of a tick: drives beyond their limits, and a shaper that fails."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.line_mode import LineMode
+from tvist_controller.line.sample import Sample
+from tvist_controller.motion.monitor import Finding, Monitor
+from tvist_plant.plant import PERIOD
+
+ALLOWED = 0.01
+"""How long a drive may exceed its limit [s]."""
+TICKS = round(ALLOWED / PERIOD)
+
+
+@compiled_for_ticks
+def exceeds(values: Floats, limits: Floats) -> bool:
+    """Return whether a magnitude exceeds its limit, each argument of shape (n,)."""
+    for j in range(limits.shape[0]):  # noqa: SIM110  numba has no generators
+        if abs(values[j]) > limits[j]:
+            return True
+    return False
+
+
+class Overload(Monitor):
+    """Finds a joint whose drive has exceeded its torque limit for longer than `ALLOWED`.
+
+    Args:
+        joints: Names of the joints.
+        limits: Largest torque of each joint, shape (n,) [N m].
+    """
+
+    needs: ClassVar = "drives"
+
+    def __init__(self, joints: Sequence[str], limits: Sequence[float]) -> None:
+        self._joints, self._limits = joints, np.array(limits, dtype=float)
+        self._beyond = np.zeros(len(limits), dtype=int)
+        self._any = False
+        exceeds(self._limits, self._limits)  # loads compiled code, which takes many ticks
+
+    def look(self, sample: Sample) -> Finding | None:
+        """Return the longest excess, if it is too long; the count then begins anew."""
+        moment = sample.measured.moment
+        if not exceeds(moment, self._limits):
+            if self._any:
+                self.restart()
+            return None
+        beyond, self._any = np.abs(moment) > self._limits, True
+        self._beyond = np.where(beyond, self._beyond + 1, 0)
+        joint = int(np.argmax(self._beyond))
+        if self._beyond[joint] <= TICKS:
+            return None
+        self.restart()
+        why = (
+            f"torque of joint {self._joints[joint]} is {moment[joint]:.0f} N m, beyond its limit of "
+            f"{self._limits[joint]:g} for more than 10 ms"
+        )
+        return Finding(why, "limit_torque", "protective_stop")
+
+    def restart(self) -> None:
+        """Restart the count."""
+        self._beyond[:] = 0
+        self._any = False
+
+
+class ShaperMonitor(Monitor):
+    """Finds a shaper whose function fails, and warns when it or its feed-forward cannot work as intended.
+
+    A warning comes once, until all works again.
+
+    Args:
+        cycle: The control line.
+    """
+
+    def __init__(self, cycle: ControlCycle) -> None:
+        self._cycle = cycle
+        self._clipped = self._limited = False
+
+    def look(self, sample: Sample) -> Finding | None:
+        """Return what is wrong with the filter, or what keeps its feed-forward from leading enough."""
+        line_filter, mode = self._cycle.filter, self._cycle.mode
+        if (fault := line_filter.fault) is not None:  # the filter continues with old weights
+            return Finding(fault, None, "protective_stop")
+        began, self._clipped = line_filter.tvist.clipped and not self._clipped, line_filter.tvist.clipped
+        if began:
+            why = (
+                f"{line_filter.tvist.name} cannot meet its specification here: it needs a longer delay line, or "
+                "leaves more vibration. Choose another shaper for these poses, or a pose in which the arm is stiffer"
+            )
+            return Finding(why, "out_of_range")
+        limited = sample.motors is not None and sample.motors.limited
+        told, self._limited = self._limited, self._limited and not mode.at_rest
+        if not limited or told or mode in {LineMode.STOPPING, LineMode.REST}:
+            return None
+        self._limited = True
+        why = (
+            "the torque limits keep the motors from leading enough: the arm will vibrate more after this motion. "
+            "Move with less acceleration, or choose a shaper without feed-forward, such as auto"
+        )
+        return Finding(why, "limit_torque")

@@ -1,0 +1,230 @@
+"""A robot with a controller of its own, which is only watched, or through which the robot is moved.
+
+What that controller says becomes our state; if the robot is moved through it, what it forbids is obeyed.
+"""
+
+from collections.abc import Callable
+from enum import IntEnum
+
+import msgspec
+
+from tvist_controller.commands.events import Emit
+from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.instruments.peripherals import Peripherals
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.sample import Sample
+from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.safety.robot_modes import RobotModes
+from tvist_controller.safety.safety_control import SafetyControl
+from tvist_plant.plant import PlantError, Sight, Supervised, Watched
+from tvist_protocol.commands import Command, SetPayload
+from tvist_protocol.io import Io, SetIo, SimulationSetInputs
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.values import Payload
+
+REFUSED = (
+    "the robot is only watched: its own controller moves and stops it, and nothing is sent to it from here; command it "
+    "at its own interfaces or its teach pendant, or serve it with --enable-motion"
+)
+"""Why a command is refused that would concern the arm."""
+_NO_STOP = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.UNDEFINED})
+SAME_MASS = 0.05
+"""Largest difference of two masses that count as equal [kg]."""
+
+
+class RemoteStatus:
+    """Mirrors what the robot's own controller says, cycle by cycle.
+
+    Args:
+        peripherals: Told when inputs and outputs change.
+        set_tcp: Told the tool centre point.
+        emit: Emits events.
+    """
+
+    def __init__(
+        self, peripherals: Peripherals, set_tcp: Callable[[tuple[float, ...]], None], emit: Emit
+    ) -> None:
+        self._peripherals, self._set_tcp, self._emit = peripherals, set_tcp, emit
+        self._sight: Sight | None = None
+        self._io: tuple[object, ...] = ()
+
+    @property
+    def missed(self) -> int:
+        """Number of the robot's cycles that did not arrive."""
+        return 0 if self._sight is None else self._sight.missed
+
+    def tell(self, sight: Sight, before: Sight | None) -> None:
+        """Emit what people should know, and take over the tool; `before` is what it said before."""
+        for why in sight.told:
+            self._emit("warning", why=why)
+        if sight.tool is not None and (before is None or sight.tool != before.tool):
+            self._set_tcp(sight.tool)
+        io = sight.payload, sight.tool, sight.slider, sight.inputs, sight.outputs
+        if io != self._io:
+            self._io, self._peripherals.changed = io, True
+
+    def declared(self, payload: Payload) -> Payload:
+        """Return the payload that the robot was told; `payload` if it does not say."""
+        if self._sight is None or self._sight.payload is None:
+            return payload
+        told = self._sight.payload
+        return Payload(mass=told.mass, com=told.com, inertia=told.inertia)
+
+    def io(self, io: Io, *, force: bool) -> Io:
+        """Return `io` with what the robot says of itself; its force at the tool only if that is wanted."""
+        sight = self._sight
+        if sight is None:
+            return io
+        given = {
+            "payload": self.declared(io.payload),
+            "tcp_offset": io.tcp_offset if sight.tool is None else list(sight.tool),
+            "target_speed_fraction": io.target_speed_fraction if sight.slider is None else sight.slider,
+            "actual_digital_input_bits": sight.inputs,
+            "actual_digital_output_bits": sight.outputs,
+            "actual_TCP_force": list(sight.force) if force and sight.force is not None else None,
+        }
+        return msgspec.structs.replace(io, **given)
+
+
+class Watching(RemoteStatus):
+    """Follows one such robot.
+
+    Args:
+        plant: The robot.
+        cycle: The control line, which only carries its signals.
+        modes: Where its modes are told.
+        peripherals: Told when its inputs and outputs change.
+        set_tcp: Told its tool centre point.
+        emit: Emits events.
+    """
+
+    def __init__(
+        self,
+        plant: Watched,
+        cycle: ControlCycle,
+        modes: RobotModes,
+        peripherals: Peripherals,
+        set_tcp: Callable[[tuple[float, ...]], None],
+        emit: Emit,
+    ) -> None:
+        super().__init__(peripherals, set_tcp, emit)
+        self._plant, self._cycle, self._modes = plant, cycle, modes
+        modes.now = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
+
+    def look(self) -> int | None:
+        """Take what the robot said in its next cycle; return the number of its tick, None if it has said nothing.
+
+        `tell_cycle` then reports what has changed, once the tick has this number.
+        """
+        self._before = self._sight
+        try:
+            self._sight = self._plant.sight()
+        except PlantError as error:
+            self._emit("warning", why=str(error))
+            return None
+        return self._sight.tick
+
+    def tell_cycle(self) -> None:
+        """Emit what the present cycle has changed."""
+        sight, before = self._sight, self._before
+        if sight is None or sight is before:
+            return
+        self.tell(sight, before)
+        _, safety, _ = self._modes.now = sight.modes
+        if before is not None and safety != before.modes[1]:
+            why = f"the robot reports safety_mode {_name(SafetyMode, safety)}"
+            # A `protective_stop` would let clients unlock it, which can be done at the robot only.
+            self._emit("warning" if safety in _NO_STOP else "safety_stop", why=why)
+
+    def sample(self) -> Sample:
+        """Return the signals of the present cycle."""
+        sight = self._sight
+        return self._cycle.sample if sight is None else self._cycle.follow(sight.target, sight.measured)
+
+    @property
+    def speed(self) -> float:
+        """Share of the programmed speed [-]."""
+        return 0.0 if self._sight is None else self._sight.speed
+
+
+class Supervision(RemoteStatus):
+    """Follows one such robot.
+
+    Args:
+        plant: The robot.
+        motion: The motion of our control line.
+        safety: Our safety system.
+        peripherals: See `RemoteStatus`.
+        set_tcp: See `RemoteStatus`.
+        emit: See `RemoteStatus`.
+    """
+
+    def __init__(
+        self,
+        plant: Supervised,
+        motion: MotionControl,
+        safety: SafetyControl,
+        peripherals: Peripherals,
+        set_tcp: Callable[[tuple[float, ...]], None],
+        emit: Emit,
+    ) -> None:
+        super().__init__(peripherals, set_tcp, emit)
+        self._plant, self._motion, self._safety = plant, motion, safety
+
+    def look(self) -> None:
+        """Take what it has said since the last tick; to be called before each."""
+        before, sight = self._sight, self._plant.seen()
+        self._sight = sight
+        self.tell(sight, before)
+        if before is None or sight.slider != before.slider:
+            self._scale(sight)
+        if before is None or sight.modes[1] != before.modes[1]:
+            self._obey(sight.modes[1])
+        if before is not None and sight.payload != before.payload and sight.payload is not None:
+            why = f"the robot was told another payload, {sight.payload.mass:.3g} kg: power off and on to check it"
+            self._emit("warning", why=why)
+
+    def check(self, command: Command) -> None:
+        """Refuse what this server cannot do at the robot.
+
+        Raises:
+            RefusalError: It is asked to.
+        """
+        if isinstance(command, SetIo | SimulationSetInputs):
+            why = "inputs and outputs are those of the robot, to which only set-points are sent: switch them there"
+            raise RefusalError("wrong_mode", "", why)
+        told = None if self._sight is None else self._sight.payload
+        if isinstance(command, SetPayload) and told is not None and abs(command.mass - told.mass) > SAME_MASS:
+            why = f"mass is {command.mass:.3g} kg, and the robot was told {told.mass:.3g} kg: tell it first"
+            raise RefusalError("wrong_mode", "mass", why)
+
+    def io(self, io: Io, *, force: bool) -> Io:
+        """Return `io` with what the robot says of itself, apart from what clients set here."""
+        kept = {name: getattr(io, name) for name in ("payload", "tcp_offset", "target_speed_fraction")}
+        return msgspec.structs.replace(super().io(io, force=force), **kept)
+
+    def _scale(self, sight: Sight) -> None:
+        """Scale motions by the robot's speed slider."""
+        slider, motions = 1.0 if sight.slider is None else sight.slider, self._motion.motions
+        before = motions.wanted_speed
+        motions.scale(slider)
+        if motions.wanted_speed != before:
+            self._emit(
+                "warning", why=f"the speed slider of the robot is at {100.0 * slider:.0f} %: so are motions"
+            )
+
+    def _obey(self, mode: int) -> None:
+        """Let our safety system be in the robot's safety mode; protective stops come with the halt that they cause."""
+        system = self._motion.safety
+        system.safeguard = mode == SafetyMode.SAFEGUARD_STOP
+        system.emergencies.clear()
+        if mode == SafetyMode.SYSTEM_EMERGENCY_STOP:
+            system.emergencies.add("system")
+        elif mode == SafetyMode.ROBOT_EMERGENCY_STOP:
+            system.emergencies.add("robot")
+        self._safety.reduce(reduced=mode == SafetyMode.REDUCED)
+        self._motion.changed = True
+
+
+def _name(kind: type[IntEnum], number: int) -> str:
+    return kind(number).name if number in {member.value for member in kind} else str(number)
