@@ -36,11 +36,6 @@ class NoControlError(Exception):
 def check_token(lease: Lease | None, token: str, where: str = "token") -> Lease:
     """Return the lease that a token names.
 
-    Args:
-        lease: Present lease.
-        token: The token.
-        where: Field that contains it.
-
     Raises:
         NoControlError: No client has control, or the token is another client's or an old one.
     """

@@ -52,10 +52,7 @@ def may_step(hold: ClockHold | None, lease: Lease | None, token: str) -> bool:
 
 
 def check_step_token(hold: ClockHold | None, lease: Lease | None, token: str) -> str:
-    """Check that a token may advance time.
-
-    Returns:
-        Name of the client that the token belongs to.
+    """Return the name of the client whose token it is, if it may advance time.
 
     Raises:
         NoControlError: It may not.
@@ -69,10 +66,7 @@ def check_step_token(hold: ClockHold | None, lease: Lease | None, token: str) ->
 
 
 def check_step(hold: ClockHold | None, lease: Lease | None, step: SimulationStep) -> str:
-    """Check the tokens of a step; advancing time and sending set-points are separate rights.
-
-    Returns:
-        Name of the client that steps.
+    """Return the name of the client that steps; advancing time and sending set-points are separate rights.
 
     Raises:
         NoControlError: A token is missing or does not give the required right.

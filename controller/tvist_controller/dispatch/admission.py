@@ -50,11 +50,6 @@ def admit(data: bytes, lease: Lease | None, clock: ClockHold | None = None) -> A
     """Decode a command, and check that its sender may send it.
 
     Of a long command only the type and token are decoded until its sender is known to have control or the clock.
-
-    Args:
-        data: Encoded message.
-        lease: Lease that gives control.
-        clock: Current hold of the clock.
     """
     try:
         if len(data) > EXPLAINED_BYTES:
@@ -70,13 +65,7 @@ def admit(data: bytes, lease: Lease | None, clock: ClockHold | None = None) -> A
 def admit_command(
     command: Command, lease: Lease | None, clock: ClockHold | None = None
 ) -> Admitted | Refused:
-    """Check that the sender of a command may send it.
-
-    Args:
-        command: The command.
-        lease: Lease that gives control.
-        clock: Current hold of the clock.
-    """
+    """Check that the sender of a command may send it."""
     try:
         client = _authorize(command, lease, clock)
     except NoControlError as error:
@@ -88,10 +77,6 @@ def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | 
     """Decode a set-point; return None if its sender is not known to have control, to spare the controller's thread.
 
     Whose it is decides the lease at the moment at which it is carried out: see `Setpoints`.
-
-    Args:
-        data: Encoded message.
-        lease: Lease that gives control.
     """
     if lease is None or len(data) > EXPLAINED_BYTES:
         return None

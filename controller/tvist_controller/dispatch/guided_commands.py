@@ -24,12 +24,7 @@ def _check_speed(command: m.SpeedJ, description: RobotDescription) -> None:
 
 
 class GuidedCommands:
-    """Handlers of the commands for guided motions.
-
-    Args:
-        guidance: Starts and stops guided motions.
-        programs: The program, which ends with every stop.
-    """
+    """Handlers of the commands for guided motions."""
 
     def __init__(self, guidance: Guidance, programs: ProgramPlayer) -> None:
         self._guidance, self._programs = guidance, programs
@@ -75,12 +70,7 @@ def _accelerations(command: m.SpeedL | m.StopL) -> tuple[float, float]:
 
 
 class ForceCommands:
-    """Handlers of these commands.
-
-    Args:
-        control: Begins and ends force mode.
-        forces: The force at the tool.
-    """
+    """Handlers of these commands."""
 
     def __init__(self, control: ForceControl, forces: ToolForces) -> None:
         self._control, self._forces = control, forces

@@ -48,13 +48,7 @@ def _check_path(command: MovePath, description: RobotDescription) -> None:
 
 
 class MotionCommands:
-    """Handlers of the commands for motion.
-
-    Args:
-        motion: The robot's motion.
-        safety: Carries out the safety system's stops.
-        programs: The program, which ends with every stop and loss of power.
-    """
+    """Handlers of the commands for motion."""
 
     def __init__(self, motion: MotionControl, safety: SafetyControl, programs: ProgramPlayer) -> None:
         self._motion, self._safety, self._programs = motion, safety, programs

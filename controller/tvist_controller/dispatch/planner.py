@@ -17,11 +17,7 @@ from tvist_protocol.lessons import PayloadLesson
 
 
 class Planner:
-    """Plans for one robot. It keeps no state: equal commands on equal bases get equal plans.
-
-    Args:
-        setup: Initial setup.
-    """
+    """Plans for one robot. It keeps no state: equal commands on equal bases get equal plans."""
 
     def __init__(self, setup: Setup) -> None:
         self._description = setup.description

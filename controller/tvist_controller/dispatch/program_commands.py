@@ -23,12 +23,7 @@ _COMPILED_AFTER = Planning(
 
 
 class ProgramCommands:
-    """Handlers of the commands for programs.
-
-    Args:
-        programs: Carries them out.
-        motion: The robot's motion.
-    """
+    """Handlers of the commands for programs."""
 
     def __init__(self, programs: ProgramPlayer, motion: MotionControl) -> None:
         self._programs, self._motion = programs, motion

@@ -26,11 +26,6 @@ class Setpoints:
     """Judges set-points: those of the client in control go into the journal, and to the stream if it accepts them.
 
     All others are counted and dropped.
-
-    Args:
-        session: The lease.
-        motion: The robot's motion.
-        counters: Counts them.
     """
 
     def __init__(self, session: Session, motion: MotionControl, counters: Counters) -> None:

@@ -95,9 +95,6 @@ class PayloadStudent:
 
     A motion is first judged alone. If its mass is that of what was known before, both are combined, as a Kalman filter
     does; else the payload has changed, and what was known is void.
-
-    Args:
-        description: The robot, of which a joint carries weight.
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -197,11 +194,7 @@ class Equations:
 
 
 class _Arm:
-    """Makes the equations of an arm's motions.
-
-    Args:
-        description: The robot.
-    """
+    """Makes the equations of an arm's motions."""
 
     def __init__(self, description: RobotDescription) -> None:
         drives = description.drives

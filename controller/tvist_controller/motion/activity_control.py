@@ -36,14 +36,7 @@ from tvist_protocol.values import ResetMode
 
 
 class MotionControl:
-    """Starts, monitors and ends motion on the control line. Each motion's number ends in either done or stopped.
-
-    Args:
-        cycle: The control line.
-        collisions: Collision model of the arm.
-        emit: Emits events.
-        mode: Initial robot mode.
-    """
+    """Starts, monitors and ends motion on the control line. Each motion's number ends in either done or stopped."""
 
     def __init__(
         self, cycle: ControlCycle, collisions: CollisionModel, emit: Emit, mode: ResetMode = "RUNNING"
@@ -90,11 +83,7 @@ class MotionControl:
         return self.streams.stream is not None
 
     def basis(self, on: FilterBasis) -> MotionBasis | None:
-        """What a point-to-point motion from here depends on; None if the arm is busy or without power.
-
-        Args:
-            on: Basis of the present filter.
-        """
+        """What a point-to-point motion from here depends on; None if the arm is busy or without power."""
         if after(self.activity, "move_j") is None:
             return None
         return self._basis(on, self.cycle.sample.reference)

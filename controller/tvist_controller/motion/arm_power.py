@@ -23,11 +23,7 @@ STALE = 10
 
 
 class ArmPower:
-    """Tells a plant what power and brakes it is to have, and the robot what the plant says of them.
-
-    Args:
-        plant: The plant.
-    """
+    """Tells a plant what power and brakes it is to have, and the robot what the plant says of them."""
 
     def __init__(self, plant: Plant) -> None:
         self._powered = plant if isinstance(plant, Powered) else None
@@ -82,12 +78,7 @@ class ArmPower:
                 self._powered.switch(power=False, brakes=True)
 
     def trouble(self, mode: RobotMode, measured: Measurement) -> str | None:
-        """Return why the robot cannot go on, in words; None if it can. To be called after every tick.
-
-        Args:
-            mode: Present robot mode.
-            measured: The plant's measurement.
-        """
+        """Return why the robot cannot go on, in words; None if it can. To be called after every tick."""
         self.begun = False
         if not (np.isfinite(measured.q).all() and np.isfinite(measured.moment).all()):
             return "the arm has measured what is no number"

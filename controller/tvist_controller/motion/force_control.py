@@ -99,16 +99,13 @@ class ForceControl(Monitor):
         return 0 if share == 1.0 else 1 if share > CRAWL else 2
 
     def begin(self, task: ForceTask, feature: Feature, kind: int, trigger: str = "force_mode") -> int:
-        """Control the force at the tool from now on; the motion under way goes on in the other axes.
+        """Control the force at the tool from now on, and return the motion's number; what moves goes on in other axes.
 
         Args:
             task: What is to be reached.
             feature: The frame of the task.
             kind: 1 to 3, see `frame_of`.
             trigger: `force_mode`, or `freedrive`, in which the arm is moved by hand.
-
-        Returns:
-            Number of the motion.
 
         Raises:
             RefusalError: The present activity does not allow it, or its motion cannot be taken over.

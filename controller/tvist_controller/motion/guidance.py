@@ -22,9 +22,6 @@ class Guidance:
 
     They are not shaped, unless the first command asks for it at rest. One that is not shaped starts from the state of
     the newest shaped reference, whatever moves. A successor continues from the reference of the command before it.
-
-    Args:
-        motion: The robot's motion.
     """
 
     def __init__(self, motion: MotionControl) -> None:
@@ -217,11 +214,7 @@ class Guidance:
         return newest.q, newest.qd, newest.qdd
 
     def follow(self, trigger: str, trajectory: Guided, *, shaped: bool = False) -> int:
-        """Carry out the transition, or let a motion that gives way go on with another one in its other axes.
-
-        Returns:
-            The motion's number.
-        """
+        """Carry out the transition, or let a motion that gives way take it in its other axes; return its number."""
         motion, cycle, guard, lead = self.motion, self._cycle, None, self.compliant
         if lead is not None and trajectory is not lead:
             lead.take(trajectory)

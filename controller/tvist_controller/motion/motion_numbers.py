@@ -14,13 +14,7 @@ from tvist_protocol.replies import Code
 
 
 class Motions:
-    """Starts motions, one at a time; each number ends in either done or stopped.
-
-    Args:
-        cycle: The control line.
-        safety: The safety system.
-        emit: Emits events.
-    """
+    """Starts motions, one at a time; each number ends in either done or stopped."""
 
     def __init__(self, cycle: ControlCycle, safety: SafetySystem, emit: Emit) -> None:
         self._cycle, self._safety, self._emit = cycle, safety, emit

@@ -35,12 +35,7 @@ class RunningMotion(Protocol):
 
 
 class RunningMove:
-    """One planned motion.
-
-    Args:
-        planned: Its plan, whose first part begins now.
-        cycle: The control line.
-    """
+    """One planned motion."""
 
     def __init__(self, planned: PlannedMove, cycle: ControlCycle) -> None:
         self._velocity, self._cycle = planned.velocity, cycle

@@ -41,11 +41,7 @@ class SafetySystem:
     """Fault or violation that is latched until a restart."""
 
     def mode(self, activity: Activity) -> SafetyMode:
-        """Return the most severe of the present conditions, as RTDE's safety mode.
-
-        Args:
-            activity: Present activity of the robot.
-        """
+        """Return the most severe of the present conditions, as RTDE's safety mode."""
         if self.latched is not None:
             return _LATCHED[self.latched]
         if self.emergencies:
@@ -56,10 +52,6 @@ class SafetySystem:
 
     def check(self, trigger: str, activity: Activity) -> None:
         """Refuse a command that the safety system does not allow.
-
-        Args:
-            trigger: `type` of the command.
-            activity: Present activity of the robot.
 
         Raises:
             RefusalError: The command is not allowed.

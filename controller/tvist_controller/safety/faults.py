@@ -37,12 +37,7 @@ def _check(command: SimulationInject, description: RobotDescription) -> None:
 
 
 class Faults:
-    """Starts faults, and ends those with a duration.
-
-    Args:
-        motion: The robot's motion.
-        safety: The robot's safety system.
-    """
+    """Starts faults, and ends those with a duration."""
 
     def __init__(self, motion: MotionControl, safety: SafetyControl) -> None:
         self._motion = motion
@@ -77,10 +72,6 @@ class Faults:
 
     def inject(self, command: SimulationInject, tick: int) -> None:
         """Start a fault.
-
-        Args:
-            command: Command that causes the fault.
-            tick: Number of the next tick.
 
         Raises:
             RefusalError: The plant does not support it.

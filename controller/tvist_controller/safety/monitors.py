@@ -72,9 +72,6 @@ class ShaperMonitor(Monitor):
     """Finds a shaper whose function fails, and warns when it or its feed-forward cannot work as intended.
 
     A warning comes once, until all works again.
-
-    Args:
-        cycle: The control line.
     """
 
     def __init__(self, cycle: ControlCycle) -> None:

@@ -33,13 +33,7 @@ SAME_MASS = 0.05
 
 
 class RemoteStatus:
-    """Mirrors what the robot's own controller says, cycle by cycle.
-
-    Args:
-        peripherals: Told when inputs and outputs change.
-        set_tcp: Told the tool centre point.
-        emit: Emits events.
-    """
+    """Mirrors what the robot's own controller says, cycle by cycle."""
 
     def __init__(
         self, peripherals: Peripherals, set_tcp: Callable[[tuple[float, ...]], None], emit: Emit
@@ -87,16 +81,7 @@ class RemoteStatus:
 
 
 class Watching(RemoteStatus):
-    """Follows one such robot.
-
-    Args:
-        plant: The robot.
-        cycle: The control line, which only carries its signals.
-        modes: Where its modes are told.
-        peripherals: Told when its inputs and outputs change.
-        set_tcp: Told its tool centre point.
-        emit: Emits events.
-    """
+    """Follows one such robot."""
 
     def __init__(
         self,

@@ -13,11 +13,7 @@ _KEEP_POWER = frozenset({SafetyMode.PROTECTIVE_STOP, SafetyMode.SAFEGUARD_STOP})
 
 
 class RobotModes:
-    """The modes of a robot, looked up again only when they may have changed, and the stop that keeps it from moving.
-
-    Args:
-        motion: The robot's motion, from which they follow.
-    """
+    """The modes of a robot, looked up again only when they may have changed, and the stop that keeps it from moving."""
 
     def __init__(self, motion: MotionControl) -> None:
         self._motion = motion

@@ -22,12 +22,7 @@ from tvist_protocol.values import ResetMode
 
 
 class SafetyControl:
-    """Carries out what the safety system's inputs request, what its faults require, and what becomes of the power.
-
-    Args:
-        motion: The robot's motion.
-        emit: Emits events.
-    """
+    """Carries out what the safety system's inputs request, what its faults require, and what becomes of the power."""
 
     def __init__(self, motion: MotionControl, emit: Emit) -> None:
         self._motion, self._emit = motion, emit
@@ -233,13 +228,6 @@ class SafetyControl:
         """Go on after the arm has failed: a simulated one is placed at rest at its reference, in a protective stop.
 
         One that cannot be placed, or fails again at once, gets no power until the safety system is restarted.
-
-        Args:
-            error: The plant's error.
-            seed: Seed of the noise and gear errors.
-
-        Returns:
-            Signals with the new state.
         """
         motion, cycle = self._motion, self._motion.cycle
         placed = isinstance(cycle.plant, Placeable)
