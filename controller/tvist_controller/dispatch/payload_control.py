@@ -10,10 +10,10 @@ from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.line.inverse_dynamics import SLEW
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.filter_control import Filters
-from tvist_controller.planning.basis import FilterBasis
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import Plan, Planning
+from tvist_controller.planning.snapshot import FILTER, FilterState
 from tvist_controller.safety.payload_monitor import PayloadMonitor
 from tvist_controller.setup import body
 from tvist_plant.description import RobotDescription
@@ -52,7 +52,7 @@ class PayloadControl:
         motion: MotionControl,
         filters: Filters,
         peripherals: Peripherals,
-        plan: Callable[[PayloadLesson, FilterBasis], Plan],
+        plan: Callable[[PayloadLesson, FilterState], Plan],
         emit: Emit,
         *,
         follows: bool,
@@ -73,13 +73,13 @@ class PayloadControl:
 
     def beliefs(self) -> Beliefs:
         """Return what the robot takes its arm for."""
-        return Beliefs(self.assumed, self._filters.basis)
+        return Beliefs(self.assumed, self._filters.present)
 
     def learn(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
         """Take a lesson at rest; a plan that was made for it beforehand is used if it still holds."""
-        on = self._filters.basis
-        if plan is None or plan.basis != on:
-            plan = self._plan(lesson, on)
+        present = self._filters.present
+        if plan is None or plan.state != {"filter": present}:
+            plan = self._plan(lesson, present)
         found: Any = plan.found
         if isinstance(found, RefusalError):
             self._emit("warning", why=f"{lesson.why}; it is not assumed: {found.reply.why}")
@@ -131,15 +131,19 @@ class PayloadControl:
             changes_io=True,
             check=_check,
             plan=Planning(
-                "filter",
+                FILTER,
                 FilterPlanner,
-                lambda planner, command, on: planner.with_payload(_payload_of(command), on),
+                lambda planner, command, now: planner.with_payload(_payload_of(command), now.filter),
             ),
         ),
         Row(
             Forget,
             _forget,
             changes_io=True,
-            plan=Planning("filter", FilterPlanner, lambda planner, _, on: planner.with_payload(on.given, on)),
+            plan=Planning(
+                FILTER,
+                FilterPlanner,
+                lambda planner, _, now: planner.with_payload(now.filter.given, now.filter),
+            ),
         ),
     )
