@@ -14,7 +14,7 @@ from tvist_controller.host import Host
 from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.reporting.sink import Sink
 from tvist_controller.setup import Setup
-from tvist_plant.plant import PERIOD, Pacing, Supervised, Truthful, Watched
+from tvist_plant.plant import Plant, RealArm
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Refused, Reply
@@ -117,18 +117,14 @@ class ServedRobot:
             survives=True,
         )  # fmt: skip
         plant = self.controller.cycle.line.plant  # also where the setup has none
-        knows = isinstance(plant, Truthful) and plant.truth() is not None
+        knows = plant.truth() is not None
         self.want_truth = self.publisher.want_truth if knows and not setup.truth else None
         """To be told whether a client on this machine wants the truth; None if it is published anyway, or unknown."""
         self.driven = Mailbox(
             self._host,
             self.sockets.patience,
-            plant.wait if isinstance(plant, Pacing) else None,
-            plant.interval()
-            if isinstance(plant, Watched)
-            else PERIOD
-            if isinstance(plant, Supervised)
-            else None,
+            plant.wait if plant.can(Plant.wait) else None,
+            plant.interval() if isinstance(plant, RealArm) and (plant.watched or plant.supervised) else None,
         )
         """The robot as seen by the clock."""
         self._plan_ahead = (

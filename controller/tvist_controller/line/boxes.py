@@ -13,7 +13,8 @@ from tvist_controller.line.line_filter import LineFilter
 from tvist_controller.line.line_tick import SIGNALS, to_drives
 from tvist_controller.line.shaped_reference import ShapedReference
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.plant import PERIOD, Plant, Supervised
+from tvist_plant.foreign import arm_of
+from tvist_plant.plant import PERIOD, Plant
 from tvist_shaping.base import Filter, Posture
 
 
@@ -45,16 +46,16 @@ class Boxes(Struct, frozen=True, eq=False):
         compensate_sag: bool = False,
     ) -> Self:
         """Return the boxes of a robot; see `ControlCycle` for the arguments."""
-        dynamics = InverseDynamics(description, declared)
+        arm, dynamics = arm_of(plant), InverseDynamics(description, declared)
         drives = DriveFeedForward(
-            description, PERIOD, compensate_sag=compensate_sag, positions=isinstance(plant, Supervised)
+            description, PERIOD, compensate_sag=compensate_sag, positions=arm.supervised
         )
         return cls(
             LineFilter(tvist, arm_limits(description)),
             ShapedReference(q, PERIOD),
             dynamics,
             drives,
-            plant,
+            arm,
             (dynamics.chain, dynamics.gravitation, dynamics.scratch, drives.rows),
         )
 

@@ -14,8 +14,8 @@ from tvist_controller.trajectory import Rest, StuckError, Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import PERIOD, Measurement, Placeable, Plant
-from tvist_plant.plant_checks import check_measurement, measured_standing
+from tvist_plant.foreign import check_measurement, measured_standing
+from tvist_plant.plant import PERIOD, Measurement, Plant, SimulatedArm
 from tvist_shaping.base import Filter
 
 T = TypeVar("T", bound=Trajectory)
@@ -212,14 +212,14 @@ class ControlCycle:
             ValueError: An arm that cannot be placed does not tell where it stands. Nothing has changed.
         """
         line, plant = self.line, self.line.plant
-        if measured is None and not isinstance(plant, Placeable):
+        if measured is None and not isinstance(plant, SimulatedArm):
             measured = measured_standing(plant, len(q))
             q = measured.q.copy()
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
         self.placements += 1
         signals = line.rest_at(q)
         command = line.drives.command(signals, line.dynamics.payload_parameters)
-        if measured is None and isinstance(plant, Placeable):
+        if measured is None and isinstance(plant, SimulatedArm):
             measured = plant.reset(command, payload=carried, seed=seed)
         assert measured is not None, "what cannot be placed is measured"
         still = line.shaped.references

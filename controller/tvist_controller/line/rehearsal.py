@@ -9,10 +9,10 @@ from tvist_controller.trajectory import SetpointStream
 from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import PERIOD, Measurement, PlantTruth
+from tvist_plant.plant import PERIOD, Measurement, SimulatedArm
 
 
-class Still:
+class Still(SimulatedArm):
     """A plant that does nothing but keep its last command.
 
     Args:
@@ -28,17 +28,13 @@ class Still:
         self._nothing = Measurement(still, still, still, np.zeros(3))
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:  # noqa: ARG002
-        """Keep a command; see `Plant.reset`."""
+        """Keep a command; see `SimulatedArm.reset`."""
         return self.step(command)
 
     def step(self, command: DriveCommand) -> Measurement:
         """Keep a command; see `Plant.step`."""
         self.last = command
         return self._nothing
-
-    def truth(self) -> PlantTruth | None:
-        """Return None."""
-        return None
 
 
 def rehearse(cycle: ControlCycle) -> None:

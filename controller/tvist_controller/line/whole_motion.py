@@ -15,7 +15,7 @@ from tvist_controller.line.rehearsal import Still
 from tvist_controller.trajectory import Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Placeable, Playable, Response, played
+from tvist_plant.plant import PERIOD, Response, SimulatedArm
 from tvist_shaping.base import Filter
 
 
@@ -122,7 +122,7 @@ class DrivenLine:
         return targets, commands
 
 
-def respond(plant: Placeable, driven: Driven, seed: int) -> Response:
+def respond(plant: SimulatedArm, driven: Driven, seed: int) -> Response:
     """Let a plant follow what its drives get, from rest.
 
     Args:
@@ -135,4 +135,4 @@ def respond(plant: Placeable, driven: Driven, seed: int) -> Response:
         ValueError: The plant does not provide the truth.
     """
     plant.reset(driven.rest, seed=seed)
-    return plant.play(driven.commands) if isinstance(plant, Playable) else played(plant, driven.commands)
+    return plant.play(driven.commands)

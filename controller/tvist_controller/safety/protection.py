@@ -9,7 +9,7 @@ from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
-from tvist_plant.plant import PERIOD, Supervised
+from tvist_plant.plant import PERIOD
 from tvist_protocol.replies import Code
 
 ALLOWED = 0.01
@@ -78,7 +78,7 @@ class Protection:
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
-        self._own = isinstance(cycle.line.plant, Supervised)
+        self._own = cycle.line.plant.supervised
         """Whether the arm's own controller watches its torques, which may be guessed here from currents."""
         self._overload = Overload(cycle.description.limits.torque)
 

@@ -12,7 +12,7 @@ from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.safety_system import Emergency, Latched
 from tvist_controller.safety.brakes import brake
 from tvist_controller.safety.protection import Protection
-from tvist_plant.plant import PERIOD, Halt, Placeable, PlantError
+from tvist_plant.plant import PERIOD, Halt, PlantError, SimulatedArm
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
@@ -136,7 +136,7 @@ class SafetyControl:
             ValueError: It does not tell where that is.
         """
         cycle = self._motion.cycle
-        if not isinstance(cycle.line.plant, Placeable):
+        if not isinstance(cycle.line.plant, SimulatedArm):
             cycle.reset(cycle.line.shaped.position)
 
     def cut_power(self, why: str, latched: Latched | None = None) -> None:
@@ -215,7 +215,7 @@ class SafetyControl:
             Signals with the new state.
         """
         motion, cycle = self._motion, self._motion.cycle
-        placed = isinstance(cycle.line.plant, Placeable)
+        placed = isinstance(cycle.line.plant, SimulatedArm)
         why, position = str(error), cycle.line.shaped.position
         try:
             sample = cycle.reset(position, seed=seed)

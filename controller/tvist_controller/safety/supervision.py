@@ -10,7 +10,7 @@ from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_controller.safety.said import Said
-from tvist_plant.plant import Sight, Supervised
+from tvist_plant.plant import RealArm, Sight
 from tvist_protocol.commands import Command, SetPayload
 from tvist_protocol.io import Io, SetIo, SimulationSetInputs
 from tvist_protocol.modes import SafetyMode
@@ -33,7 +33,7 @@ class Supervision(Said):
 
     def __init__(
         self,
-        plant: Supervised,
+        plant: RealArm,
         motion: MotionControl,
         safety: SafetyControl,
         peripherals: Peripherals,

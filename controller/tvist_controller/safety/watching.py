@@ -9,7 +9,7 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.sample import Sample
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.said import Said
-from tvist_plant.plant import PlantError, Watched
+from tvist_plant.plant import PlantError, RealArm
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 
 REFUSED = (
@@ -34,7 +34,7 @@ class Watching(Said):
 
     def __init__(
         self,
-        plant: Watched,
+        plant: RealArm,
         cycle: ControlCycle,
         modes: RobotModes,
         peripherals: Peripherals,
