@@ -23,6 +23,7 @@ from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.clock import Clock, Mailbox
 from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.gateways.sockets import ProgramSockets
+from tvist_server.kernels import warm_up
 from tvist_server.lateness import Punctuality
 from tvist_server.plan_ahead import PlanAhead
 from tvist_server.plans_of_programs import PlansOfPrograms
@@ -31,7 +32,6 @@ from tvist_server.publisher import Publisher
 from tvist_server.punctual import waited_us
 from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
-from tvist_server.rehearsal import rehearse
 from tvist_server.studies import Studies
 
 if TYPE_CHECKING:
@@ -77,11 +77,11 @@ class ServedRobot:
         plant = setup.made_plant()
         setup = setup.standing(plant)  # with the limits of a robot that has its own
         # When a client advances time, nothing is late, and plans are made when they are needed.
-        self._plans = None if lockstep else PlansOfPrograms(_planner(setup))
+        self._plans = None if lockstep else PlansOfPrograms(Planner(setup))
         self.controller = Controller(setup, plant, None if self._plans is None else self._plans.order)
         self.setup = setup = self.controller.setup
         if self._realtime:
-            rehearse(self.controller)
+            warm_up()
         info_of(self.controller)  # computes the slowest part of the description once, before the first tick
         self.recorder: Recorder | None = None
         if record is not None:
@@ -128,7 +128,7 @@ class ServedRobot:
         )
         """The robot as seen by the clock."""
         self._plan_ahead = (
-            None if lockstep else PlanAhead(self._host, _planner(setup), self.driven.post, self._complete)
+            None if lockstep else PlanAhead(self._host, Planner(setup), self.driven.post, self._complete)
         )
         carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
         self.reception = Reception(
@@ -317,10 +317,3 @@ class ServedRobot:
     def warn(self, why: str) -> None:
         """Publish a warning to clients and the console."""
         self.driven.post(lambda: self._host.warn(why))
-
-
-def _planner(setup: Setup) -> Planner:
-    """A planner that compiles nothing while the robot ticks."""
-    planner = Planner(setup)
-    planner.rehearse()
-    return planner

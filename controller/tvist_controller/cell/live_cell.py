@@ -71,7 +71,6 @@ class LiveCell:
         self._cell, self._plant, self._terminals, self._emit = cell, plant, terminals, emit
         self._hand = plant if plant.can(Plant.grip) else None
         self._kinematics = ToolKinematics(description)
-        self._kinematics.pose(np.zeros(description.joints))  # its kernel is loaded before the first tick
         self.gripper = (
             None if cell.gripper is None else Gripper(cell.gripper.stroke, activated=cell.gripper.activated)
         )
