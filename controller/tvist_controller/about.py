@@ -6,7 +6,7 @@ from tvist_controller.calibrations import available, fits
 from tvist_controller.controller import Controller
 from tvist_controller.reporting.stop_report import stopping
 from tvist_plant.description import RobotDescription
-from tvist_plant.plant import PERIOD, InWorld, Plant
+from tvist_plant.plant import PERIOD, Plant
 from tvist_protocol.channels import COMMANDS, tag
 from tvist_protocol.geometry import Capsule, Geometry, Mesh, World, WorldShape
 from tvist_protocol.info import CalibrationInfo, Info, Limits
@@ -79,9 +79,9 @@ def info_of(controller: Controller) -> Info:
 
 def _world_of(plant: Plant) -> World | None:
     """What stands around an arm, for clients that draw it; None if nothing does."""
-    if not isinstance(plant, InWorld):
-        return None
     things = plant.things()
+    if things is None:
+        return None
     shapes = [
         WorldShape(
             kind=one.kind, size=list(one.size), pose=list(one.pose), body=one.body, colour=list(one.colour)

@@ -49,7 +49,8 @@ from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_controller.setup import Setup, body
 from tvist_plant.fingerprint import fingerprint
-from tvist_plant.plant import PERIOD, InWorld, Placeable, Plant, PlantError, Supervised, Watched
+from tvist_plant.foreign import arm_of
+from tvist_plant.plant import PERIOD, Plant, PlantError, RealArm, SimulatedArm
 from tvist_protocol import commands as c
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Refused, Reply
@@ -71,9 +72,9 @@ class Controller(WholeRobot):
     """
 
     def __init__(self, setup: Setup, plant: Plant | None = None, order: Order | None = None) -> None:
-        plant = setup.made_plant() if plant is None else plant
+        plant = setup.made_plant() if plant is None else arm_of(plant)
         setup = setup.standing(plant)
-        setup.check(placed=not isinstance(plant, Watched | Supervised))
+        setup.check(placed=plant is None or not (plant.watched or plant.supervised))
         self.setup = setup
         """Initial setup; of an arm that cannot be placed, with the posture in which it stood."""
         self.tick_number = 0
@@ -91,7 +92,7 @@ class Controller(WholeRobot):
         self._seed = setup.seed
         self._reporter = Reporter(setup.description, self.cycle.plant)
         # What only watches has no power to move anything, whatever is asked of it.
-        mode = "POWER_OFF" if isinstance(plant, Watched) else setup.mode
+        mode = "POWER_OFF" if self.cycle.plant.watched else setup.mode
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, mode)
         self.modes = RobotModes(self.motion)
@@ -105,7 +106,7 @@ class Controller(WholeRobot):
         self._safety = safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
         self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
-        self.watching, self.supervision = self._own_controller(plant)
+        self.watching, self.supervision = self._own_controller()
         """The robot's own controller, which is only watched, or through which the robot is moved; None for neither."""
         self.forces = ToolForces(
             setup.description, self.peripherals, lambda: self.latest, lambda: self.declared
@@ -391,12 +392,12 @@ class Controller(WholeRobot):
         self.programs.end(why)
         self.motion.interrupt(why)
 
-    def _own_controller(self, plant: Plant | None) -> tuple[Watching | None, Supervision | None]:
+    def _own_controller(self) -> tuple[Watching | None, Supervision | None]:
         """Return what follows a robot's own controller; see `watching` and `supervision`."""
-        tools, set_tcp = self.peripherals, self._reporter.set_tcp
-        if isinstance(plant, Watched):
+        tools, set_tcp, plant = self.peripherals, self._reporter.set_tcp, self.cycle.plant
+        if isinstance(plant, RealArm) and plant.watched:
             return Watching(plant, self.cycle, self.modes, tools, set_tcp, self._emit), None
-        if isinstance(plant, Supervised):
+        if isinstance(plant, RealArm) and plant.supervised:
             return None, Supervision(plant, self.motion, self._safety, tools, tools.set_tcp, self._emit)
         return None, None
 
@@ -405,7 +406,7 @@ class Controller(WholeRobot):
         description = self.setup.description
         overload = Overload(description.robot.joints, description.limits.torque)
         # An arm with a controller of its own is watched by that; here its torques may be guessed from currents.
-        drives = () if isinstance(self.cycle.plant, Supervised) else (overload,)
+        drives = () if self.cycle.plant.supervised else (overload,)
         return *drives, ShaperMonitor(self.cycle), self._force_control, self.payload.monitor
 
     def _access(self) -> Access:
@@ -432,7 +433,7 @@ class Controller(WholeRobot):
     def place(self, call: Call[SimulationReset]) -> Reply:
         """Place the simulated arm somewhere at rest."""
         command, chosen, plant = call.command, call.planned(), self.cycle.plant
-        if not isinstance(plant, Placeable):
+        if not isinstance(plant, SimulatedArm):
             name = type(plant).__name__
             raise RefusalError(
                 "unknown_type", "type", f"the plant {name} cannot be put anywhere: it has no reset"
@@ -446,7 +447,7 @@ class Controller(WholeRobot):
             placed = [self.motion.collisions.declared, *(placed or [plant.payload])]
         blamed = "payload" if command.q is None and command.payload is not None else "q"
         self.motion.collisions.check_place(q, placed, blamed)
-        met = plant.obstacle(q, carried) if isinstance(plant, InWorld) else None
+        met = plant.obstacle(q, carried)
         if met is not None:
             raise RefusalError("collision", blamed, f"{met}: choose a posture in which the arm is clear")
         self.programs.end("simulation.reset")

@@ -20,7 +20,7 @@ from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.socket_ports import NoPorts, SocketPorts
 from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.reporting.sink import Sink
-from tvist_controller.sources.plant_calls import told
+from tvist_plant.foreign import told
 from tvist_plant.user_file import named
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command, Forget, Setpoint

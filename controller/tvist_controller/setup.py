@@ -14,12 +14,11 @@ from tvist_controller.paths.poses import placement
 from tvist_controller.sources.mode_source import ModeSource, first_source
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_controller.sources.own_shapers import OwnShaper
-from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
+from tvist_plant.foreign import called, measured_standing
 from tvist_plant.model import carries_weight
-from tvist_plant.plant import Gripping, Hand, Placeable, Plant, Supervised
-from tvist_plant.plant_checks import measured_standing
+from tvist_plant.plant import Hand, Plant, RealArm, SimulatedArm
 from tvist_plant.variants import hidden_variant
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.content import checked
@@ -146,9 +145,11 @@ class Setup:
             arm = hidden_variant(self.hidden).make(self.description, carried, self.seed)
             return called(arm, self.description.joints, untold=True)
         made = None if self.plant is None else self.plant.make(self.description, carried, self.seed)
-        if self.cell is not None and self.cell.gripping_tool is not None and isinstance(made, Gripping):
+        tool = None if self.cell is None else self.cell.gripping_tool
+        if tool is not None and made is not None and made.can(Plant.mount):
+            assert self.cell is not None
             assert self.cell.gripper is not None
-            tcp = placement(self.cell.gripping_tool.tcp)
+            tcp = placement(tool.tcp)
             made.mount(Hand(self.cell.gripper.stroke, tcp.position, tcp.rotation))
         return made
 
@@ -158,10 +159,10 @@ class Setup:
         Raises:
             ValueError: See `measured_standing`.
         """
-        if plant is None or isinstance(plant, Placeable):
+        if plant is None or isinstance(plant, SimulatedArm):
             return self
         stands = replace(self, q=tuple(measured_standing(plant, len(self.q)).q.tolist()))
-        if not isinstance(plant, Supervised):
+        if not (isinstance(plant, RealArm) and plant.supervised):
             return stands
         told = plant.payload
         payload = Payload(mass=told.mass, com=told.com, inertia=told.inertia)

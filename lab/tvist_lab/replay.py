@@ -18,7 +18,7 @@ from tvist_controller.api.robot import (
     load_plant,
 )
 from tvist_lab.recordings.mcap_file import RecordingFile
-from tvist_plant.plant_checks import check_unpaced
+from tvist_plant.foreign import check_unpaced
 from tvist_plant.variants import VARIANTS
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked

@@ -59,10 +59,11 @@ class KernelCache(_Cache):
 
     Args:
         function: The kernel's Python source.
+        dispatcher: numba's dispatcher of it, for `load_all`.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
+    def __init__(self, function: Callable[..., Any], dispatcher: Any = None) -> None:
+        self._function, self._dispatcher = function, dispatcher
         self.name = f"{function.__module__}.{function.__qualname__}".replace("<locals>", "_")
         """Module and name of the function."""
         self._content = _Content(function)
@@ -91,19 +92,26 @@ class KernelCache(_Cache):
 
     def holds(self) -> bool:
         """Return whether there is machine code of this kernel for this processor, for any types."""
-        return bool(held([self]))
+        return self in held([self])
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
         """Return the kernel for types of arguments; None if there is none on disk, or the file is damaged."""
         for machine in _machines(target_context) if self._enabled else ():
             name = self._file(sig, machine)
             for folder in self.places:
-                content = _read(folder / name) or b""
-                checksum, code = content[:CHECKSUM_BYTES], content[CHECKSUM_BYTES:]
-                if hashlib.sha256(code).digest() == checksum:
-                    _cache_log("[cache] data loaded from %r", str(folder / name))  # with NUMBA_DEBUG_CACHE=1
+                if (code := _code(folder / name)) is not None:
                     return from_bytes(target_context, code)
         return None
+
+    def load_file(self, file: Path) -> None:
+        """Take what is in a file into use, for the types of arguments that it is for, unless these are in use."""
+        code, context = _code(file), cpu_target.target_context
+        if not self._enabled or code is None:
+            return
+        found = from_bytes(context, code)
+        if tuple(found.signature.args) not in self._dispatcher.overloads:
+            context.insert_user_function(found.entry_point, found.fndesc, [found.library])
+            self._dispatcher.add_overload(found)
 
     def save_overload(self, sig: object, data: Any) -> None:
         """Write a kernel into the first folder that can be written in; if there is none, note it in `unkept`."""
@@ -159,11 +167,11 @@ class _Content(CompileResultCacheImpl):
         self._locator = self
 
 
-def held(some: "Iterable[KernelCache]") -> "list[KernelCache]":
-    """Return those of some kernels of which there is machine code for this processor, for any types."""
+def held(some: "Iterable[KernelCache]") -> "dict[KernelCache, list[Path]]":
+    """Return those of some kernels of which there is machine code for this processor, with its files."""
     machines, listed, real = _machines(cpu_target.target_context), cache(_listed), cache(_real)
 
-    def there(kernel: KernelCache, folder: Path) -> bool:
+    def there(kernel: KernelCache, folder: Path) -> list[Path]:
         listing = listed(folder)
         files = [
             file
@@ -172,9 +180,17 @@ def held(some: "Iterable[KernelCache]") -> "list[KernelCache]":
         ]
         # A folder without such files is nobody's concern, whoever can write there.
         place = real(folder) if files else None
-        return place is not None and any(_may_be_loaded(place / file) for file in files)
+        return [] if place is None else [place / file for file in files if _may_be_loaded(place / file)]
 
-    return [kernel for kernel in some if any(there(kernel, folder) for folder in kernel.places)]
+    found = {kernel: [file for folder in kernel.places for file in there(kernel, folder)] for kernel in some}
+    return {kernel: files for kernel, files in found.items() if files}
+
+
+def load_all(some: "Iterable[KernelCache]") -> None:
+    """Load all machine code of some kernels that is on disk, so that no call does, which takes milliseconds each."""
+    for kernel, files in held(some).items():
+        for file in files:
+            kernel.load_file(file)
 
 
 def _listed(folder: Path) -> dict[str, list[str]]:
@@ -227,6 +243,16 @@ def _machines(target_context: Any) -> list[str]:
     versions = (FORMAT, python, numba.__version__, llvmlite.__version__)
     own = target_context.codegen().magic_tuple()
     return [_short(repr((processor, versions))) for processor in (own, (own[0], "generic", ""))]
+
+
+def _code(file: Path) -> bytes | None:
+    """Return the machine code in a file; None if there is none, or it is damaged."""
+    content = _read(file) or b""
+    checksum, code = content[:CHECKSUM_BYTES], content[CHECKSUM_BYTES:]
+    if hashlib.sha256(code).digest() != checksum:
+        return None
+    _cache_log("[cache] data loaded from %r", str(file))  # with NUMBA_DEBUG_CACHE=1
+    return code
 
 
 def _read(file: Path) -> bytes | None:

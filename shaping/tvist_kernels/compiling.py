@@ -24,5 +24,5 @@ def compiled(function: F, *, nogil: bool = False) -> F:
 
     dispatcher: Any = njit(nogil=nogil)(function)
     # As njit(cache=True) does, with a cache of our own.
-    dispatcher._cache = KernelCache(dispatcher.py_func)  # noqa: SLF001
+    dispatcher._cache = KernelCache(dispatcher.py_func, dispatcher)  # noqa: SLF001
     return cast("F", dispatcher)

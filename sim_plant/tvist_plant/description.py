@@ -1,12 +1,14 @@
 """A robot as described by its file: numbers with units, checked but not processed."""
 
+import re
 import tomllib
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
-from tvist_plant._words import in_words
 from tvist_plant.robot_checks import check, is_real_body
 from tvist_plant.robot_tables import (
     DISTURBANCES,
@@ -20,7 +22,6 @@ from tvist_plant.robot_tables import (
     Tensor,
 )
 from tvist_plant.similar import completed, with_limits
-from tvist_plant.urdf import read_urdf
 from tvist_plant.user_file import read_toml, toml
 
 __all__ = [
@@ -61,6 +62,8 @@ def load(robot: str | Path) -> RobotDescription:
         if isinstance(robot, str) and robot in robots():
             content = toml(shipped.read_text(encoding="utf-8"))
         elif Path(robot).suffix == ".urdf":
+            from tvist_plant.urdf import read_urdf  # pinocchio is slow to import
+
             content = with_limits(read_urdf(robot))
         else:
             content = read_toml(robot, "robot file")
@@ -74,7 +77,7 @@ def load(robot: str | Path) -> RobotDescription:
     except tomllib.TOMLDecodeError as error:
         raise RobotFileError(f"robot file {robot}: it is not valid TOML: {error}") from error
     except msgspec.ValidationError as error:
-        raise RobotFileError(f"robot file {robot}: {in_words(error, content)}") from error
+        raise RobotFileError(f"robot file {robot}: {_in_words(error, content)}") from error
     check(description, robot)
     if description.imperfections:
         _check_imperfections(description, robot)
@@ -99,7 +102,7 @@ def _check_imperfections(description: RobotDescription, source: str | Path) -> N
     except msgspec.ValidationError as error:
         said, _, path = str(error).partition(" - at `$")
         inner = path.rstrip("`")
-        told = in_words(msgspec.ValidationError(f"{said} - at `$.imperfections{inner}`"), table)
+        told = _in_words(msgspec.ValidationError(f"{said} - at `$.imperfections{inner}`"), table)
         raise RobotFileError(f"robot file {source}: {told}") from error
     known = msgspec.to_builtins(made)
     for key, value in description.imperfections.items():
@@ -114,3 +117,71 @@ def _check_imperfections(description: RobotDescription, source: str | Path) -> N
         imperfect_model(description, description.payload, made)
     except ValueError as error:
         raise RobotFileError(f"robot file {source}: imperfections: {error}") from error
+
+
+_KINDS = {
+    "float": "a number", "int": "a whole number", "str": "text", "array": "a list", "object": "a table",
+    "bool": "true or false", "null": "nothing",
+}  # fmt: skip
+_RELATIONS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less than", "": "exactly"}
+
+
+def _in_words(error: msgspec.ValidationError, content: Any) -> str:
+    """Return a message with the key, the value and the permitted values.
+
+    Args:
+        error: Error raised by msgspec.
+        content: Content that was checked.
+    """
+    said, _, path = str(error).partition(" - at `$")
+    key = path.rstrip("`").removeprefix(".")
+    value = content
+    for name, index in re.findall(r"([A-Za-z_][^.\[]*)|\[(\d+)\]", key):
+        try:
+            value = value[int(index) if index else name]
+        except (TypeError, LookupError):
+            value = None
+    key = key.replace("[...]", ".<one of its keys>")[:200]
+    for pattern, words in _RULES:
+        if found := re.fullmatch(pattern, said):
+            return words(key, value, *found.groups())
+    return f"{key or 'the file'}: {said.replace('`', ''):.300}"
+
+
+def _missing(key: str, _: Any, name: str) -> str:
+    return f"{_joined(key, name)} is missing"
+
+
+def _unknown(key: str, _: Any, name: str) -> str:
+    return f"{_joined(key, name):.200} is not a key of a robot file"
+
+
+def _bound(key: str, value: Any, relation: str, limit: str) -> str:
+    return f"{key} is {value!r:.60}: must be {_RELATIONS[relation]} {float(limit):g}"
+
+
+def _length(key: str, value: Any, relation: str, limit: str) -> str:
+    count = len(value) if isinstance(value, list | str) else "another number of"
+    return f"{key} has {count} entries: must have {_RELATIONS[relation]} {limit}"
+
+
+def _kind(key: str, value: Any, wanted: str, got: str) -> str:
+    found = f" is {_called(got)}, {value!r:.60}:" if key else ""
+    return f"{key or 'the file'}{found} must be {_called(wanted)}"
+
+
+_RULES: tuple[tuple[str, Callable[..., str]], ...] = (
+    (r"Object missing required field `(.*)`", _missing),
+    (r"Object contains unknown field `(.*)`", _unknown),
+    (r"Expected `(?:float|int)` (>=|<=|>|<) (\S+)", _bound),
+    (r"Expected `(?:array|str)` of length (>=|<=|) ?(\d+)(?:, got \d+)?", _length),
+    (r"Expected `([^`]*)`, got `([^`]*)`", _kind),
+)
+
+
+def _joined(key: str, name: str) -> str:
+    return f"{key}.{name}".removeprefix(".")
+
+
+def _called(said: str) -> str:
+    return " or ".join(_KINDS.get(kind, kind) for kind in said.split(" | "))

@@ -20,7 +20,7 @@ from tvist_plant.joint_parameters import packed
 from tvist_plant.model import FlexibleModel, Floats
 from tvist_plant.modes import Modes, modes
 from tvist_plant.outside import Outside
-from tvist_plant.plant import PERIOD, Measurement, PlantError, PlantTruth, Response, played
+from tvist_plant.plant import PERIOD, Measurement, PlantError, PlantTruth, Response, SimulatedArm
 from tvist_plant.sensors import Accelerometer, gear_phases
 
 SUBSTEPS_OF_A_PERIOD = 4
@@ -31,7 +31,7 @@ SUBSTEPS_IF_IMPERFECT = 8
 """Substeps per period of an arm with imperfections, which are integrated explicitly."""
 
 
-class FlexibleArm:
+class FlexibleArm(SimulatedArm):
     """A flexible arm and its drives: a `Plant` that also supports pushes, other payloads, a failure, and its modes.
 
     Args:
@@ -41,6 +41,7 @@ class FlexibleArm:
             explicitly, so they need 8 substeps for the accuracy that the rest has with 4.
         period: Control period [s].
         substeps: Number of the integrator's steps per period; None for 4, or 8 if the file has imperfections.
+        carries: What it truly carries when it is said to carry a payload; None for that payload.
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class FlexibleArm:
         imperfections: Imperfections | None = None,
         period: float = PERIOD,
         substeps: int | None = None,
+        carries: Callable[[Payload], Payload] | None = None,
     ) -> None:
         self.description = description
         self.period = period
@@ -64,18 +66,15 @@ class FlexibleArm:
         self._width = 3 * n + 3
         self._places = slice(n), slice(n, 2 * n), slice(2 * n, 3 * n), slice(3 * n, None)
         """Places of what `evaluate` measures: angles, velocities, torques and specific force."""
+        self._carries = carries
         self._load(payload)
         self._accelerometer = Accelerometer(description.sensors.accelerometer_noise, 0)
 
-    @property
-    def payload(self) -> Payload:
-        """Carried payload."""
-        return self._payload
-
     def _load(self, payload: Payload) -> None:
         """Create the models of the arm with this payload, and memory for its state."""
-        self._payload = payload
-        self._flexible: FlexibleModel = imperfect_model(self.description, payload, self._imperfections)
+        self.payload = payload
+        truly = payload if self._carries is None else self._carries(payload)
+        self._flexible: FlexibleModel = imperfect_model(self.description, truly, self._imperfections)
         self._outside = Outside(self._flexible)
         self._data: pin.Data = self._flexible.model.createData()
         rotors = tuple(self._imperfections.rotor * B for B in self.description.drives.rotor_inertia)
@@ -170,13 +169,13 @@ class FlexibleArm:
         return measured
 
     def play(self, commands: Floats) -> Response:
-        """Move the arm by many periods in one call; see `Playable`.
+        """Move the arm by many periods in one call.
 
         Raises:
             PlantError: The state is no longer finite.
         """
         if not self._outside.rests:
-            return played(self, commands)
+            return super().play(commands)
         response = self._played(self.memory, commands)
         force = response.specific_force
         noisy = self._accelerometer.read_all(force)
@@ -185,7 +184,7 @@ class FlexibleArm:
         return replace(response, measured=replace(response.measured, accelerometer=noisy))
 
     def held(self) -> Callable[[int], Response]:
-        """Keep the present state, and return what the arm would do from it if nothing moved it; see `Foreseeing`."""
+        """Keep the present state, and return what the arm would do from it if nothing moved it."""
         memory = self.memory.copy()
         command = parts(memory).commands[NOW].copy()
         command[1] = 0.0
@@ -203,9 +202,9 @@ class FlexibleArm:
         return Response(measured, force, flange[:, 9:], flange[:, :9].reshape(T, 3, 3))
 
     def load(self, payload: Payload) -> None:
-        """Carry another payload from now on; see `Loadable`."""
-        self._payload, model = payload, self._flexible.model
-        self._flexible.carry(payload)
+        """Carry another payload from now on."""
+        self.payload, model = payload, self._flexible.model
+        self._flexible.carry(payload if self._carries is None else self._carries(payload))
         self._arm.chain[model.nv - 1, BODY:] = body_of(model, model.nv)
         self._arm.pushed[:] = 0.0 if self._outside.rests else self._outside.generalized_force(self._q)
         evaluate(self.memory, np.empty(self._width))

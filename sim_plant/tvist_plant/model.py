@@ -11,6 +11,7 @@ There are two models of the same arm:
   would put the fastest pole at -1.6e6 1/s, beyond any integrator at 500 Hz.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,6 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from tvist_plant.robot_tables import Payload, RobotDescription, Tensor
-from tvist_plant.urdf_elements import rotation as rotation_of
 
 FLANGE = "flange"
 
@@ -145,6 +145,18 @@ def link_frame(description: RobotDescription, number: int) -> pin.SE3:
     alpha = kinematics.alpha[number]
     rotation = np.array([[1, 0, 0], [0, np.cos(alpha), -np.sin(alpha)], [0, np.sin(alpha), np.cos(alpha)]])
     return pin.SE3(rotation, np.array([kinematics.a[number], 0.0, kinematics.d[number]]))
+
+
+def rotation_of(roll: float, pitch: float, yaw: float) -> Floats:
+    """Return the rotation matrix by angles as URDF has them: about fixed x, then y, then z [rad], shape (3, 3)."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in (roll, pitch, yaw))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
 
 
 def _matrix(tensor: Tensor) -> Floats:

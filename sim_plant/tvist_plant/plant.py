@@ -1,13 +1,14 @@
 """Interface between a controller and a plant: drive commands in, measurements out, one control period at a time.
 
-A controller requires only `Plant`, and that it is `Placeable` or `Standing`. Other abilities that only some plants have
-are interfaces of their own, too, which a plant implements by having the method: a simulation can be pushed and broken,
-and knows the truth; a real arm has power, brakes, faults and a clock.
+A plant is a `SimulatedArm`, which can be put anywhere, or a `RealArm`, which stands somewhere. All else that only some
+arms can do has a default in `Plant`. A class that derives from neither but has the methods is a plant, too; see
+`foreign.arm_of`.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -88,80 +89,6 @@ class Response:
     """Orientation of the flange, shape (T, 3, 3)."""
 
 
-@runtime_checkable
-class Plant(Protocol):
-    """An arm with its drives, simulated or real.
-
-    A controller owns its plant: no other code steps or resets it, and controllers do not share plants. When it starts,
-    it places the plant if that is `Placeable`, and otherwise begins where the arm stands (`Standing`); from then on it
-    calls `step` once in every control period of `PERIOD` seconds, with power or without.
-
-    An implementation guarantees:
-
-    - n joints, as many as in the robot's description, in its order and with its signs and zeros;
-    - that equal resets and equal commands give equal measurements to the last bit, if runs are to be replayed;
-    - that returned arrays are not changed later, since they belong to the receiver;
-    - that the command's arrays are neither kept nor changed;
-    - that each call returns within the control period, if the clock is real time.
-    """
-
-    @property
-    def payload(self) -> Payload:
-        """Carried payload, as far as it is known; it determines how far the arm moves when the brakes close."""
-
-    def step(self, command: DriveCommand) -> Measurement:
-        """Move the arm by one control period.
-
-        Args:
-            command: Set-points for the end of the period; the drives go linearly from the previous ones to these.
-
-        Returns:
-            Measurements at the end of the period.
-
-        Raises:
-            PlantError: A simulated state is no longer finite, or a real arm does not answer. A plant that can be placed
-                then is, in a protective stop; any other gets no power until the safety system is restarted.
-        """
-
-
-@runtime_checkable
-class Placeable(Plant, Protocol):
-    """A plant that can be put anywhere at rest, as simulated ones can: `simulation.reset` needs it."""
-
-    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
-        """Put the arm at rest under a command without motion, as if it had stood there for a long time.
-
-        Args:
-            command: Position to hold, shape (n,) [rad], feed-forward torque [N m], and a velocity of zero.
-            payload: New carried payload; None to keep the present one.
-            seed: Seed of all random effects, such as sensor noise.
-
-        Raises:
-            ValueError: The arm cannot be there, or cannot carry the payload, so that no controller can start with it.
-                Once its controller has started, a plant must not raise this.
-        """
-
-
-@runtime_checkable
-class Standing(Plant, Protocol):
-    """A plant that stands somewhere by itself, as a real arm does; every plant is this or `Placeable`."""
-
-    def measure(self) -> Measurement:
-        """Return the present measurements without moving the arm.
-
-        Raises:
-            PlantError: It does not answer. The robot then cannot begin with it, or does not switch its power on.
-        """
-
-
-@runtime_checkable
-class Truthful(Protocol):
-    """A plant that knows what a real robot cannot measure."""
-
-    def truth(self) -> PlantTruth | None:
-        """Return what a real robot cannot measure, after the last step or reset; None if that is unknown."""
-
-
 @dataclass(frozen=True)
 class Halt:
     """Why an arm's own controller does not follow us any more."""
@@ -182,39 +109,6 @@ class Condition:
     """What is wrong with it, in words; None if nothing is."""
     halt: Halt | None = None
     """Why its own controller has stopped it; None if it has not."""
-
-
-@runtime_checkable
-class Powered(Protocol):
-    """A plant whose power and brakes are switched, and which may switch itself off."""
-
-    def switch(self, *, power: bool, brakes: bool) -> None:
-        """Ask for another state, which may take a while: `condition` tells when the drives hold the arm.
-
-        Args:
-            power: Whether the drives are to have power.
-            brakes: Whether the brakes are to hold the arm.
-        """
-
-    @property
-    def condition(self) -> Condition:
-        """Its present condition. If it stops being ready while the robot runs, the robot stops."""
-
-
-@runtime_checkable
-class Stoppable(Protocol):
-    """A plant with a stop of its own, for stops that do not go through the control line."""
-
-    def stop(self) -> None:
-        """Stop with category 0: no power, brakes closed."""
-
-
-@runtime_checkable
-class Pacing(Protocol):
-    """A plant that gives the tick, as a controller does whose states arrive every 2 ms."""
-
-    def wait(self, timeout: float) -> bool:
-        """Wait until the next control period begins; return False if it does not within the timeout [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -249,79 +143,6 @@ class Sight:
     """What people should know, in sentences."""
 
 
-@runtime_checkable
-class Watched(Pacing, Standing, Protocol):
-    """A robot that its own controller moves, while we watch: no command reaches it, and `step` only measures."""
-
-    def sight(self) -> Sight:
-        """Return what it said in its next cycle, for which `wait` has waited.
-
-        Raises:
-            PlantError: It has said nothing since the last call.
-        """
-
-    def interval(self) -> float:
-        """Return the time between two of its cycles as they arrive [s]."""
-
-
-@runtime_checkable
-class Supervised(Pacing, Standing, Powered, Stoppable, Protocol):
-    """A robot that we move through its own controller, which follows our positions and may stop it."""
-
-    def seen(self) -> Sight:
-        """Return what it said last; its `told` are those since the last call."""
-
-    def described(self) -> RobotDescription:
-        """Return the robot file with limits no wider than the robot's own."""
-
-
-@runtime_checkable
-class Loadable(Protocol):
-    """A plant whose carried payload can change while it moves, for the parts and tools of a cell."""
-
-    def load(self, payload: Payload) -> None:
-        """Carry another payload from now on. Positions and velocities stay, only forces change.
-
-        Args:
-            payload: New carried payload.
-        """
-
-
-@runtime_checkable
-class Pushable(Protocol):
-    """A plant that supports external torques on its joints, for the fault `torque`."""
-
-    def push(self, torque: Floats) -> None:
-        """Apply external torques to the joints, until they are changed or the arm is reset.
-
-        Args:
-            torque: Torques on the link side, shape (n,); zeros end the push [N m].
-        """
-
-
-@runtime_checkable
-class Breakable(Protocol):
-    """A plant whose equations can be made to fail: fault `nan`."""
-
-    def make_nan(self) -> None:
-        """Make the state NaN, so that the next step raises `PlantError`."""
-
-
-@runtime_checkable
-class Playable(Protocol):
-    """A plant that computes many periods in one call, with the same results to the last bit as one by one."""
-
-    def play(self, commands: Floats) -> Response:
-        """Move the arm by T control periods.
-
-        Args:
-            commands: Position, velocity and torque of the command for the end of each, shape (T, 3, n).
-
-        Raises:
-            PlantError: The state is no longer finite.
-        """
-
-
 @dataclass(frozen=True)
 class Shape:
     """A primitive shape of a thing."""
@@ -354,28 +175,6 @@ class Things:
     """Number of shapes that are left out, such as meshes."""
 
 
-@runtime_checkable
-class InWorld(Protocol):
-    """A plant that stands among things that it touches."""
-
-    def things(self) -> Things:
-        """Return what stands around it, which stays the same."""
-
-    def places(self) -> Floats:
-        """Return the present poses of the bodies that move, in the frame of the base, shape (bodies, 6) [m, rad]."""
-
-    def contact(self) -> Floats:
-        """Return the force of all that touches the arm, its tool or its fingers, base frame, shape (3,) [N]."""
-
-    def obstacle(self, q: Floats, payload: Payload | None) -> str | None:
-        """Say what the arm would stand in after a reset; None if it would be clear. Asking changes nothing.
-
-        Args:
-            q: Joint angles of the reset, shape (n,) [rad].
-            payload: New carried payload; None for the present one.
-        """
-
-
 @dataclass(frozen=True)
 class Hand:
     """A gripper whose two fingers close along y of the tool centre point."""
@@ -398,12 +197,54 @@ class Hand:
         return np.asarray(self.position - 0.05 * self.direction)
 
 
-@runtime_checkable
-class Gripping(Protocol):
-    """A plant with room for a gripper that really holds."""
+class Plant(ABC):
+    """An arm with its drives, simulated or real: all that a controller may ask of it.
+
+    A controller owns its plant: no other code steps or resets it, and controllers do not share plants. When it starts,
+    it places a `SimulatedArm`, and begins where a `RealArm` stands; from then on it calls `step` once in every control
+    period of `PERIOD` seconds, with power or without. Every other method has a default, and `can` tells whether a plant
+    has one of its own.
+
+    An implementation guarantees:
+
+    - n joints, as many as in the robot's description, in its order and with its signs and zeros;
+    - that equal resets and equal commands give equal measurements to the last bit, if runs are to be replayed;
+    - that returned arrays are not changed later, since they belong to the receiver;
+    - that the command's arrays are neither kept nor changed;
+    - that each call returns within the control period, if the clock is real time.
+    """
+
+    payload: Payload
+    """Carried payload, as far as it is known; it determines how far the arm moves when the brakes close."""
+
+    @abstractmethod
+    def step(self, command: DriveCommand) -> Measurement:
+        """Move the arm by one control period.
+
+        Args:
+            command: Set-points for the end of the period; the drives go linearly from the previous ones to these.
+
+        Returns:
+            Measurements at the end of the period.
+
+        Raises:
+            PlantError: A simulated state is no longer finite, or a real arm does not answer. A simulated arm then is in
+                a protective stop; a real one gets no power until the safety system is restarted.
+        """
+
+    def can(self, method: Callable[..., Any]) -> bool:
+        """Return whether the plant has a method of its own for one that has a default here, such as `Plant.load`."""
+        return getattr(type(self), method.__name__) is not method
+
+    # ------------------------------------------------------------------ what it carries and grips
+
+    def load(self, payload: Payload) -> None:
+        """Carry another payload from now on, for the parts and tools of a cell; positions and velocities stay."""
+        self._lacks("load")
 
     def mount(self, hand: Hand) -> None:
-        """Mount a gripper, before the first reset."""
+        """Mount a gripper that really holds, before the first reset."""
+        self._lacks("mount")
 
     def grip(self, opening: float, force: float) -> None:
         """Move the fingers from the next step on.
@@ -412,14 +253,57 @@ class Gripping(Protocol):
             opening: Wanted distance between them [m].
             force: Largest force of each [N].
         """
+        self._lacks("grip")
 
     def opening(self) -> float:
         """Return the measured distance between the fingers [m]."""
+        self._lacks("opening")
 
+    # ------------------------------------------------------------------ power, and the tick
 
-@runtime_checkable
-class Foreseeing(Protocol):
-    """A plant that can tell what it would do if it were not moved any more."""
+    @property
+    def condition(self) -> Condition:
+        """Its present condition. If it stops being ready while the robot runs, the robot stops."""
+        return Condition(ready=True)
+
+    def switch(self, *, power: bool, brakes: bool) -> None:
+        """Ask for another state, which may take a while: `condition` tells when the drives hold the arm.
+
+        Args:
+            power: Whether the drives are to have power.
+            brakes: Whether the brakes are to hold the arm.
+        """
+
+    def stop(self) -> None:
+        """Stop with category 0, no power and brakes closed, for stops that do not go through the control line."""
+
+    def wait(self, timeout: float) -> bool:
+        """Give the tick: wait for the next control period; return False if it does not begin within the timeout [s]."""
+        self._lacks("wait")
+
+    @property
+    def watched(self) -> bool:
+        """Whether its own controller moves it, while we watch; see `RealArm.sight`."""
+        return False
+
+    @property
+    def supervised(self) -> bool:
+        """Whether we move it through its own controller; see `RealArm.seen`."""
+        return False
+
+    # ------------------------------------------------------------------ what only a simulation knows
+
+    def truth(self) -> PlantTruth | None:
+        """Return what a real robot cannot measure, after the last step or reset; None if that is unknown."""
+        return None
+
+    def modes(self, q: Floats | None = None) -> Modes | None:
+        """Return the vibration modes of the closed loop at rest; None if they are unknown.
+
+        Args:
+            q: Joint positions, shape (n,) [rad]; None for the present ones.
+        """
+        return None
 
     def held(self) -> Callable[[int], Response]:
         """Keep the present state, which takes little time.
@@ -428,38 +312,127 @@ class Foreseeing(Protocol):
             What the arm would do in a number of periods if its drives held the position of the last command, without
             noise and without pushes from outside. It does not change the arm, and may be called at any later time.
         """
+        self._lacks("held")
 
-
-@runtime_checkable
-class ModalPlant(Protocol):
-    """A plant that knows its vibration modes."""
-
-    def modes(self, q: Floats | None = None) -> Modes:
-        """Return the vibration modes of the closed loop at rest.
+    def push(self, torque: Floats) -> None:
+        """Apply external torques to the joints until they are changed or the arm is reset, for the fault `torque`.
 
         Args:
-            q: Joint positions, shape (n,) [rad]; None for the present ones.
+            torque: Torques on the link side, shape (n,); zeros end the push [N m].
+        """
+        self._lacks("push")
+
+    def make_nan(self) -> None:
+        """Make the state NaN for the fault `nan`, so that the next step raises `PlantError`."""
+        self._lacks("make_nan")
+
+    # ------------------------------------------------------------------ the world around it
+
+    def things(self) -> Things | None:
+        """Return what stands around it and touches it, which stays the same; None if nothing does."""
+        return None
+
+    def places(self) -> Floats:
+        """Return the present poses of the bodies that move, in the frame of the base, shape (bodies, 6) [m, rad]."""
+        return np.empty((0, 6))
+
+    def contact(self) -> Floats:
+        """Return the force of all that touches the arm, its tool or its fingers, base frame, shape (3,) [N]."""
+        return np.zeros(3)
+
+    def obstacle(self, q: Floats, payload: Payload | None) -> str | None:
+        """Say what the arm would stand in after a reset; None if it would be clear. Asking changes nothing.
+
+        Args:
+            q: Joint angles of the reset, shape (n,) [rad].
+            payload: New carried payload; None for the present one.
+        """
+        return None
+
+    def _lacks(self, method: str) -> NoReturn:
+        raise NotImplementedError(f"the plant {type(self).__name__} has no {method}")
+
+
+class SimulatedArm(Plant):
+    """A plant that can be put anywhere at rest: `simulation.reset` needs it."""
+
+    @abstractmethod
+    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
+        """Put the arm at rest under a command without motion, as if it had stood there for a long time.
+
+        Args:
+            command: Position to hold, shape (n,) [rad], feed-forward torque [N m], and a velocity of zero.
+            payload: New carried payload; None to keep the present one.
+            seed: Seed of all random effects, such as sensor noise.
+
+        Raises:
+            ValueError: The arm cannot be there, or cannot carry the payload, so that no controller can start with it.
+                Once its controller has started, a plant must not raise this.
         """
 
+    def play(self, commands: Floats) -> Response:
+        """Move the arm by T control periods, with the same results to the last bit as one by one.
 
-def played(plant: Plant, commands: Floats) -> Response:
-    """Let a plant move by T control periods, one by one.
+        Args:
+            commands: Position, velocity and torque of the command for the end of each, shape (T, 3, n).
 
-    Args:
-        plant: The plant; it must provide the truth.
-        commands: See `Playable.play`.
+        Raises:
+            PlantError: See `step`.
+            ValueError: The plant does not provide the truth.
+        """
+        rows = []
+        for command in commands:
+            measured = self.step(DriveCommand(*command))
+            truth = self.truth()
+            if truth is None:
+                raise ValueError(f"the plant {type(self).__name__} does not provide the truth")
+            own = (measured.q, measured.qd, measured.moment, measured.accelerometer)
+            rows.append((*own, truth.specific_force, truth.flange_position, truth.flange_rotation))
+        q, qd, moment, accelerometer, *felt = (np.array(column) for column in zip(*rows, strict=True))
+        return Response(Measurement(q, qd, moment, accelerometer), *felt)
 
-    Raises:
-        PlantError: See `Plant.step`.
-        ValueError: The plant does not provide the truth.
+
+class RealArm(Plant):
+    """A plant that stands somewhere by itself.
+
+    Its own controller may move it (`sight`), or follow our positions and stop it (`seen`); neither has a default.
     """
-    rows = []
-    for command in commands:
-        measured = plant.step(DriveCommand(*command))
-        truth = plant.truth() if isinstance(plant, Truthful) else None
-        if truth is None:
-            raise ValueError(f"the plant {type(plant).__name__} does not provide the truth")
-        own = (measured.q, measured.qd, measured.moment, measured.accelerometer)
-        rows.append((*own, truth.specific_force, truth.flange_position, truth.flange_rotation))
-    q, qd, moment, accelerometer, *felt = (np.array(column) for column in zip(*rows, strict=True))
-    return Response(Measurement(q, qd, moment, accelerometer), *felt)
+
+    def measure(self) -> Measurement:
+        """Return the present measurements without moving the arm.
+
+        Raises:
+            PlantError: It does not answer. The robot then cannot begin with it, or does not switch its power on.
+        """
+        name = type(self).__name__
+        raise ValueError(f"the plant {name} has neither reset nor measure: it needs one of them")
+
+    @property
+    def watched(self) -> bool:
+        """Whether its own controller moves it: no command reaches it, and `step` only measures."""
+        return self.can(RealArm.sight)
+
+    @property
+    def supervised(self) -> bool:
+        """Whether we move it through its own controller, which follows our positions and may stop it."""
+        return self.can(RealArm.seen)
+
+    def sight(self) -> Sight:
+        """Return what it said in its next cycle, for which `wait` has waited.
+
+        Raises:
+            PlantError: It has said nothing since the last call.
+        """
+        self._lacks("sight")
+
+    def interval(self) -> float:
+        """Return the time between two of its cycles as they arrive [s]."""
+        return PERIOD
+
+    def seen(self) -> Sight:
+        """Return what it said last; its `told` are those since the last call."""
+        self._lacks("seen")
+
+    def described(self) -> RobotDescription:
+        """Return the robot file with limits no wider than the robot's own."""
+        self._lacks("described")

@@ -1,6 +1,9 @@
 """Checks of a robot file that types cannot express."""
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -12,8 +15,12 @@ from tvist_plant.robot_tables import (
     RobotFileError,
     Tensor,
 )
-from tvist_plant.units import check_limits
-from tvist_plant.user_file import LONGEST_NAME, is_name
+from tvist_plant.user_file import LONGEST_NAME, UserFileError, is_name
+
+MAX_POSITION: Final = 20.0 * math.pi
+"""Largest position limit that is accepted as radians: ten turns in either direction [rad]."""
+MAX_VELOCITY: Final = 16.0 * math.pi
+"""Largest velocity limit that is accepted as radians: eight turns per second [rad/s]."""
 
 
 def check(description: RobotDescription, source: str | Path) -> None:
@@ -28,6 +35,24 @@ def check(description: RobotDescription, source: str | Path) -> None:
     check_limits(description.limits.position, description.limits.velocity, f"robot file {source}")
     _check_bodies(description, source)
     _check_provenance(description, source)
+
+
+def check_limits(position: Sequence[float], velocity: Sequence[float], source: str) -> None:
+    """Refuse limits that only make sense in degrees, which would be no limits at all.
+
+    Raises:
+        UserFileError: A limit exceeds `MAX_POSITION` or `MAX_VELOCITY`; the message gives it in both units.
+    """
+    for key, values, most, per in (
+        ("position", position, MAX_POSITION, ""),
+        ("velocity", velocity, MAX_VELOCITY, "/s"),
+    ):
+        for joint, value in enumerate(values):
+            if value > most:
+                raise UserFileError(
+                    f"{source}: limits.{key}[{joint}] is {value:g} rad{per}, and at most {most:.1f} rad{per} are "
+                    f"supported: if degrees were meant, write {math.radians(value):.6g} rad{per}"
+                )
 
 
 def is_real_body(inertia: Tensor) -> bool:

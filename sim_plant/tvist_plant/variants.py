@@ -12,11 +12,10 @@ from typing import Any, Final
 import numpy as np
 from msgspec import structs
 
-from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import SUBSTEPS_IF_IMPERFECT, FlexibleArm
 from tvist_plant.hidden import hidden, hidden_payload
 from tvist_plant.imperfections import Imperfections, YieldingBase
-from tvist_plant.plant import Measurement, Placeable
+from tvist_plant.plant import SimulatedArm
 from tvist_plant.robot_tables import Payload, RobotDescription
 from tvist_plant.similar import counterpart
 
@@ -57,7 +56,7 @@ class Variant:
     carries: Callable[[Payload], Payload] | None = None
     """Returns what it carries from what it is said to carry; None if that is true."""
 
-    def make(self, description: RobotDescription, carried: Payload, seed: int) -> Placeable:
+    def make(self, description: RobotDescription, carried: Payload, seed: int) -> SimulatedArm:
         """Create the arm from the controller's description, the payload that it is said to carry, and a seed.
 
         Raises:
@@ -68,37 +67,8 @@ class Variant:
             joints = description.joints
             widths = (self.backlash * BACKLASH[counterpart(joint, joints)] for joint in range(joints))
             found = replace(found or Imperfections(), backlash=tuple(widths))
-        how: dict[str, Any] = (
-            {} if found is None else {"imperfections": found, "substeps": SUBSTEPS_IF_IMPERFECT}
-        )
-        if self.carries is None:
-            return FlexibleArm(arm, carried, **how)
-        return _Mistaken(arm, carried, self.carries, **how)
-
-
-class _Mistaken(FlexibleArm):
-    """An arm that carries something else than it is said to."""
-
-    def __init__(
-        self, description: RobotDescription, said: Payload, carries: Callable[[Payload], Payload], **how: Any
-    ) -> None:
-        self._said, self._carries = said, carries
-        super().__init__(description, carries(said), **how)
-
-    @property
-    def payload(self) -> Payload:
-        """The payload that it is said to carry."""
-        return self._said
-
-    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
-        """Put the arm at rest; see `FlexibleArm.reset`."""
-        self._said = self._said if payload is None else payload
-        return super().reset(command, payload=None if payload is None else self._carries(payload), seed=seed)
-
-    def load(self, payload: Payload) -> None:
-        """Say that it carries another payload from now on; see `Loadable`."""
-        self._said = payload
-        super().load(self._carries(payload))
+        substeps = None if found is None else SUBSTEPS_IF_IMPERFECT
+        return FlexibleArm(arm, carried, imperfections=found, substeps=substeps, carries=self.carries)
 
 
 def _heavier(payload: Payload) -> Payload:

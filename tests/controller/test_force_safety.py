@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import load
 from tvist_plant.drives import DriveCommand
+from tvist_plant.foreign import called
 from tvist_plant.plant import PlantError
 from tvist_protocol import commands as c
 from tvist_protocol import forces as f

@@ -144,8 +144,8 @@ def test_no_point_travels_farther_than_the_reach_of_the_joints_that_turn():
         model = CollisionModel(UR5E, Payload(mass=2.0, com=com))
         for _ in range(60):
             q, turned = random.uniform(-3, 3, (2, 6)) * np.array([[1.0], [0.05]])
-            here, there = model._nearest(q), model._nearest(q + turned)
-            assert abs(there.distance - here.distance) <= model.travel(turned) + 1e-9
+            here, there = model._gaps(q).min(), model._gaps(q + turned).min()
+            assert abs(there - here) <= model.travel(turned) + 1e-9
 
 
 def test_info_says_how_long_stops_last():

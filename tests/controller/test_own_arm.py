@@ -7,7 +7,7 @@ from tests.own_arm import STANDS, SWITCHES, OwnArm
 from tvist_controller.controller import Controller
 from tvist_controller.motion.arm_power import STALE
 from tvist_controller.sources.own_plants import OwnPlant
-from tvist_controller.sources.plant_calls import told
+from tvist_plant.foreign import told
 from tvist_plant.plant import PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, SafetyMode

@@ -1,6 +1,8 @@
 """What streams and their look-ahead compute at every tick, compiled, against its own Python source and others."""
 
+import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 from tests.plant.arms import chain
 
@@ -119,22 +121,41 @@ def test_the_stop_in_closed_form_is_ruckigs(limit, in_python):
 def test_gaps_are_coals_and_shrink_no_faster_than_the_bound(payload, in_python):
     model, random = CollisionModel(UR5E, UR5E.payload), np.random.default_rng(1)
     model.declare(payload)
-    links, bodies, pairs, ends = model._bounds
-    kept = np.ones(len(model._pairs), dtype=bool) if payload.mass else ~model._with_payload
+    links, bodies, pairs, ends = model._parts
 
     def gaps(q):
-        clearance.place(links, q, bodies, ends)
-        return np.array([clearance.gap(bodies, ends, int(one), int(other)) for one, other in pairs[:, :2]])
+        found = np.empty(len(pairs))
+        least = clearance.rooms(links, bodies, pairs, ends, q, np.zeros(6), found)
+        assert least == found.min()
+        return found
 
     for _ in range(200):
         q, turned = random.uniform(-3, 3, (2, 6)) * np.array([[1.0], [0.05]])
-        here, there, coal = gaps(q), gaps(q + turned), model._gaps(q)[kept]
+        there, here = gaps(q + turned), gaps(q)
+        theirs = np.array([by_coal(bodies, ends, int(one), int(other)) for one, other in pairs[:, :2]])
         np.testing.assert_allclose(here, in_python(lambda q=q: gaps(q)), rtol=0, atol=1e-14)
-        apart = coal > 1e-3
-        np.testing.assert_allclose(here[apart], coal[apart], rtol=0, atol=2e-6)
-        assert ((here < 2e-3) == (coal < 2e-3))[np.abs(coal - 2e-3) > 1e-5].all()
+        apart = theirs > 1e-3
+        np.testing.assert_allclose(here[apart], theirs[apart], rtol=0, atol=2e-6)
+        assert ((here < 2e-3) == (theirs < 2e-3))[np.abs(theirs - 2e-3) > 1e-5].all()
         both = (here > 0.0) & (there > 0.0)
         assert (np.abs(there - here) <= pairs[:, 2:] @ np.abs(turned) + 1e-9)[both].all()
+
+
+def by_coal(bodies, ends, one, other):
+    """The distance of two bodies, of which the second may be the floor, as coal computes it."""
+
+    def placed(number):
+        if bodies[number, clearance.LINK] == clearance.FLOOR:
+            return coal.Halfspace(
+                np.array([0.0, 0.0, 1.0]), bodies[number, clearance.RADIUS]
+            ), coal.Transform3s()
+        first, second = ends[number, :3], ends[number, 3:]
+        length, up = float(np.linalg.norm(second - first)), np.array([0.0, 0.0, 1.0])
+        turn = pin.Quaternion.FromTwoVectors(up, second - first).matrix() if length > 0.0 else np.eye(3)
+        capsule = coal.Capsule(float(bodies[number, clearance.RADIUS]), max(length, 1e-6))
+        return capsule, coal.Transform3s(turn, (first + second) / 2.0)
+
+    return coal.distance(*placed(one), *placed(other), coal.DistanceRequest(), coal.DistanceResult())
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from tests.controller.robots import Q2, UR5E, Robot
 
-from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload
+from tvist_plant.foreign import called
 from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, PlantError, Sight
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetIo

@@ -32,7 +32,7 @@ class Change:
 
 
 class ChangingArm:
-    """A hidden robot with errors of its torque sensors, which can be changed while it rests; a `Placeable` plant."""
+    """A hidden robot with errors of its torque sensors, which can be changed while it rests; a simulated arm."""
 
     def __init__(self, description, said, seed):
         self._description, self._seed = hidden(description, seed), seed

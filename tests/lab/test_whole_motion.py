@@ -17,7 +17,7 @@ from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.shaping import Running, shape
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import PERIOD, PlantError, played
+from tvist_plant.plant import PERIOD, PlantError, SimulatedArm
 from tvist_shaping.named import BUILT_IN
 
 RESTING = 4
@@ -94,7 +94,7 @@ def test_an_arm_plays_what_it_steps_with_noise_and_pushes(ur5e):
     for arm in arms:
         arm.reset(DriveCommand(made[0, 0], np.zeros(6), np.zeros(6)), seed=3)
     for part in (made[:150], made[150:300], made[300:]):
-        one, other = arms[0].play(part), played(arms[1], part)
+        one, other = arms[0].play(part), SimulatedArm.play(arms[1], part)
         for name in ("specific_force", "flange_position", "flange_rotation"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
         for name in ("q", "qd", "moment", "accelerometer"):

@@ -17,7 +17,7 @@ from tvist_plant.description import (
     robots,
 )
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.units import check_limits
+from tvist_plant.robot_checks import check_limits
 from tvist_plant.user_file import UserFileError
 
 from .arms import chain, hold

@@ -5,7 +5,7 @@ import numpy as np
 from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import Loadable
+from tvist_plant.plant import Plant
 
 LIGHT, HEAVY = (
     Payload(mass=mass, com=(0.01, 0.0, 0.1), inertia=(0.01, 0.0, 0.0, 0.01, 0.0, 0.01)) for mass in (1.0, 3.0)
@@ -20,7 +20,7 @@ def held(arm, command, ticks):
 def test_an_arm_settles_as_if_it_had_carried_the_payload_from_the_start(ur5e):
     arm, other = FlexibleArm(ur5e, LIGHT), FlexibleArm(ur5e, HEAVY)
     command = DriveCommand(np.array(ur5e.poses["Q1"]), np.zeros(6), np.zeros(6))
-    assert isinstance(arm, Loadable)
+    assert arm.can(Plant.load)
     arm.reset(command)
     before = arm.truth()
     other.reset(command)

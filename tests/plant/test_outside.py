@@ -9,7 +9,7 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.model import flexible_model
 from tvist_plant.outside import Outside
-from tvist_plant.plant import Breakable, ModalPlant, Pushable
+from tvist_plant.plant import Plant
 
 from .arms import chain, hold, quiet
 
@@ -158,5 +158,5 @@ def test_torques_without_sense_are_refused(ur5e, torque):
 
 
 def test_the_flexible_arm_can_be_pushed_and_broken_and_knows_its_modes(ur5e):
-    for ability in (Pushable, Breakable, ModalPlant):
-        assert isinstance(FlexibleArm(ur5e, ur5e.payload), ability)
+    for ability in (Plant.push, Plant.make_nan, Plant.modes):
+        assert FlexibleArm(ur5e, ur5e.payload).can(ability)

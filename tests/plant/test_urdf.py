@@ -9,9 +9,8 @@ import pytest
 
 from tvist_plant.description import DescriptionError, load
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.model import rigid_model
+from tvist_plant.model import rigid_model, rotation_of
 from tvist_plant.robot_tables import Payload
-from tvist_plant.urdf_elements import angles, rotation
 
 SEVEN = Path(__file__).parent / "urdf" / "seven.urdf"
 
@@ -64,8 +63,9 @@ def test_it_vibrates_and_says_what_was_assumed(path, base):
 def test_angles_give_the_rotation_back():
     random = np.random.default_rng(0)
     for angle in [*random.uniform(-3.0, 3.0, (50, 3)), (0.3, np.pi / 2, 0.2), (0.0, -np.pi / 2, 1.0)]:
-        turn = rotation(*angle)
-        np.testing.assert_allclose(rotation(*angles(turn)), turn, atol=1e-7)
+        turn = rotation_of(*angle)
+        np.testing.assert_allclose(pin.rpy.rpyToMatrix(*angle), turn, atol=1e-12)
+        np.testing.assert_allclose(rotation_of(*pin.rpy.matrixToRpy(turn)), turn, atol=1e-7)
 
 
 BRANCH = '<link name="x"/><joint name="jx" type="{}"><parent link="elbow"/><child link="x"/><limit effort="1" velocity="1" lower="0" upper="1"/></joint></robot>'  # noqa: E501

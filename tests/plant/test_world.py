@@ -11,11 +11,10 @@ from msgspec.structs import replace
 
 from tvist_plant.description import Payload, load
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import GRAVITY, Hand, InWorld, PlantError, played
+from tvist_plant.plant import GRAVITY, Hand, Plant, PlantError, SimulatedArm
 from tvist_plant.world import apart
 from tvist_plant.world.mujoco_arm import MujocoArm
 from tvist_plant.world.scene_file import SceneError, find_scene, scenes
-from tvist_plant.world.world_arm import WorldArm
 
 EMPTY = '<mujoco><worldbody><geom size="0.1" pos="3 3 3"/></worldbody></mujoco>'
 DOWN = np.array([0.4, -1.8, -1.8, -1.1, 1.57, 0.0])
@@ -31,7 +30,7 @@ def world(tmp_path, text, arm="ur5e", payload=None, **sensors):
     )
     file = tmp_path / "scene.xml"
     file.write_text(text)
-    return WorldArm(description, description.payload if payload is None else payload, find_scene(str(file)))
+    return MujocoArm(description, description.payload if payload is None else payload, find_scene(str(file)))
 
 
 def still(q):
@@ -123,7 +122,7 @@ def test_pressed_a_surface_yields_by_the_stiffness_it_has_whatever_the_arm_carri
     force = arm.contact()
     assert force[2] > 1.0
     sphere = arm._world.model.geom("tool shape 0").id
-    (touch,) = [one for one in arm._arm.data.contact[: arm._arm.data.ncon] if sphere in one.geom]
+    (touch,) = [one for one in arm._data.contact[: arm._data.ncon] if sphere in one.geom]
     assert force[2] == pytest.approx(-stiffness * touch.dist, rel=0.02), depth
     upward = arm.truth().flange_rotation @ (measured.wrench - free)[:3]
     assert upward[2] == pytest.approx(force[2], rel=0.02)
@@ -198,7 +197,7 @@ def test_a_tools_margin_is_the_pairs(tmp_path):
 def test_what_a_reset_would_stand_in_is_known_before_and_asking_changes_nothing(tmp_path, ur5e):
     clear, low = np.array([[-2.7, -1.8, -1.8, -1.1, 1.57, 0.0], [-2.7, -2.2, -1.8, -0.7, 1.57, 0.0]])
     for payload in (None, Payload(mass=5.0, com=(0.0, 0.0, 0.05))):
-        asked, other = (WorldArm(ur5e, ur5e.payload, find_scene("table")) for _ in range(2))
+        asked, other = (MujocoArm(ur5e, ur5e.payload, find_scene("table")) for _ in range(2))
         for arm in (asked, other):
             arm.reset(still(clear))
             held(arm, clear, 5)
@@ -223,7 +222,7 @@ def test_what_only_turns_about_its_centre_of_mass_is_touched_as_stiffly_as_anyth
     )
     arm = world(tmp_path, text)
     arm.reset(still(DOWN))
-    model, data = arm._world.model, arm._arm.data
+    model, data = arm._world.model, arm._data
     data.qfrc_applied[model.joint("world/hinge").dofadr[0]] = force * lever
     held(arm, DOWN, 400)
     (touch,) = data.contact
@@ -243,9 +242,9 @@ def test_an_elastic_impact_has_the_peak_of_v_sqrt_k_m_and_gains_no_energy(tmp_pa
     arm = world(tmp_path, text, "one-joint")
     clean = arm._description.clean()
     description = replace(clean, drives=replace(clean.drives, gear_damping=(0.0, 0.0)))
-    arm = WorldArm(description, description.payload, find_scene(str(tmp_path / "scene.xml")))
+    arm = MujocoArm(description, description.payload, find_scene(str(tmp_path / "scene.xml")))
     arm.reset(still([0.0, 0.0]))
-    model, data = arm._world.model, arm._arm.data
+    model, data = arm._world.model, arm._data
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data.qvel[0] = v / reach
     inertia = np.zeros((model.nv, model.nv))
@@ -287,10 +286,10 @@ def test_two_fingers_hold_a_box_by_friction_and_no_heavier_than_they_can(tmp_pat
         arm.mount(hand)
         arm.reset(still(DOWN))
         # The box is put between the fingers when they have closed on it, so that it need not fall until then.
-        start = arm._arm.data.qpos[-7:].copy()
+        start = arm._data.qpos[-7:].copy()
         arm.grip(0.0, 60.0)
         for _ in range(150):
-            arm._arm.data.qpos[-7:], arm._arm.data.qvel[-6:] = start, 0.0
+            arm._data.qpos[-7:], arm._data.qvel[-6:] = start, 0.0
             arm.step(still(DOWN))
         arm.grip(0.0, force)
         box = arm.things().bodies.index("box")
@@ -303,8 +302,8 @@ def test_two_fingers_hold_a_box_by_friction_and_no_heavier_than_they_can(tmp_pat
 
 
 def test_equal_runs_are_equal_to_the_bit_and_a_reset_puts_everything_back(tmp_path, ur5e):
-    arm = WorldArm(ur5e, ur5e.payload, find_scene("table"))
-    assert isinstance(arm, InWorld)
+    arm = MujocoArm(ur5e, ur5e.payload, find_scene("table"))
+    assert arm.can(Plant.grip)
     runs = []
     for _ in range(2):
         arm.reset(still(DOWN), seed=3)
@@ -325,8 +324,8 @@ def test_equal_runs_are_equal_to_the_bit_and_a_reset_puts_everything_back(tmp_pa
 def test_many_periods_are_as_one_by_one(tmp_path, ur5e):
     commands = np.array([[one.q, one.qd, one.torque] for one in moving(DOWN, 40)])
     found = []
-    for how in (lambda arm: arm.play(commands), lambda arm: played(arm, commands)):
-        arm = WorldArm(ur5e, ur5e.payload, find_scene("table"))
+    for how in (lambda arm: arm.play(commands), lambda arm: SimulatedArm.play(arm, commands)):
+        arm = MujocoArm(ur5e, ur5e.payload, find_scene("table"))
         arm.reset(still(DOWN))
         found.append(how(arm))
     for name in ("specific_force", "flange_position", "flange_rotation"):
@@ -349,7 +348,7 @@ def test_a_push_moves_it_and_a_state_that_is_no_number_fails(tmp_path, monkeypat
 
 @pytest.mark.parametrize("name", scenes())
 def test_the_scenes_stand_still_and_leave_room_for_the_arm(name, ur5e):
-    arm = WorldArm(ur5e, Payload(), find_scene(name))
+    arm = MujocoArm(ur5e, Payload(), find_scene(name))
     ursim = [-1.6, -1.727, -2.203, -0.808, 1.595, -0.031]
     arm.reset(still(ursim))
     begun = arm.places()

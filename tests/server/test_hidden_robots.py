@@ -17,7 +17,7 @@ from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_plant.description import load
 from tvist_plant.hidden import hidden, hidden_payload
-from tvist_plant.plant import Foreseeing, ModalPlant, Truthful
+from tvist_plant.plant import Plant
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ConfigError, ServeConfig
@@ -72,8 +72,8 @@ def test_only_the_seed_tells_of_it():
 
 def test_its_plant_has_no_ability_that_would_tell():
     plant = setup(hidden=SEED).made_plant()
-    for ability in (Truthful, ModalPlant, Foreseeing):
-        assert not isinstance(plant, ability)
+    for ability in (Plant.truth, Plant.modes, Plant.held):
+        assert not plant.can(ability)
     assert plant.payload == body(setup().payload)
 
 

@@ -17,9 +17,9 @@ from tests.controller.robots import UR5E, Robot
 
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.line.kinematics import ForwardKinematics
-from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload, load
 from tvist_plant.drives import DriveCommand
+from tvist_plant.foreign import called
 from tvist_plant.plant import PERIOD, Measurement, Sight
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_state, encode

@@ -12,8 +12,8 @@ from tvist_lab.programs.in_lockstep import run_in_lockstep
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
 from tvist_plant.plant import Shape
+from tvist_plant.world.mujoco_arm import MujocoArm
 from tvist_plant.world.scene_file import find_scene
-from tvist_plant.world.world_arm import WorldArm
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
 from tvist_protocol.simulation import SimulationReset
@@ -155,7 +155,8 @@ def test_a_reset_into_the_world_is_refused_and_changes_nothing(given, tmp_path):
     )
     scene = find_scene(str(tmp_path / "scene.xml"))
     robots = [
-        Robot(q=clear, carried=light, plant=WorldArm(UR5E, UR5E.payload, scene), truth=True) for _ in range(2)
+        Robot(q=clear, carried=light, plant=MujocoArm(UR5E, UR5E.payload, scene), truth=True)
+        for _ in range(2)
     ]
     for one in robots:
         one.tick(5)

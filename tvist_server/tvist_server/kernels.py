@@ -6,11 +6,23 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
+
+import numpy as np
 
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.instruments.snapshot import Instruments
+from tvist_controller.kinematics.inverse import InverseKinematics
 from tvist_controller.loopback import LoopbackHost
-from tvist_kernels.cache import held, kernels, unkept
+from tvist_controller.paths.legs import JointWay, Pacing
+from tvist_controller.paths.pacing import JointLimits, ground_of, joined, law_of
+from tvist_controller.paths.route import Piece
+from tvist_controller.paths.tool_curves import PER_RADIAN, ToolLine
+from tvist_controller.paths.tracking import Tracker
+from tvist_controller.planning.path_planner import LEAST_WINDOW
+from tvist_controller.setup import Setup
+from tvist_controller.trajectory.spline import SplineCurve
+from tvist_kernels.cache import held, kernels, load_all, unkept
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import Command, MoveJ, ServoStart, ServoStop, SetShaper, Stop, TakeControl
 from tvist_protocol.kinematics import ForwardKinematics
@@ -20,7 +32,6 @@ from tvist_protocol.simulation import SimulationStep, StepSetpoint
 from tvist_server.config_file import from_mapping
 from tvist_server.gateways.starting import Tell
 from tvist_server.punctual import processors
-from tvist_server.rehearsal import rehearse
 
 MOVE_TICKS = 1000
 """Longest time of a motion that uses kernels [ticks]."""
@@ -39,6 +50,15 @@ class KernelsError(RuntimeError):
 def compiled() -> int:
     """Return how many of `KERNELS` are on disk; if some are not, the start of a robot takes long."""
     return len(held(KERNELS))
+
+
+@cache
+def warm_up() -> None:
+    """Load every kernel of a served robot, so that no tick does; those that could not be kept on disk are compiled."""
+    load_all(KERNELS)
+    if compiled() < len(KERNELS):
+        for part in PARTS.values():
+            part()
 
 
 def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> None:
@@ -113,7 +133,8 @@ def _line() -> None:
         MoveJ(token=token, q=bent), step, MoveL(token=token, pose=(x, y, z + 0.05, a, b, c)),
         SimulationStep(token=token, ticks=50), Stop(), step, SetShaper(token=token, name="elastic"), back, step,
         SetShaper(token=token, name="auto"), MoveJ(token=token, q=bent), step,
-        SetShaper(token=token, name="none", modes=2), back, step,
+        SetShaper(token=token, name="none", modes=2), back, SimulationStep(token=token, ticks=100),
+        SetShaper(token=token, name="zv"), step,
     ]  # fmt: skip
     here = StepSetpoint(sequence=0, q=back.q)
     for period in (0.002, 0.008):
@@ -123,22 +144,31 @@ def _line() -> None:
         reply = ask(command)
         assert not isinstance(reply, Refused), reply
     Instruments(host.controller.setup.description)
-    rehearse(host.controller)  # as a served robot does before its first tick
+    _ = host.controller.cycle.shaped.joints.published
 
 
 def _postures() -> None:
     """Compile inverse kinematics, in closed form and by iteration."""
     for robot in ("ur5e", "one-joint"):
-        _planner(robot).rehearse_postures()
+        InverseKinematics(_setup(robot).description).prepare()
 
 
 def _plans() -> None:
     """Compile what plans use besides inverse kinematics and lines."""
-    _planner("ur5e").rehearse_plans()
+    setup = _setup("ur5e")
+    Planner(setup).filters.first()
+    q, tracker = np.zeros(setup.description.joints), Tracker(setup.description, (0.0,) * 6)
+    tracker.rates(q, ToolLine(*[tracker.pose(q)] * 2).at(0.0))
+    run = [Piece(JointWay(q, q + 0.1).part(0.0, 0.1 * PER_RADIAN), Pacing(1.0, 1.0), None, True, "")]
+    limits = setup.description.limits
+    joints = JointLimits(np.array(limits.velocity), np.array(limits.acceleration), min(limits.jerk))
+    curve = SplineCurve(joined(run))
+    for goes_on in (False, True):
+        law_of(run, curve, ground_of(run, curve), joints, 60.0, LEAST_WINDOW, goes_on=goes_on)
 
 
-def _planner(robot: str) -> Planner:
-    return Planner(from_mapping({"robot": robot}, "configuration").setup())
+def _setup(robot: str) -> Setup:
+    return from_mapping({"robot": robot}, "configuration").setup()
 
 
 PARTS: dict[str, Callable[[], None]] = {"postures": _postures, "line": _line, "plans": _plans}

@@ -13,7 +13,7 @@ from tvist_controller.host import Host
 from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.reporting.sink import Sink
 from tvist_controller.setup import Setup
-from tvist_plant.plant import PERIOD, Pacing, Supervised, Truthful, Watched
+from tvist_plant.plant import Plant, RealArm
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Refused, Reply
@@ -22,6 +22,7 @@ from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.clock import Clock, Mailbox
 from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.gateways.sockets import ProgramSockets
+from tvist_server.kernels import warm_up
 from tvist_server.lateness import Punctuality
 from tvist_server.plan_ahead import PlanAhead
 from tvist_server.plans_of_programs import PlansOfPrograms
@@ -30,7 +31,6 @@ from tvist_server.publisher import Publisher
 from tvist_server.punctual import waited_us
 from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
-from tvist_server.rehearsal import rehearse
 from tvist_server.studies import Studies
 
 if TYPE_CHECKING:
@@ -76,11 +76,11 @@ class ServedRobot:
         plant = setup.made_plant()
         setup = setup.standing(plant)  # with the limits of a robot that has its own
         # When a client advances time, nothing is late, and plans are made when they are needed.
-        self._plans = None if lockstep else PlansOfPrograms(_planner(setup))
+        self._plans = None if lockstep else PlansOfPrograms(Planner(setup))
         self.controller = Controller(setup, plant, None if self._plans is None else self._plans.order)
         self.setup = setup = self.controller.setup
         if self._realtime:
-            rehearse(self.controller)
+            warm_up()
         info_of(self.controller)  # computes the slowest part of the description once, before the first tick
         self.recorder: Recorder | None = None
         if record is not None:
@@ -116,22 +116,18 @@ class ServedRobot:
             survives=True,
         )  # fmt: skip
         plant = self.controller.cycle.plant  # also where the setup has none
-        knows = isinstance(plant, Truthful) and plant.truth() is not None
+        knows = plant.truth() is not None
         self.want_truth = self.publisher.want_truth if knows and not setup.truth else None
         """To be told whether a client on this machine wants the truth; None if it is published anyway, or unknown."""
         self.driven = Mailbox(
             self._host,
             self.sockets.patience,
-            plant.wait if isinstance(plant, Pacing) else None,
-            plant.interval()
-            if isinstance(plant, Watched)
-            else PERIOD
-            if isinstance(plant, Supervised)
-            else None,
+            plant.wait if plant.can(Plant.wait) else None,
+            plant.interval() if isinstance(plant, RealArm) and (plant.watched or plant.supervised) else None,
         )
         """The robot as seen by the clock."""
         self._plan_ahead = (
-            None if lockstep else PlanAhead(self._host, _planner(setup), self.driven.post, self._complete)
+            None if lockstep else PlanAhead(self._host, Planner(setup), self.driven.post, self._complete)
         )
         carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
         self.reception = Reception(
@@ -320,10 +316,3 @@ class ServedRobot:
     def warn(self, why: str) -> None:
         """Publish a warning to clients and the console."""
         self.driven.post(lambda: self._host.warn(why))
-
-
-def _planner(setup: Setup) -> Planner:
-    """A planner that compiles nothing while the robot ticks."""
-    planner = Planner(setup)
-    planner.rehearse()
-    return planner

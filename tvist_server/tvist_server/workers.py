@@ -27,8 +27,8 @@ from tvist_server.ending import Ending
 from tvist_server.gateways.access import with_robots_behind
 from tvist_server.gateways.endpoints import protocol
 from tvist_server.gateways.starting import Prepare
+from tvist_server.kernels import warm_up
 from tvist_server.own_folder import OwnFolder
-from tvist_server.rehearsal import rehearse
 from tvist_server.server import Recording
 from tvist_server.spread import LOCAL, Share, check_together, shares
 from tvist_server.ur_ports import InterfaceName
@@ -278,12 +278,11 @@ def _rehearse(setup: Setup) -> None:
     Somebody's own arm is not touched: only the process that serves it makes it.
     """
     setup = replace(setup, plant=None)
+    warm_up()
     planner = Planner(setup)
-    planner.rehearse()
     planner.rehearse_scripts()
     controller = Controller(setup)
     Host(controller).tick()
-    rehearse(controller)
 
 
 def _listed(names: Sequence[str], part: range) -> str:

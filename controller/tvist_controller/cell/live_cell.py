@@ -14,7 +14,7 @@ from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.paths.poses import Placement, placement
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import Floats
-from tvist_plant.plant import Gripping, Loadable, Plant
+from tvist_plant.plant import Plant
 from tvist_protocol.values import Pose
 
 TRANSFER = 100
@@ -60,7 +60,7 @@ class LiveCell:
     def __init__(
         self, cell: Cell, description: RobotDescription, plant: Plant, terminals: Terminals, emit: Emit
     ) -> None:
-        if cell.changes_load and not isinstance(plant, Loadable):
+        if cell.changes_load and not plant.can(Plant.load):
             name = type(plant).__name__
             raise ValueError(
                 f"cell: the plant {name} cannot carry another payload while it moves, since it has no load: leave "
@@ -69,9 +69,8 @@ class LiveCell:
         if cell.tools:
             terminals.set_tcp(cell.tools[0].tcp)
         self._cell, self._plant, self._terminals, self._emit = cell, plant, terminals, emit
-        self._hand = plant if isinstance(plant, Gripping) else None
+        self._hand = plant if plant.can(Plant.grip) else None
         self._kinematics = ToolKinematics(description)
-        self._kinematics.pose(np.zeros(description.joints))  # its kernel is loaded before the first tick
         self.gripper = (
             None if cell.gripper is None else Gripper(cell.gripper.stroke, activated=cell.gripper.activated)
         )
@@ -142,7 +141,7 @@ class LiveCell:
             self._share = min(self._share + 1, TRANSFER)
         elif self._share:
             self._share -= 1
-        if (self._tool, self._share) != before and isinstance(self._plant, Loadable):
+        if (self._tool, self._share) != before and self._plant.can(Plant.load):
             self._plant.load(joined(self._load, self._part, self._share / TRANSFER))
         mask, values = self._wires.tick(tick, outputs)
         if mask:
@@ -160,7 +159,7 @@ class LiveCell:
         self._load = self._first_load if tool is self._cell.tools[0] else tool_body(tool)
         self._emit("text", why=f"cell: the tool {tool.name} ({tool.mass:g} kg) is on the flange")
 
-    def _move_real_fingers(self, gripper: Gripper, hand: Gripping) -> None:
+    def _move_real_fingers(self, gripper: Gripper, hand: Plant) -> None:
         """Move fingers that touch things: what stops them is between them, and what they hold does not fall."""
         opening = hand.opening()
         if gripper.holds and opening < gripper.opening - STALLED:

@@ -29,19 +29,6 @@ class Planner:
         planners = (self.filters, moves, self._paths, self._reachable, self._scripts)
         self._planners: dict[type, Any] = {type(one): one for one in planners}
 
-    def rehearse(self) -> None:
-        """Load what plans use, before any is needed; where it is not on disk, it is compiled, which takes long."""
-        self.rehearse_postures()
-        self.rehearse_plans()
-
-    def rehearse_postures(self) -> None:
-        """Compile inverse kinematics."""
-        self._reachable.rehearse()
-
-    def rehearse_plans(self) -> None:
-        """Compile what is not inverse kinematics."""
-        self._paths.rehearse()
-
     def rehearse_scripts(self) -> None:
         """Make what compiling a program needs; that is Python alone, and may be done while a robot ticks."""
         self._scripts.rehearse()

@@ -1,4 +1,6 @@
-"""Bounds that prove an arm to be clear of itself and the floor, compiled: no stop near a body is decided here.
+"""Distances between the bodies of an arm and the floor, and bounds of them while joints turn, compiled.
+
+Each body is a capsule: all that is nearer to its axis than its radius.
 
 The distance between two bodies on one chain of joints changes only with the joints between them. If joint j turns at
 the rate q̇_j, it changes at most as fast as |q̇_j| times the smaller of the two bodies' largest distances from the joint:
@@ -72,29 +74,30 @@ def gap(bodies: Floats, ends: Floats, one: int, other: int) -> float:
 
 
 @compiled_for_ticks
-def has_room(
-    chain: Floats, bodies: Floats, pairs: Floats, ends: Floats, q: Floats, turned: Floats, least: float
-) -> bool:
-    """Return whether all bodies certainly stay farther apart than `least` [m] while the joints turn.
+def rooms(
+    chain: Floats, bodies: Floats, pairs: Floats, ends: Floats, q: Floats, turned: Floats, found: Floats
+) -> float:
+    """Compute how far the bodies of each pair certainly stay apart while joints turn, and return the least [m].
 
     Args:
-        chain: See `place`; also for bodies, ends and q.
+        chain: See `place`; also for bodies and q.
         bodies: Bodies.
         pairs: See `ARMS`, shape (k, 2+n).
-        ends: Scratch.
+        ends: Scratch; see `place`.
         q: Joint positions around which they turn.
-        turned: Largest angle of each joint, shape (n,) [rad].
-        least: Distance [m].
+        turned: Largest angle of each joint, shape (n,); with zeros, the distances at q are computed [rad].
+        found: Result of each pair, shape (k,) [m].
     """
     place(chain, q, bodies, ends)
+    least = math.inf
     for p in range(pairs.shape[0]):
         way = 0.0
         for j in range(q.shape[0]):
             way += pairs[p, ARMS + j] * turned[j]
-        # Negated, so that nothing is clear in a posture that is not finite.
-        if not gap(bodies, ends, int(pairs[p, ONE]), int(pairs[p, OTHER])) - way > least:
-            return False
-    return True
+        found[p] = gap(bodies, ends, int(pairs[p, ONE]), int(pairs[p, OTHER])) - way
+        # Nothing is clear in a posture that is not finite.
+        least = min(least, found[p]) if math.isfinite(found[p]) else -math.inf
+    return least
 
 
 @compiled_for_ticks
@@ -115,7 +118,7 @@ def stop_has_room(
     From each posture that is looked at, time goes on by as much as the bodies then certainly need to meet.
 
     Args:
-        chain: See `has_room`; also for bodies, pairs, ends and least.
+        chain: See `rooms`; also for bodies, pairs and ends.
         bodies: Bodies.
         pairs: Pairs.
         ends: Scratch.

@@ -1,10 +1,9 @@
-"""Collisions of the arm with itself and the floor: capsules of the robot file, distances by coal."""
+"""Collisions of the arm with itself and the floor: capsules of the robot file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-import coal
 import numpy as np
 import pinocchio as pin
 
@@ -15,14 +14,16 @@ from tvist_controller.foresight.clearance import (
     FIRST,
     FLOOR,
     LINK,
+    ONE,
+    OTHER,
     RADIUS,
-    has_room,
+    rooms,
     stop_has_room,
 )
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.trajectory import Way
 from tvist_plant.chain import AXES, chain_of
-from tvist_plant.description import Body, Payload, RobotDescription
+from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, link_frame, rigid_model
 
 CLEARANCE = 0.005
@@ -63,33 +64,32 @@ class CollisionModel:
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
-        self._model = rigid_model(description, Payload())
-        self._data = self._model.createData()
-        self._chain = chain_of(self._model, self._model.getFrameId(FLANGE))
-        self._reach = np.zeros(description.joints)
-        self.declared = payload
-        """Declared payload."""
-        self._geometry = pin.GeometryModel()
-        self._names: list[str] = []
-        collision = description.collision
-        for body in collision.bodies:
-            self._add(body, description)
-        if collision.bodies:
-            self._add_payload(collision.payload_radius)
-        self._add_pairs(description)
-        self._fine, self._coarse = (self._request(margin) for margin in (CLEARANCE, FAR))
-        self._distances = self._geometry.createData()
-        self._pairs = list(self._geometry.collisionPairs)
+        model, collision = rigid_model(description, Payload()), description.collision
+        frame = model.frames[model.getFrameId(FLANGE)]
+        self._chain = chain_of(model, model.getFrameId(FLANGE))
+        self._links = [float(np.linalg.norm(one.translation)) for one in model.jointPlacements]
+        # From pinocchio's frame of each link to that of its chain, whose z is the axis.
+        self._axes = [np.eye(3), *(AXES[joint.shortname()] for joint in list(model.joints)[1:])]
+        self._flange, self._payload_radius = frame.placement, collision.payload_radius
+        self._flange_link = frame.parentJoint
+        self._names = [body.name for body in collision.bodies]
+        self._names += [PAYLOAD] if self._names else []
+        self._names += ["floor"] if self._names and collision.has_floor else []
         self._bodies = np.zeros((len(self._names), BODY))
         self._far = np.full((len(self._names), description.joints), np.inf)
-        for number in range(len(self._names)):
-            self._bound(number)
-        self._with_payload = np.array(
-            [PAYLOAD in (self._names[pair.first], self._names[pair.second]) for pair in self._pairs],
-            dtype=bool,
-        )
-        self._loaded = False
-        self._bounds = self._bound_pairs()
+        """How far each joint may carry each body [m/rad]."""
+        self._own = np.zeros(len(self._names))
+        """Distance of the farthest point of each body from the origin of its link [m]."""
+        for number, body in enumerate(collision.bodies):
+            place = pin.SE3.Identity() if body.link < 0 else link_frame(description, body.link)
+            ends = np.array([place.act(np.array(end)) for end in (body.start, body.end)])
+            self._put(number, max(body.link + 1, 0), ends, body.radius)
+        if self._names and collision.has_floor:
+            self._bodies[-1, [LINK, RADIUS]] = FLOOR, collision.floor
+        self._all_pairs = self._pairs_of(description)
+        self._still = np.zeros(description.joints)
+        self._upright = bool(np.allclose(self._chain[0, [2, 5]], 0.0))
+        """Whether the first joint changes no height."""
         self.declare(payload)
 
     def meeting(self, q: Floats) -> Meeting | None:
@@ -98,7 +98,9 @@ class CollisionModel:
         Args:
             q: Joint positions, shape (n,) [rad].
         """
-        return self._nearest(q) if self._within(self._fine, q) else None
+        gaps = self._gaps(q)
+        number = int(np.argmin(gaps)) if len(gaps) else None
+        return None if number is None or gaps[number] >= CLEARANCE else self._meeting_of(gaps, number)
 
     def misplaced(self, q: Floats, *payloads: Payload) -> str | None:
         """Say which bodies would meet if the arm were put at a posture with one of these payloads; None if none would.
@@ -145,27 +147,20 @@ class CollisionModel:
             Share of the way, and the pair; None if the way is clear.
         """
         travel, share = self.travel(way.turned), 0.0
-        begin = way.at(0.0) if before is None else before
-        least = np.minimum(self._gaps(begin), CLEARANCE) if self._within(self._fine, begin) else CLEARANCE
+        least = np.minimum(self._gaps(way.at(0.0) if before is None else before), CLEARANCE)
         while True:
-            q = way.at(share)
-            step = FAR - CLEARANCE
-            if self._within(self._coarse, q):
-                gaps = self._gaps(q)
-                if (gaps < least - ROUNDING).any():
-                    return share, self._meeting_of(gaps, int(np.argmin(gaps - least)))
-                least = np.maximum(np.minimum(gaps, CLEARANCE), least)
-                step = max(float(gaps.min()) - CLEARANCE, SHORT)
-            else:
-                least = CLEARANCE
+            gaps = self._gaps(way.at(share))
+            if (gaps < least - ROUNDING).any():
+                return share, self._meeting_of(gaps, int(np.argmin(gaps - least)))
+            least = np.maximum(np.minimum(gaps, CLEARANCE), least)
             if share >= 1.0:
                 return None
-            share = 1.0 if travel <= 0.0 else min(share + step / travel, 1.0)
+            nearest = min(float(gaps.min(initial=np.inf)), FAR)
+            share = 1.0 if travel <= 0.0 else min(share + max(nearest - CLEARANCE, SHORT) / travel, 1.0)
 
     def nearest(self, postures: Floats, far: float = FAR) -> float:
         """Smallest distance between two bodies at k postures, shape (k, n) [rad]; `far` if none is smaller [m]."""
-        near = [q for q in postures if self._names and self._within(self._coarse, q)]
-        return min((far, *(self._nearest(q).distance for q in near)))
+        return min((far, *(float(self._gaps(q).min(initial=far)) for q in postures)))
 
     def travel(self, turned: Floats) -> float:
         """Upper bound of any point's travel [m] while the joints turn by these angles, shape (n,) [rad]."""
@@ -178,7 +173,7 @@ class CollisionModel:
             q: Joint positions around which they turn, shape (n,) [rad].
             turned: Largest angle of each joint, shape (n,) [rad].
         """
-        return has_room(*self._bounds, q, turned, CLEARANCE + SURE)
+        return rooms(*self._parts, q, turned, self._found) > CLEARANCE + SURE
 
     def stop_is_spacious(self, state: Target, acceleration: float, jerk: float) -> bool:
         """Return whether the joints can certainly stop without a meeting.
@@ -189,150 +184,79 @@ class CollisionModel:
             jerk: Jerk limit [rad/s^3].
         """
         least = CLEARANCE + SURE
-        return stop_has_room(*self._bounds, state.q, state.qd, state.qdd, acceleration, jerk, least)
+        return stop_has_room(*self._parts, state.q, state.qd, state.qdd, acceleration, jerk, least)
 
-    def _request(self, margin: float) -> pin.GeometryData:
-        data = self._geometry.createData()
-        for request in data.collisionRequests:
-            request.security_margin = margin
-        return data
-
-    def _within(self, margin: pin.GeometryData, q: Floats) -> bool:
-        """Return whether any pair is closer than the margin."""
-        return bool(pin.computeCollisions(self._model, self._data, self._geometry, margin, q, True))
-
-    def _nearest(self, q: Floats) -> Meeting:
-        gaps = self._gaps(q)
-        return self._meeting_of(gaps, int(np.argmin(gaps)))
+    def declare(self, payload: Payload) -> None:
+        """Change the payload in place."""
+        self.declared = payload
+        pairs = self._all_pairs
+        if self._names:
+            number, centre = self._names.index(PAYLOAD), np.array(payload.com)
+            distance = float(np.linalg.norm(centre))
+            inset = centre * min(self._payload_radius / distance, 1.0) if distance > 0.0 else centre
+            ends = np.array([self._flange.act(end) for end in (inset, 2.0 * centre - inset)])
+            self._put(number, self._flange_link, ends, self._payload_radius)
+            pairs = pairs if payload.mass > 0.0 else pairs[(pairs[:, [ONE, OTHER]] != number).all(axis=1)]
+        pairs = np.array([self._bounded(pair) for pair in pairs]).reshape(-1, ARMS + len(self._still))
+        self._parts = self._chain, self._bodies, pairs, np.zeros((len(self._names), 6))
+        """Chain, bodies, pairs that can meet, and scratch, as the kernels of `clearance` take them."""
+        self._found = np.zeros(len(pairs))
+        self._reach = self._reaches(loaded=payload.mass > 0.0)
 
     def _gaps(self, q: Floats) -> Floats:
         """Distance of each pair of bodies at a posture [m]."""
-        pin.computeDistances(self._model, self._data, self._geometry, self._distances, q)
-        gaps = np.array([result.min_distance for result in self._distances.distanceResults])
-        if not self._loaded:
-            gaps[self._with_payload] = np.inf
-        return gaps
+        found = np.empty(len(self._found))
+        rooms(*self._parts, q, self._still, found)
+        return found
 
     def _meeting_of(self, gaps: Floats, number: int) -> Meeting:
-        pair = self._pairs[number]
-        return Meeting(self._names[pair.first], self._names[pair.second], float(gaps[number]))
+        pair = self._parts[2][number]
+        return Meeting(self._names[int(pair[ONE])], self._names[int(pair[OTHER])], float(gaps[number]))
 
-    def _add(self, body: Body, description: RobotDescription) -> None:
-        start, end = np.array(body.start), np.array(body.end)
-        if body.link < 0:
-            self._add_capsule(body.name, 0, pin.SE3.Identity(), start, end, body.radius)
-        else:
-            frame = link_frame(description, body.link)
-            self._add_capsule(body.name, body.link + 1, frame, start, end, body.radius)
+    def _put(self, number: int, link: int, ends: Floats, radius: float) -> None:
+        """Place a body by the ends of its axis in pinocchio's frame of its link, shape (2, 3) [m]."""
+        row = self._bodies[number]
+        row[LINK], row[FIRST:RADIUS], row[RADIUS] = link, (ends @ self._axes[link]).ravel(), radius
+        self._own[number] = radius + float(np.linalg.norm(ends, axis=1).max())
+        along = np.cumsum(self._links)
+        self._far[number] = self._own[number] + np.abs(along[link] - along[1:])
 
-    def _add_payload(self, radius: float) -> None:
-        flange = self._model.frames[self._model.getFrameId(FLANGE)]
-        self._flange, self._radius, self._payload = flange.placement, radius, len(self._names)
-        nowhere = np.zeros(3)
-        self._add_capsule(PAYLOAD, flange.parentJoint, flange.placement, nowhere, nowhere, radius)
-
-    def declare(self, payload: Payload) -> None:
-        """Change the payload in place, since building a new model takes a good part of a tick.
-
-        Args:
-            payload: Declared payload.
-        """
-        self.declared = payload
-        if not self._names:
-            return
-        centre = np.array(payload.com)
-        distance = float(np.linalg.norm(centre))
-        inset = centre * min(self._radius / distance, 1.0) if distance > 0.0 else centre
-        body = self._geometry.geometryObjects[self._payload]
-        body.placement, length = _placed(self._flange, inset, 2.0 * centre - inset)
-        body.geometry.halfLength = length / 2.0
-        self._loaded = payload.mass > 0.0
-        body.disableCollision = not self._loaded
-        self._reach = self._reaches()
-        self._bound(self._payload)
-        self._bounds = self._bound_pairs()
-
-    def _reaches(self) -> Floats:
+    def _reaches(self, *, loaded: bool) -> Floats:
         """Largest distance of any point of the arm from each joint's axis, in any posture, shape (n,) [m]."""
-        joints = self._model.nv
+        joints = len(self._still)
         own = np.zeros(joints)  # from the joint's origin to the farthest point of its own link
-        for body in self._geometry.geometryObjects:
-            if body.parentJoint > 0 and not body.disableCollision:
-                axis = body.placement.rotation[:, 2] * body.geometry.halfLength
-                ends = [np.linalg.norm(body.placement.translation + sign * axis) for sign in (-1.0, 1.0)]
-                joint = body.parentJoint - 1
-                own[joint] = max(own[joint], max(ends) + body.geometry.radius)
-        links = [float(np.linalg.norm(placement.translation)) for placement in self._model.jointPlacements]
+        for name, row, farthest in zip(self._names, self._bodies, self._own, strict=True):
+            if row[LINK] > 0 and (loaded or name != PAYLOAD):
+                joint = int(row[LINK]) - 1
+                own[joint] = max(own[joint], farthest)
         reach, beyond = np.zeros(joints), 0.0
         for joint in reversed(range(joints)):
             reach[joint] = beyond = max(own[joint], beyond)
-            beyond += links[joint + 1]
+            beyond += self._links[joint + 1]
         return reach
 
-    def _bound(self, number: int) -> None:
-        """Tell the bounds of `clearance` where a body is, and how far each joint may carry it [m/rad]."""
-        body, row = self._geometry.geometryObjects[number], self._bodies[number]
-        if isinstance(body.geometry, coal.Halfspace):
-            row[[LINK, RADIUS]] = FLOOR, body.geometry.d
-            return
-        link, radius = body.parentJoint, body.geometry.radius
-        # From pinocchio's frame of the link to that of its chain, whose z is the axis.
-        turned = AXES[self._model.joints[link].shortname()] if link > 0 else np.eye(3)
-        axis = body.placement.rotation[:, 2] * body.geometry.halfLength
-        ends = np.array([body.placement.translation - axis, body.placement.translation + axis])
-        row[LINK], row[FIRST:RADIUS], row[RADIUS] = link, (ends @ turned).ravel(), radius
-        own = radius + float(np.linalg.norm(ends, axis=1).max())
-        along = np.cumsum(
-            [np.linalg.norm(placement.translation) for placement in self._model.jointPlacements]
-        )
-        self._far[number] = own + np.abs(along[link] - along[1:])
+    def _bounded(self, pair: Floats) -> Floats:
+        """Return a pair with how far each joint between its bodies may bring them [m/rad]."""
+        row, (one, other) = pair.copy(), (int(pair[ONE]), int(pair[OTHER]))
+        links = [max(int(self._bodies[number, LINK]), 0) for number in (one, other)]
+        between = slice(min(links), max(links))
+        row[ARMS:][between] = np.minimum(self._far[one], self._far[other])[between]
+        if self._upright and self._bodies[other, LINK] == FLOOR:
+            row[ARMS] = 0.0
+        return row
 
-    def _bound_pairs(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Chain, bodies, pairs that can meet, and scratch, as the bounds of `clearance` take them."""
-        joints = self._model.nv
-        pairs = np.zeros((len(self._pairs), ARMS + joints))
-        upright = bool(np.allclose(self._chain[0, [2, 5]], 0.0))  # the first joint changes no height
-        for row, pair in zip(pairs, self._pairs, strict=True):
-            one, other = pair.first, pair.second
-            links = [max(int(self._bodies[number, LINK]), 0) for number in (one, other)]
-            between = slice(min(links), max(links))
-            row[:ARMS] = one, other
-            row[ARMS:][between] = np.minimum(self._far[one], self._far[other])[between]
-            if upright and self._bodies[other, LINK] == FLOOR:
-                row[ARMS] = 0.0
-        if not self._loaded:
-            pairs = pairs[~self._with_payload]
-        return self._chain, self._bodies, pairs, np.zeros((len(self._names), 6))
-
-    def _add_capsule(
-        self, name: str, joint: int, frame: pin.SE3, start: Floats, end: Floats, radius: float
-    ) -> None:
-        placement, length = _placed(frame, start, end)
-        shape = coal.Capsule(radius, length)
-        self._geometry.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))
-        self._names.append(name)
-
-    def _add_pairs(self, description: RobotDescription) -> None:
-        collision = description.collision
-        apart = {frozenset(pair) for pair in collision.apart}
-        bodies = range(len(self._names))
-        for first, second in combinations(bodies, 2):
-            names = frozenset((self._names[first], self._names[second]))
-            if second - first > 1 and names not in apart:
-                self._geometry.addCollisionPair(pin.CollisionPair(first, second))
-        if not self._names or not collision.has_floor:
-            return
-        floor = coal.Halfspace(np.array([0.0, 0.0, 1.0]), collision.floor)
-        self._geometry.addGeometryObject(pin.GeometryObject("floor", 0, pin.SE3.Identity(), floor))
-        self._names.append("floor")
-        for number in bodies[2:]:  # the base stands on the floor, and the shoulder cannot reach it
-            self._geometry.addCollisionPair(pin.CollisionPair(number, len(self._names) - 1))
-
-
-def _placed(frame: pin.SE3, start: Floats, end: Floats) -> tuple[pin.SE3, float]:
-    """Placement of a capsule and the length of its axis [m], from the ends of the axis in a frame."""
-    axis = end - start
-    length = float(np.linalg.norm(axis))
-    up = np.array([0.0, 0.0, 1.0])
-    rotation = pin.Quaternion.FromTwoVectors(up, axis / length).matrix() if length > 0.0 else np.eye(3)
-    return frame * pin.SE3(rotation, (start + end) / 2.0), max(length, 1e-6)
+    def _pairs_of(self, description: RobotDescription) -> Floats:
+        """Return the pairs of bodies that may meet, without bounds; see `ARMS`."""
+        bodies = len(description.collision.bodies) + 1 if self._names else 0
+        apart = {frozenset(pair) for pair in description.collision.apart}
+        found = [
+            (first, second)
+            for first, second in combinations(range(bodies), 2)
+            if second - first > 1 and frozenset((self._names[first], self._names[second])) not in apart
+        ]
+        if self._names and description.collision.has_floor:
+            # The base stands on the floor, and the shoulder cannot reach it.
+            found += [(number, bodies) for number in range(2, bodies)]
+        pairs = np.zeros((len(found), ARMS + description.joints))
+        pairs[:, [ONE, OTHER]] = np.array(found).reshape(-1, 2)
+        return pairs

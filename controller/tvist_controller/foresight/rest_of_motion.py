@@ -58,12 +58,6 @@ class WayAhead:
             guard.take(state, stops.stop(state, stops.highest) if stop is None else stop)
         return guard
 
-    def rehearse(self) -> None:
-        """Judge the arm's standing once, since the first look ahead loads compiled code, which takes some ticks."""
-        state = self._cycle.newest
-        self._guard.begin(state)
-        self._guard(state)
-
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
         """Time until the shaped reference rests [s], and the angle that the joint that turns most still turns [rad].
 

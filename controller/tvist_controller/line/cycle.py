@@ -19,8 +19,8 @@ from tvist_controller.trajectory import PlannedMotion, Rest, StuckError, Traject
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import PERIOD, Measurement, Placeable, Plant, Supervised
-from tvist_plant.plant_checks import check_measurement, measured_standing
+from tvist_plant.foreign import arm_of, check_measurement, measured_standing
+from tvist_plant.plant import PERIOD, Measurement, Plant, SimulatedArm
 from tvist_shaping.base import Filter, Posture
 
 T = TypeVar("T", bound=Trajectory)
@@ -60,7 +60,7 @@ class ControlCycle:
         law: Floats | None = None,
     ) -> None:
         self.description = description
-        self.plant: Plant = FlexibleArm(description, carried) if plant is None else plant
+        self.plant = arm_of(FlexibleArm(description, carried) if plant is None else plant)
         """The arm."""
         self.trajectory: Trajectory = Rest(q)
         """Trajectory generator."""
@@ -71,7 +71,7 @@ class ControlCycle:
         self.dynamics = dynamics = InverseDynamics(description, declared)
         """Torques of the rigid arm with its declared payload."""
         self.drives = drives = DriveFeedForward(
-            description, PERIOD, compensate_sag=compensate_sag, positions=isinstance(self.plant, Supervised)
+            description, PERIOD, compensate_sag=compensate_sag, positions=self.plant.supervised
         )
         """Joint controllers: what the drives are sent for a target."""
         self.drives.use(elastic)
@@ -278,7 +278,7 @@ class ControlCycle:
             ValueError: An arm that cannot be placed does not tell where it stands. Nothing has changed.
         """
         plant = self.plant
-        if measured is None and not isinstance(plant, Placeable):
+        if measured is None and not isinstance(plant, SimulatedArm):
             measured = measured_standing(plant, len(q))
             q = measured.q.copy()
         self.trajectory, self.mode, self.guard = Rest(q), LineMode.REST, None
@@ -289,7 +289,7 @@ class ControlCycle:
         self.drives.reset(self.dynamics.gravity(q))
         signals = self._to_drives(q)
         command = self.drives.command(signals, self.dynamics.payload_parameters)
-        if measured is None and isinstance(plant, Placeable):
+        if measured is None and isinstance(plant, SimulatedArm):
             measured = plant.reset(command, payload=carried, seed=seed)
         assert measured is not None, "what cannot be placed is measured"
         still = self.shaped.references

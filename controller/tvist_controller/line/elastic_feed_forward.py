@@ -170,13 +170,6 @@ class ElasticFeedForward:
         """Whether the motors do not lead, and have not led for some ticks."""
         return self._ticks == 0 or float(np.abs(self._leads[1]).max()) < SETTLED
 
-    def rehearse(self) -> None:
-        """Compute commands at rest, since the first ones load compiled code, which takes many ticks."""
-        still = np.zeros_like(self.motors)
-        for _ in range(len(still) + 2):
-            self.command(Target(*still), still[0], np.zeros(10))
-        self.reset()
-
     def command(
         self,
         target: Target,

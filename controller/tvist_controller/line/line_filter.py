@@ -125,13 +125,6 @@ class LineFilter:
             other.tvist = self.tvist.fork() if waits else other._fade.new  # noqa: SLF001  likewise
         return other
 
-    def rehearse(self, q: Floats) -> None:
-        """Filter a sample through a transition and undo it, since the first time loads compiled code for many ticks."""
-        self._fade = self._fade_to(self.tvist.fork(), self.tvist)
-        for _ in range(3):
-            self.filter(q)
-        self.begin(self.tvist, q)
-
     def window(self) -> Floats:
         """Samples that the filters may still use, the oldest first, shape (k, m) [rad]."""
         filters = [self.tvist] if self._fade is None else [self._fade.old, self._fade.new, self.tvist]

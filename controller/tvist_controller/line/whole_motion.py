@@ -11,11 +11,10 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.line_tick import all_to_drives
-from tvist_controller.line.rehearsal import Still
 from tvist_controller.trajectory import Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Placeable, Playable, Response, played
+from tvist_plant.plant import PERIOD, Measurement, Response, SimulatedArm
 from tvist_shaping.base import Filter
 
 
@@ -31,6 +30,31 @@ class Driven:
     """Positions, velocities and torques of each command, shape (T, 3, n)."""
     delay: float
     """Time by which commands are later than their targets [s]."""
+
+
+class Still(SimulatedArm):
+    """A plant that does nothing but keep its last command.
+
+    Args:
+        joints: Number of joints.
+    """
+
+    payload = Payload()
+
+    def __init__(self, joints: int) -> None:
+        still: Floats = np.zeros(joints)
+        self.last = DriveCommand(still, still, still)
+        """The last command."""
+        self._nothing = Measurement(still, still, still, np.zeros(3))
+
+    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:  # noqa: ARG002
+        """Keep a command; see `SimulatedArm.reset`."""
+        return self.step(command)
+
+    def step(self, command: DriveCommand) -> Measurement:
+        """Keep a command; see `Plant.step`."""
+        self.last = command
+        return self._nothing
 
 
 class Player(Trajectory):
@@ -122,7 +146,7 @@ class DrivenLine:
         return targets, commands
 
 
-def respond(plant: Placeable, driven: Driven, seed: int) -> Response:
+def respond(plant: SimulatedArm, driven: Driven, seed: int) -> Response:
     """Let a plant follow what its drives get, from rest.
 
     Args:
@@ -135,4 +159,4 @@ def respond(plant: Placeable, driven: Driven, seed: int) -> Response:
         ValueError: The plant does not provide the truth.
     """
     plant.reset(driven.rest, seed=seed)
-    return plant.play(driven.commands) if isinstance(plant, Playable) else played(plant, driven.commands)
+    return plant.play(driven.commands)

@@ -5,17 +5,7 @@ from typing import Self
 
 import numpy as np
 
-from tvist_plant.plant import (
-    PERIOD,
-    Condition,
-    Halt,
-    Measurement,
-    Placeable,
-    Plant,
-    PlantError,
-    Powered,
-    Stoppable,
-)
+from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, Plant, PlantError, SimulatedArm
 from tvist_protocol.modes import RobotMode
 
 STALE = 10
@@ -26,8 +16,7 @@ class ArmPower:
     """Tells a plant what power and brakes it is to have, and the robot what the plant says of them."""
 
     def __init__(self, plant: Plant) -> None:
-        self._powered = plant if isinstance(plant, Powered) else None
-        self._stoppable = plant if isinstance(plant, Stoppable) else None
+        self._plant = plant
         self.halted: Halt | None = None
         """Why the arm's own controller has taken it, until it is to be held again."""
         self._told: RobotMode | None = None
@@ -40,16 +29,16 @@ class ArmPower:
     @classmethod
     def of(cls, plant: Plant) -> Self | None:
         """Return the power of a plant; None if it has none, and no clock, as simulated arms."""
-        needs_nothing = isinstance(plant, Placeable) and not isinstance(plant, Powered | Stoppable)
+        needs_nothing = isinstance(plant, SimulatedArm) and not (
+            plant.can(Plant.switch) or plant.can(Plant.stop)
+        )
         return None if needs_nothing else cls(plant)
 
     @property
     def condition(self) -> Condition:
         """Present condition of the plant; one that does not answer has a fault."""
-        if self._powered is None:
-            return Condition(ready=True)
         try:
-            return self._powered.condition
+            return self._plant.condition
         except PlantError as error:
             return Condition(ready=False, fault=str(error))
 
@@ -60,22 +49,19 @@ class ArmPower:
         if mode is self._told:
             return
         self._told, self._was_ready = mode, False
-        if self._powered is not None:
-            self._powered.switch(power=mode >= RobotMode.POWER_ON, brakes=mode is not RobotMode.RUNNING)
+        self._plant.switch(power=mode >= RobotMode.POWER_ON, brakes=mode is not RobotMode.RUNNING)
 
     def stop(self) -> None:
         """Let the plant make its own stop, if it has one."""
         self._told = None  # by its own stop it has switched itself
-        if self._stoppable is not None:
-            with suppress(PlantError):  # the robot stops in any case, and says why
-                self._stoppable.stop()
+        with suppress(PlantError):  # the robot stops in any case, and says why
+            self._plant.stop()
 
     def end(self) -> None:
         """Leave the arm without power, since nobody controls it any more."""
         self.stop()
-        if self._powered is not None:
-            with suppress(PlantError):
-                self._powered.switch(power=False, brakes=True)
+        with suppress(PlantError):
+            self._plant.switch(power=False, brakes=True)
 
     def trouble(self, mode: RobotMode, measured: Measurement) -> str | None:
         """Return why the robot cannot go on, in words; None if it can. To be called after every tick."""

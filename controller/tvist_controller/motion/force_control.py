@@ -16,7 +16,7 @@ from tvist_controller.motion.task_frame import Feature, frame_of
 from tvist_controller.trajectory import Compliant, ForceTask, Guided, JointSpeed, Rest
 from tvist_controller.trajectory.compliant import CRAWL
 from tvist_controller.trajectory.force_law import FREE_DAMPING
-from tvist_plant.plant import PERIOD, Supervised
+from tvist_plant.plant import PERIOD
 
 SMOOTHED = 0.04
 """Time constant of a wrench that is estimated from the drives' torques, which the arm's elasticity shakes [s]."""
@@ -110,7 +110,7 @@ class ForceControl(Monitor):
         Raises:
             RefusalError: The present activity does not allow it, or its motion cannot be taken over.
         """
-        if isinstance(self._cycle.plant, Supervised):
+        if self._cycle.plant.supervised:
             why = "this arm follows positions with a lag, and its force is a guess: forces cannot move it"
             raise RefusalError("wrong_mode", "", why)
         self.check_sensor()

@@ -48,25 +48,16 @@ class FilterPlanner:
         self._modal = modal_source(setup.description, setup.calibration)
 
     def first(self) -> PlannedFilter:
-        """Return the robot's initial filter. Code that its first use would compile is compiled now.
+        """Return the robot's initial filter.
 
         Raises:
             ValueError: There is no such shaper for this robot.
         """
         setup = self._setup
         try:
-            chosen = self.choose(setup.shaper, 1, setup.source(), setup.payload)
+            return self.choose(setup.shaper, 1, setup.source(), setup.payload)
         except RefusalError as error:
             raise ValueError(str(error)) from error
-        if (
-            self._modal is not None
-            and not setup.positions
-            and wanted_modes("elastic-auto", 1, "shaper", self._known) <= self._modal.most
-        ):
-            ready = self.choose("elastic-auto", 1, self._modal, setup.payload)
-            if ready.elastic is not None:
-                ready.elastic.rehearse()
-        return chosen
 
     def choose(
         self, name: str, modes: int, source: ModeSource, declared: Payload, where: str = "shaper"

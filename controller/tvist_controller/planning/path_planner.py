@@ -9,10 +9,9 @@ from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import arm_limits, rate_of
-from tvist_controller.paths.legs import JointWay, Leg, Pacing
+from tvist_controller.paths.legs import Leg
 from tvist_controller.paths.pacing import Ground, JointLimits, fastest, going_on, ground_of, joined, law_of
-from tvist_controller.paths.route import Branch, Piece, Route, Run, length_of, route_of
-from tvist_controller.paths.tool_curves import PER_RADIAN, ToolLine
+from tvist_controller.paths.route import Branch, Route, Run, length_of, route_of
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.course import Course
 from tvist_controller.planning.filter_planner import FilterPlanner
@@ -52,19 +51,6 @@ class PathPlanner:
     ) -> None:
         self._description, self._filters, self._moves = setup.description, filters, moves
         self._reachable, self._legs = reachable, PathLegs(setup.description, reachable)
-
-    def rehearse(self) -> None:
-        """Compile what plans use, before any is needed."""
-        q = np.zeros(self._description.joints)
-        tracker = Tracker(self._description, (0.0,) * 6)
-        tracker.pose(q)
-        tracker.rates(q, ToolLine(*[tracker.pose(q)] * 2).at(0.0))
-        run = [Piece(JointWay(q, q + 0.1).part(0.0, 0.1 * PER_RADIAN), Pacing(1.0, 1.0), None, True, "")]
-        limits = self._description.limits
-        joints = JointLimits(np.array(limits.velocity), np.array(limits.acceleration), min(limits.jerk))
-        curve = SplineCurve(joined(run))
-        for goes_on in (False, True):
-            law_of(run, curve, ground_of(run, curve), joints, 60.0, LEAST_WINDOW, goes_on=goes_on)
 
     def plan(self, command: MoveL | MoveC | MovePath, now: Snapshot) -> PlannedMove | None:
         """Plan a motion from rest, or the rest of one that goes on; the command's content has been checked.

@@ -21,10 +21,6 @@ class Reachable:
         self._description = description
         self._inverse = InverseKinematics(description)
 
-    def rehearse(self) -> None:
-        """Compile what answers use, before any is needed."""
-        self._inverse.prepare()
-
     def posture(self, question: k.InverseKinematics, now: Snapshot) -> Posture:
         """Return the joint positions at which the tool has a pose, nearest to others.
 

@@ -5,7 +5,7 @@ from tvist_controller.line.sample import Sample
 from tvist_controller.reporting.report import Layouts, Report
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
-from tvist_plant.plant import PERIOD, InWorld, ModalPlant, Plant, PlantTruth, Truthful
+from tvist_plant.plant import PERIOD, Plant, PlantTruth
 from tvist_protocol.stream import Truth
 from tvist_shaping.base import Filter
 
@@ -28,8 +28,7 @@ class Reporter:
         self._layouts = Layouts()
         self._true_modes: dict[str, list[float]] = {}
         self._plant = plant
-        self._modal = plant if isinstance(plant, ModalPlant) else None
-        self._world = plant if isinstance(plant, InWorld) else None
+        self._in_world = plant.things() is not None
 
     def report(
         self,
@@ -76,12 +75,12 @@ class Reporter:
             ValueError: The plant does not provide the truth.
         """
         if with_modes and (not self._true_modes or tick % TRUE_MODES_EVERY == 0):
-            modes = None if self._modal is None else self._modal.modes()
+            modes = self._plant.modes()
             self._true_modes = {
                 name: [] if modes is None else getattr(modes, name)[: self._joints].tolist()
                 for name in ("f_d", "zeta", "participation")
             }
-        truth, world = truth_of(self._plant), self._world
+        truth, plant = truth_of(self._plant), self._plant
         return Truth(
             tick=tick,
             timestamp=tick * PERIOD,
@@ -93,8 +92,8 @@ class Reporter:
             tool_acceleration=truth.specific_force.tolist(),
             static_gear_deflection=_listed(truth.static_gear_deflection),
             static_link_deflection=_listed(truth.static_link_deflection),
-            body_poses=[] if world is None else world.places().ravel().tolist(),
-            contact_force=[] if world is None else world.contact().tolist(),
+            body_poses=plant.places().ravel().tolist(),
+            contact_force=plant.contact().tolist() if self._in_world else [],
             **(self._true_modes or NO_MODES),
         )
 
@@ -109,7 +108,7 @@ def truth_of(plant: Plant) -> PlantTruth:
     Raises:
         ValueError: The plant does not provide it.
     """
-    truth = plant.truth() if isinstance(plant, Truthful) else None
+    truth = plant.truth()
     if truth is None:
         raise ValueError(
             f"truth is on, but the plant {type(plant).__name__} cannot report it: turn truth off"

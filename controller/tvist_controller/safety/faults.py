@@ -13,7 +13,7 @@ from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.command_row import Row
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_plant.description import RobotDescription
-from tvist_plant.plant import PERIOD, Breakable, Pushable
+from tvist_plant.plant import PERIOD, Plant
 from tvist_protocol.faults import FAULTS
 from tvist_protocol.simulation import SimulationInject
 
@@ -63,8 +63,8 @@ class Faults:
         }
         """Functions for the faults that have no duration."""
         plant = motion.cycle.plant
-        self._pushable = plant if isinstance(plant, Pushable) else None
-        if isinstance(plant, Breakable):
+        self._pushable = plant if plant.can(Plant.push) else None
+        if plant.can(Plant.make_nan):
             self._momentary["nan"] = plant.make_nan
         self._push = np.zeros(motion.cycle.description.joints)
         self._ends: list[tuple[int, int, str, Callable[[], None]]] = []

@@ -16,7 +16,7 @@ from tvist_controller.line.sample import Sample
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
-from tvist_plant.plant import PlantError, Sight, Supervised, Watched
+from tvist_plant.plant import PlantError, RealArm, Sight
 from tvist_protocol.commands import Command, SetPayload
 from tvist_protocol.io import Io, SetIo, SimulationSetInputs
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
@@ -85,7 +85,7 @@ class Watching(RemoteStatus):
 
     def __init__(
         self,
-        plant: Watched,
+        plant: RealArm,
         cycle: ControlCycle,
         modes: RobotModes,
         peripherals: Peripherals,
@@ -146,7 +146,7 @@ class Supervision(RemoteStatus):
 
     def __init__(
         self,
-        plant: Supervised,
+        plant: RealArm,
         motion: MotionControl,
         safety: SafetyControl,
         peripherals: Peripherals,

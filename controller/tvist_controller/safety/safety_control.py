@@ -15,7 +15,7 @@ from tvist_controller.motion.monitor import Monitor
 from tvist_controller.motion.safety_system import Emergency, Latched
 from tvist_controller.safety.brakes import brake
 from tvist_controller.trajectory import Compliant
-from tvist_plant.plant import PERIOD, Halt, Placeable, PlantError
+from tvist_plant.plant import PERIOD, Halt, PlantError, SimulatedArm
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
@@ -136,7 +136,7 @@ class SafetyControl:
             ValueError: It does not tell where that is.
         """
         cycle = self._motion.cycle
-        if not isinstance(cycle.plant, Placeable):
+        if not isinstance(cycle.plant, SimulatedArm):
             cycle.reset(cycle.position)
 
     def cut_power(self, why: str, latched: Latched | None = None) -> None:
@@ -230,7 +230,7 @@ class SafetyControl:
         One that cannot be placed, or fails again at once, gets no power until the safety system is restarted.
         """
         motion, cycle = self._motion, self._motion.cycle
-        placed = isinstance(cycle.plant, Placeable)
+        placed = isinstance(cycle.plant, SimulatedArm)
         why, position = str(error), cycle.position
         try:
             sample = cycle.reset(position, seed=seed)

@@ -9,8 +9,8 @@ from typing import Any
 from msgspec import Struct
 
 from tvist_controller.sources.own_files import OwnFileError, ends, is_file, run_file
-from tvist_controller.sources.plant_calls import called
 from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.foreign import called, is_plant
 from tvist_plant.plant import Plant, PlantError
 from tvist_plant.user_file import named
 from tvist_plant.variants import VARIANTS, Variant
@@ -71,7 +71,7 @@ class OwnPlant:
                 raise OwnPlantError(f"plant {self.place}: {error}") from error
         try:
             made = self.maker(description, carried)
-            if isinstance(made, Plant):
+            if is_plant(made):
                 return called(made, description.joints)
         except (PlantError, SceneError) as error:  # it says in a sentence why it cannot be made
             said = f"{error}" if self.place.startswith(WORLD) else f"plant {self.place}: {error}"
@@ -138,10 +138,10 @@ def load_world(scene: str) -> OwnPlant:
 def _in_scene(scene: SceneFile, description: RobotDescription, carried: Payload) -> Plant:
     """Make the arm in a scene."""
     try:
-        from tvist_plant.world.world_arm import WorldArm
+        from tvist_plant.world.mujoco_arm import MujocoArm
     except ImportError as error:
         raise OwnPlantError(f"world needs MuJoCo: pip install 'tvist[world]' ({error})") from error
-    return WorldArm(description, carried, scene)
+    return MujocoArm(description, carried, scene)
 
 
 def named_plants() -> list[str]:

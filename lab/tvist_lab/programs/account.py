@@ -4,7 +4,7 @@ from typing import Any
 
 from tvist_lab.programs.watch import Fastest, Move, ProgramWatch, Said
 from tvist_lab.words import counted
-from tvist_plant.plant import PERIOD, InWorld
+from tvist_plant.plant import PERIOD
 
 
 def largest_peak(watch: ProgramWatch) -> float | None:
@@ -47,13 +47,14 @@ def as_dict(watch: ProgramWatch) -> dict[str, Any]:
 
 def _in_world(watch: ProgramWatch) -> dict[str, Any]:
     """The largest force of contact, and where the bodies of the arm's world are; nothing without one."""
-    if not isinstance(watch.plant, InWorld):
+    things = watch.plant.things()
+    if things is None:
         return {}
     hardest = watch.hardest
     force = {
         "force_n": hardest.speed, "timestamp": seconds(hardest.tick), "line": hardest.line or None,
     }  # fmt: skip
-    poses = zip(watch.plant.things().bodies, watch.plant.places().tolist(), strict=True)
+    poses = zip(things.bodies, watch.plant.places().tolist(), strict=True)
     return {"largest_contact_force": force, "bodies": dict(poses)}
 
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from tvist_lab.programs.limits import Shortcoming
 from tvist_plant.model import Floats
-from tvist_plant.plant import InWorld, Plant, Shape
+from tvist_plant.plant import Plant, Shape
 
 _EXPECTED = re.compile(r"(?P<body>.+?) in (?P<area>.+)")
 
@@ -39,9 +39,9 @@ class Expectation:
 
     def missed(self, plant: Plant) -> Shortcoming | None:
         """Say why a plant is not as expected; None if it is."""
-        if not isinstance(plant, InWorld):
-            return _no(f"{self.body} cannot be in {self.area}: the arm stands in no world (--world)")
         things, places = plant.things(), plant.places()
+        if things is None:
+            return _no(f"{self.body} cannot be in {self.area}: the arm stands in no world (--world)")
         for kind, name, known in (
             ("body", self.body, things.bodies),
             ("area", self.area, tuple(things.areas)),

@@ -8,7 +8,7 @@ from tvist_controller.api.line import Setup
 from tvist_controller.api.robot import Controller, Host, Sink, experience_of, info_of
 from tvist_lab.programs.start import start
 from tvist_lab.programs.watch import ProgramWatch
-from tvist_plant.plant_checks import check_unpaced
+from tvist_plant.foreign import check_unpaced
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.programs import ProgramClosePopup

@@ -11,7 +11,7 @@ import numpy as np
 
 from tvist_controller.api.robot import Controller, Sink, truth_of
 from tvist_plant.model import Floats
-from tvist_plant.plant import GRAVITY, PERIOD, Foreseeing, InWorld, Response, Truthful
+from tvist_plant.plant import GRAVITY, PERIOD, Plant, Response
 from tvist_protocol.stream import Event, State
 
 AFTER_STOP = 5
@@ -173,9 +173,9 @@ class ProgramWatch(Sink):
         """Ticks for which the shaped reference has rested after the last move."""
         self.plant = plant = controller.cycle.plant
         """The arm."""
-        self._world = plant if isinstance(plant, InWorld) else None
-        self._truthful = isinstance(plant, Truthful) and plant.truth() is not None
-        self._foreseeing = plant if isinstance(plant, Foreseeing) else None
+        self._in_world = plant.things() is not None
+        self._truthful = plant.truth() is not None
+        self._foreseeing = plant.can(Plant.held)
 
     @property
     def seconds(self) -> float:
@@ -250,7 +250,7 @@ class ProgramWatch(Sink):
         elif self._rest <= WINDOW:
             if self._rest == 0:  # before the next motion may have begun
                 move.rests = self.tick
-                move.held = None if self._foreseeing is None else self._foreseeing.held()
+                move.held = self.plant.held() if self._foreseeing else None
             self._rest = move.rested = self._rest + 1
             if self._rest == SEEN:
                 move.held = None
@@ -265,8 +265,8 @@ class ProgramWatch(Sink):
             self.fastest_joint = Fastest(most, state.tick, self.line, self._names[speeds.index(most)])
         if (tool := math.hypot(*state.actual_TCP_speed[:3])) > self.fastest_tool.speed:
             self.fastest_tool = Fastest(tool, state.tick, self.line)
-        if self._world is not None:
-            force = math.hypot(*self._world.contact())
+        if self._in_world:
+            force = math.hypot(*self.plant.contact())
             if force > self.hardest.speed:
                 self.hardest = Fastest(force, state.tick, self.line)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.plant import Placeable
+from tvist_plant.plant import SimulatedArm
 from tvist_plant.variants import AS_DESCRIBED, VARIANTS, Variant, scattered, stiffer, with_springs
 from tvist_plant.world.mujoco_arm import MujocoArm
 
@@ -31,7 +31,7 @@ class ArmVariant(Variant):
     in_mujoco: bool = False
     """Whether MuJoCo simulates it, without gear error."""
 
-    def make(self, description: RobotDescription, carried: Payload, seed: int) -> Placeable:
+    def make(self, description: RobotDescription, carried: Payload, seed: int) -> SimulatedArm:
         """Create a plant that provides the truth; see `Variant.make`."""
         if self.in_mujoco:
             return MujocoArm(self.truly(description, seed), carried)

@@ -20,7 +20,7 @@ from tvist_controller.api.line import (
 )
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.plant import PERIOD, Placeable
+from tvist_plant.plant import PERIOD, SimulatedArm
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter
@@ -162,7 +162,7 @@ class Following:
             "shaper_delay": np.full(ticks, delay + driven.delay),
         }  # fmt: skip
 
-    def simulate(self, plant: Placeable, seed: int) -> Recording:
+    def simulate(self, plant: SimulatedArm, seed: int) -> Recording:
         """Let a plant follow the reference.
 
         Args:

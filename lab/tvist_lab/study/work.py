@@ -16,7 +16,7 @@ from tvist_lab.study.measures import OF_PEAKS, Motion, measured
 from tvist_lab.study.method import Method, Task, Waiting
 from tvist_lab.study.shaping import Shaped, ShaperFaultError
 from tvist_plant.description import Payload
-from tvist_plant.plant import PERIOD, Placeable
+from tvist_plant.plant import PERIOD, SimulatedArm
 from tvist_plant.user_file import named
 
 MEASURED, TOO_WEAK, FAILED = "measured", "too weak", "failed"
@@ -69,7 +69,7 @@ class Bench:
         self._plain: dict[str, Motion] = {}
 
     @cached_property
-    def _arms(self) -> dict[str, Placeable]:
+    def _arms(self) -> dict[str, SimulatedArm]:
         """The arms by their names, each of which starts anew with each motion."""
         case, carried = self.job.case, self._body(self.job.case.move.mass)
         return {arm.name: arm.make(case.description, carried, case.seed) for arm in case.arms}

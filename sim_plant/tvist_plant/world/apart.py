@@ -7,15 +7,15 @@ import signal
 import subprocess
 import sys
 
+import mujoco
 import numpy as np
 
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import Hand
 from tvist_plant.user_file import named, one_line
+from tvist_plant.world.arm_form import settle
 from tvist_plant.world.scene import World, build
 from tvist_plant.world.scene_file import SceneError, SceneFile
-from tvist_plant.world.second_opinion import SecondOpinion
 
 LONGEST, MOST_MEMORY = 30, 768 << 20
 """Longest time [s] and largest memory [byte] that MuJoCo may take for a scene."""
@@ -44,13 +44,12 @@ def _main() -> None:
     os.dup2(2, 1)  # MuJoCo prints warnings, and writes a log of them where it is
     os.chdir("/")
     longest, asked = pickle.load(sys.stdin.buffer)  # noqa: S301  from above
-    description, payload, _, timestep, _ = asked
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
     signal.alarm(longest)  # also ends what waits inside MuJoCo, and what nobody waits for any more
     found: World | str
     try:
-        still, found = np.zeros(description.joints), build(*asked)
-        SecondOpinion(description, payload, timestep, found.model).reset(DriveCommand(still, still, still))
+        description, found = asked[0], build(*asked)
+        settle(description, found.model, mujoco.MjData(found.model), np.zeros(description.joints))
     except Exception as error:  # noqa: BLE001  of all kinds, also of memory
         found = one_line(str(error)) if isinstance(error, SceneError) else f"MuJoCo fails: {named(error)}"
     with answer:

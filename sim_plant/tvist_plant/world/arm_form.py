@@ -8,9 +8,10 @@ flange hangs on one body, so that the wrench between the two is what a sensor th
 import mujoco
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from tvist_plant.description import Payload, RobotDescription, Tensor
-from tvist_plant.model import FLANGE, link_frame
+from tvist_plant.model import FLANGE, Floats, link_frame
 
 LOAD = "load"
 """Name of the body that all beyond the flange is part of: the payload, and the fingers of a gripper."""
@@ -29,6 +30,11 @@ def motor_name(number: int) -> str:
 def flex_name(number: int, axis: str) -> str:
     """Name of the virtual joint by which a link bends about an axis, y or z."""
     return f"flex {number} {axis}"
+
+
+def flex_names(description: RobotDescription) -> list[str]:
+    """Names of all virtual joints, in the order of MuJoCo's coordinates."""
+    return [flex_name(number, axis) for number in description.link_flexibility.links for axis in "yz"]
 
 
 def link_name(description: RobotDescription, number: int) -> str:
@@ -108,6 +114,37 @@ def principal(inertia: Tensor) -> tuple[list[float], list[float]]:
     if np.linalg.det(axes) < 0.0:
         axes = -axes
     return np.maximum(moments, 1e-9).tolist(), np.roll(pin.Quaternion(axes).coeffs(), 1).tolist()
+
+
+def places(model: "mujoco.MjModel", names: list[str]) -> NDArray[np.int64]:
+    """Numbers of hinges among a model's coordinates."""
+    return np.array([model.joint(name).dofadr[0] for name in names], dtype=np.int64)
+
+
+def carry(model: "mujoco.MjModel", payload: Payload) -> None:
+    """Give the body beyond the flange another payload."""
+    load = model.body(LOAD).id
+    model.body_mass[load], model.body_ipos[load] = payload.mass, payload.com
+    model.body_inertia[load], model.body_iquat[load] = principal(payload.inertia)
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+def settle(
+    description: RobotDescription, model: "mujoco.MjModel", data: "mujoco.MjData", q: Floats
+) -> Floats:
+    """Set static equilibrium with the motors at q; return the torques of gravity on the joints, shape (n,) [N m]."""
+    numbers, flexes = range(description.joints), places(model, flex_names(description))
+    joints = places(model, [joint_name(number) for number in numbers])
+    motors = places(model, [motor_name(number) for number in numbers])
+    mujoco.mj_resetData(model, data)
+    gravity = np.zeros(model.nv)
+    for _ in range(20):
+        data.qpos[joints] = q - gravity[joints] / description.drives.gear_stiffness
+        data.qpos[flexes] = -gravity[flexes] / np.repeat(description.link_flexibility.stiffness, 2)
+        data.qpos[motors] = q
+        mujoco.mj_forward(model, data)
+        gravity = data.qfrc_bias.copy()
+    return np.asarray(gravity[joints])
 
 
 def add_mass(body: "mujoco.MjsBody", mass: float, com: tuple[float, float, float], inertia: Tensor) -> None:

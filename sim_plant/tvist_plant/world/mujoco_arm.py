@@ -1,50 +1,169 @@
-"""The flexible arm in MuJoCo as a plant: a second implementation for a controller to drive."""
+"""The arm in MuJoCo as a plant, alone or among things that it touches.
+
+The same arm as `FlexibleArm`, built from the same description independently of our model: MuJoCo computes the dynamics
+and integrates them (semi-implicit Euler with implicit damping, first order). Gears have no kinematic error.
+"""
 
 import math
+from collections.abc import Callable
+from copy import copy
+from typing import Any, Final
 
+import mujoco
 import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
 
+from tvist_kernels.compiling import compiled
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.model import Floats
-from tvist_plant.plant import Measurement, PlantError, PlantTruth, Response
-from tvist_plant.world.second_opinion import SecondOpinion
+from tvist_plant.model import FLANGE, Floats
+from tvist_plant.plant import PERIOD, Hand, Measurement, Plant, PlantError, PlantTruth, SimulatedArm, Things
+from tvist_plant.sensors import Accelerometer, ForceSensor
+from tvist_plant.world.apart import build_apart
+from tvist_plant.world.arm_form import (
+    LOAD,
+    arm_spec,
+    carry,
+    flex_names,
+    joint_name,
+    motor_name,
+    places,
+    settle,
+)
+from tvist_plant.world.contacts import PREFIX, set_contacts
+from tvist_plant.world.fingers import Fingers
+from tvist_plant.world.scene import World
+from tvist_plant.world.scene_file import SceneFile
 
 TIMESTEP = 0.00025
 """Time step at which MuJoCo agrees with `FlexibleArm` [s]."""
+DEEPEST = 1e-4
+"""Depth up to which an arm may touch something where it is put [m]."""
+_OF_HANDS: Final = (Plant.mount, Plant.grip, Plant.opening)
 
 
-class MujocoArm:
-    """The arm in MuJoCo: a `Plant` without external pushes, faults and true modes.
+@compiled
+def drive(
+    start: Floats,
+    end: Floats,
+    share: float,
+    timestep: float,
+    motors: NDArray[np.int64],
+    laws: Floats,
+    s: Floats,
+    q: Floats,
+    qd: Floats,
+    applied: Floats,
+) -> None:
+    """Compute the torques [N m] of the drives for one of MuJoCo's steps, and step their integrators s.
 
-    It is deterministic: it has neither sensor noise nor gear errors, and ignores seeds.
+    The commands have rows q_r, q̇_r and τ_ff; the rows of `laws` are gains of velocity, position and integral, friction
+    and its width. Velocity gain and the slope of friction at rest are joint damping, which MuJoCo integrates itself.
+    """
+    for j in range(motors.shape[0]):
+        m = motors[j]
+        q_r = start[0, j] + share * (end[0, j] - start[0, j])
+        qd_r = start[1, j] + share * (end[1, j] - start[1, j])
+        torque = start[2, j] + share * (end[2, j] - start[2, j])
+        steep = qd[m] / laws[4, j]
+        torque += laws[0, j] * qd_r + laws[1, j] * (q_r - q[m]) + laws[2, j] * s[j]
+        applied[m] = torque + laws[3, j] * (steep - math.tanh(steep))
+        s[j] += timestep * (q_r - q[m])
+
+
+class MujocoArm(SimulatedArm):
+    """The arm in MuJoCo. It is deterministic; alone it has no noise, in a scene it has that of its sensors.
+
+    In a scene it also has a force sensor in its flange, and room for a gripper.
 
     Args:
         description: The arm.
         payload: Carried payload.
+        scene: The scene; None for the arm alone.
+        timestep: Time step of MuJoCo's integrator, a fraction of 2 ms [s]. 1 ms is unstable for the UR5e.
+
+    Raises:
+        ValueError: 2 ms is not a multiple of the time step.
+        SceneError: The file is no scene, or no arm can stand in it.
     """
 
-    def __init__(self, description: RobotDescription, payload: Payload) -> None:
-        self._description = description
-        self._load(payload)
+    def __init__(
+        self,
+        description: RobotDescription,
+        payload: Payload,
+        scene: SceneFile | None = None,
+        *,
+        timestep: float = TIMESTEP,
+    ) -> None:
+        self._steps = round(PERIOD / timestep)
+        if self._steps < 1 or abs(self._steps * timestep - PERIOD) > 1e-12:
+            raise ValueError(f"timestep is {timestep} s; {PERIOD} s must be a multiple of it")
+        self._description, self._scene, self._timestep = description, scene, timestep
+        drives, joints = description.drives, description.joints
+        K_d, K_p, K_i = (
+            np.array(gain) for gain in (drives.velocity_gain, drives.position_gain, drives.integral_gain)
+        )
+        friction = np.array(drives.coulomb_friction) * (not drives.linear_friction)
+        width = np.full(joints, drives.friction_width)
+        self._laws = np.array([K_d, K_d * (K_p + K_i), K_d * K_p * K_i, friction, width])
+        self._s, self._command, self._felt = np.zeros(joints), np.zeros((3, joints)), np.zeros(6)
+        self._world: World | None = None
+        self._fingers: Fingers | None = None
+        self._build(payload, None)
+        self._seed(0)
 
-    def _load(self, payload: Payload) -> None:
-        self._payload, self._arm = payload, self._made(payload)
+    def _build(self, payload: Payload, hand: Hand | None) -> None:
+        description, self.payload = self._description, payload
+        if self._scene is None:
+            self._model = arm_spec(description, payload, self._timestep).compile()
+        else:
+            self._world = build_apart((description, payload, self._scene, self._timestep, hand))
+            self._model = self._world.model
+        world = self._world
+        self._bodies = np.array(() if world is None else world.bodies, dtype=np.int64)
+        self._own = np.array(() if world is None else world.arm, dtype=np.int64)
+        model, numbers = self._model, range(description.joints)
+        self._data = data = mujoco.MjData(model)
+        self._joints = places(model, [joint_name(number) for number in numbers])
+        self._motors = places(model, [motor_name(number) for number in numbers])
+        self._flexes = places(model, flex_names(description))
+        self._flange, self._load = model.body(FLANGE).id, model.body(LOAD).id
+        self._state = data.qpos, data.qvel, data.qfrc_applied
+        self._place, self._turn = data.xpos[self._flange], data.xmat[self._flange]
+        self._evaluated = False
+        """Whether MuJoCo has evaluated the present positions and velocities already."""
 
-    def _made(self, payload: Payload) -> SecondOpinion:
-        return SecondOpinion(self._description, payload, TIMESTEP)
+    def _seed(self, seed: int) -> None:
+        sensors, alone = self._description.sensors, self._scene is None
+        self._accelerometer = Accelerometer(0.0 if alone else sensors.accelerometer_noise, seed)
+        self._sensor = ForceSensor(
+            (sensors.force_noise, sensors.torque_noise), (sensors.force_offset, sensors.torque_offset), seed
+        )
 
-    @property
-    def payload(self) -> Payload:
-        """Carried payload."""
-        return self._payload
+    def can(self, method: Callable[..., Any]) -> bool:
+        """Return whether the arm can do something; alone it has no gripper that really holds."""
+        return super().can(method) and (self._scene is not None or method not in _OF_HANDS)
 
-    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:  # noqa: ARG002
-        """Put the arm at rest in static equilibrium under a command; see `Plant.reset`."""
-        if payload is not None and payload != self._payload:
-            self._load(payload)
-        self._arm.reset(command)
-        return self._measure()
+    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
+        """Put the arm at rest in static equilibrium under a command, and the things where the scene has them.
+
+        Raises:
+            PlantError: The arm would stand in something.
+        """
+        self._seed(seed)
+        if self._fingers is not None:
+            self._fingers.open()
+        if payload is not None and payload != self.payload:
+            self.load(payload)
+        self._evaluated, self._command = False, np.array([command.q, command.qd, command.torque])
+        weight = settle(self._description, self._model, self._data, command.q)
+        self._s = (weight - command.torque) / self._laws[2]
+        measured = self._measure()
+        met = self._met(self._data)
+        if met is not None:
+            raise PlantError(f"{met}: choose a posture in which the arm is clear")
+        return measured
 
     def step(self, command: DriveCommand) -> Measurement:
         """Move the arm by one period.
@@ -52,39 +171,141 @@ class MujocoArm:
         Raises:
             PlantError: The state is no longer finite.
         """
-        self._arm.step(command)
+        self.move(command)
         measured = self._measure()
         if not math.isfinite(self._force.dot(self._force)):
             raise PlantError("the state of the arm in MuJoCo is no longer finite")
+        if self._bodies.size and not np.isfinite(self._data.xpos[self._bodies]).all():
+            raise PlantError("what stands around the arm is no longer anywhere")
         return measured
 
-    def play(self, commands: Floats) -> Response:
-        """Move the arm by many periods; see `Playable`.
-
-        Raises:
-            PlantError: The state is no longer finite.
-        """
-        q, qd, moment, force, position, turned = self._arm.play(np.ascontiguousarray(commands, dtype=float))
-        if not (np.isfinite(force).all() and np.isfinite(position).all()):
-            raise PlantError("the state of the arm in MuJoCo is no longer finite")
-        if len(commands):
-            self._force, self._rotation = force[-1].copy(), turned[-1].copy()
-        return Response(Measurement(q, qd, moment, force.copy()), force, position, turned)
+    def move(self, command: DriveCommand) -> None:
+        """Simulate 2 ms, in which the drives approach the command linearly, without measuring."""
+        if self._fingers is not None:
+            self._fingers.drive(self._data)
+        start, end = self._command, np.array([command.q, command.qd, command.torque])
+        model, data, steps, timestep = self._model, self._data, self._steps, self._timestep
+        motors, laws, s, step, (q, qd, applied) = (
+            self._motors, self._laws, self._s, mujoco.mj_step, self._state,
+        )  # fmt: skip
+        for k in range(steps):
+            drive(start, end, (k + 0.5) / steps, timestep, motors, laws, s, q, qd, applied)
+            if self._evaluated:  # the first half of MuJoCo's step is done
+                mujoco.mj_step2(model, data)
+                self._evaluated = False
+            else:
+                step(model, data)
+        self._command = end
 
     def _measure(self) -> Measurement:
-        arm = self._arm
-        self._force, self._rotation = arm.flange()
-        return Measurement(q=arm.q, qd=arm.qd, moment=arm.moment(), accelerometer=self._force.copy())
+        """Evaluate the accelerations at the present state, and measure."""
+        model, data = self._model, self._data
+        mujoco.mj_forward(model, data)
+        self._evaluated = True
+        mujoco.mj_rnePostConstraint(model, data)  # accelerations in MuJoCo include gravity's
+        mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, self._flange, self._felt, 1)
+        self._force, self._rotation = self._felt[3:].copy(), self._turn.reshape(3, 3).copy()
+        q, qd = data.qpos[self._motors], data.qvel[self._motors]
+        (q_r, qd_r, torque), (K_d, K, K_s, _, _) = self._command, self._laws
+        return Measurement(
+            q=data.qpos[self._joints],
+            qd=data.qvel[self._joints],
+            moment=torque + (K_d * (qd_r - qd) + K * (q_r - q)) + K_s * self._s,
+            accelerometer=self._accelerometer.read(self._force),
+            wrench=None if self._world is None else self._sensor.read(self._wrench()),
+        )
+
+    def _wrench(self) -> Floats:
+        """What all beyond the flange exerts on it, in its frame, shape (6,) [N, N m]."""
+        data, load = self._data, self._load
+        whole = data.cfrc_int[load]  # of the flange, about the centre of mass of the arm
+        x, y, z = (data.subtree_com[self._model.body_rootid[load]] - self._place).tolist()
+        fx, fy, fz = whole[3:].tolist()
+        moment = whole[:3] + np.array([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
+        felt = np.empty(6)
+        felt[:3], felt[3:] = -whole[3:] @ self._rotation, -moment @ self._rotation
+        return felt
 
     def truth(self) -> PlantTruth:
         """Return what a real robot cannot measure, at the present state."""
-        arm = self._arm
+        q, qd, _ = self._state
         return PlantTruth(
-            motor_q=arm.motor_q,
-            motor_qd=arm.motor_qd,
-            gear_deflection=arm.q - arm.motor_q,
-            link_deflection=arm.link_deflection,
-            flange_position=arm.flange_position(),
+            motor_q=q[self._motors],
+            motor_qd=qd[self._motors],
+            gear_deflection=q[self._joints] - q[self._motors],
+            link_deflection=q[self._flexes],
+            flange_position=self._place.copy(),
             flange_rotation=self._rotation,
             specific_force=self._force,
         )
+
+    def load(self, payload: Payload) -> None:
+        """Carry another payload from now on. Its shape in the world stays the first one's."""
+        self.payload, self._evaluated = payload, False
+        carry(self._model, payload)
+        if self._world is not None:
+            set_contacts(self._model, self._world.contacts)  # their stiffness is relative to the masses
+
+    def push(self, torque: Floats) -> None:
+        """Apply external torques to the joints."""
+        self._data.qfrc_applied[self._joints] = torque
+
+    def make_nan(self) -> None:
+        """Make the state NaN, so that the next step raises `PlantError`."""
+        self._data.qvel[0] = np.nan
+
+    # ------------------------------------------------------------------ the world
+
+    def things(self) -> Things | None:
+        """Return what stands around it."""
+        return None if self._world is None else self._world.things
+
+    def places(self) -> Floats:
+        """Return the poses of the bodies that move, shape (bodies, 6) [m, rad]."""
+        data = self._data
+        turns = [pin.log3(data.xmat[body].reshape(3, 3)) for body in self._bodies]
+        return np.concatenate([data.xpos[self._bodies], np.reshape(turns, (-1, 3))], axis=1)
+
+    def contact(self) -> Floats:
+        """Return the force of all that touches the arm, base frame, shape (3,) [N]."""
+        return np.asarray(self._data.cfrc_ext[self._own, 3:].sum(axis=0))
+
+    def obstacle(self, q: Floats, payload: Payload | None) -> str | None:
+        """Say what the arm would stand in after a reset."""
+        model = copy(self._model)
+        if payload is not None:
+            carry(model, payload)  # it bends the arm
+        data = mujoco.MjData(model)
+        settle(self._description, model, data, q)
+        return self._met(data)
+
+    def _met(self, data: "mujoco.MjData") -> str | None:
+        """Say what the arm stands in; None if it is clear."""
+        model, world, scene = self._model, self._world, self._scene
+        if world is None or scene is None:
+            return None
+        for touch in data.contact[: data.ncon]:
+            bodies = [int(model.geom_bodyid[geom]) for geom in touch.geom]
+            if touch.dist < -DEEPEST and any(body in world.arm or model.geom(geom).name.startswith("arm ")
+                                             for body, geom in zip(bodies, touch.geom, strict=True)):  # fmt: skip
+                first, second = (model.geom(geom).name.removeprefix(PREFIX) for geom in touch.geom)
+                depth = -1e3 * touch.dist
+                return f"world {scene.name}: {first} stands {depth:.3g} mm inside {second}"
+        return None
+
+    # ------------------------------------------------------------------ the gripper
+
+    def mount(self, hand: Hand) -> None:
+        """Mount a gripper, before the first reset."""
+        self._build(self.payload, hand)
+        self._fingers = Fingers(self._model, hand)
+
+    def grip(self, opening: float, force: float) -> None:
+        """Move the fingers from the next step on."""
+        if self._fingers is not None:
+            self._fingers.wanted, self._fingers.force = opening, force
+
+    def opening(self) -> float:
+        """Return the measured distance between the fingers [m]."""
+        assert self._fingers is not None
+        return self._fingers.opening(self._data)

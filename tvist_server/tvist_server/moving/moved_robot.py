@@ -9,7 +9,7 @@ import numpy as np
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.model import Floats
-from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, PlantError, Sight
+from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, PlantError, RealArm, Sight
 from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_server.moving.commanded_robot import CommandedRobot
 from tvist_server.moving.configuration import configuration_of, narrowed
@@ -33,7 +33,7 @@ NUMBERS = 1_000_000_000
 """Numbers of runs begin with our time in microseconds, so that those of two processes differ."""
 
 
-class MovedRobot:
+class MovedRobot(RealArm):
     """Moves one robot.
 
     Args:
@@ -94,7 +94,7 @@ class MovedRobot:
     # ------------------------------------------------------------------ a plant
 
     @property
-    def payload(self) -> Payload:
+    def payload(self) -> Payload:  # type: ignore[override]
         """Payload that it was told."""
         return self._robot.payload
 

@@ -13,7 +13,7 @@ from tvist_controller.instruments.ratings import joint_ratings
 from tvist_controller.line.kinematics import ForwardKinematics
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Measurement, PlantError, Sight
+from tvist_plant.plant import PERIOD, Measurement, PlantError, RealArm, Sight
 from tvist_protocol.errors import harmless
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.rtde.client import Row, RtdeClient, RtdeError
@@ -37,7 +37,7 @@ OTHER = 0.03
 kinematics differ by some millimetres."""
 
 
-class WatchedRobot:
+class WatchedRobot(RealArm):
     """Reads one robot.
 
     Args:

@@ -11,9 +11,10 @@ from .reference import commands
 
 def second_opinion(*arguments):
     """MuJoCo's arm; imported here, as other tests do not need to wait for it."""
-    from tvist_plant.world.second_opinion import SecondOpinion
+    from tvist_plant.world.mujoco_arm import MujocoArm
 
-    return SecondOpinion(*arguments)
+    description, payload, timestep = arguments
+    return MujocoArm(description, payload, timestep=timestep)
 
 
 def angles(description, drive):
@@ -23,11 +24,7 @@ def angles(description, drive):
 
 def other_angles(description, drive, timestep):
     other = second_opinion(description, description.payload, timestep)
-    angles = [other.reset(drive[0])]
-    for command in drive[1:]:
-        other.step(command)
-        angles.append(other.q)
-    return np.array(angles)
+    return np.array([other.reset(drive[0]).q, *(other.step(command).q for command in drive[1:])])
 
 
 @pytest.mark.parametrize("kind", ["friction", "clean"])
@@ -51,7 +48,7 @@ def test_static_equilibrium_is_that_of_mujoco(ur5e):
         command = hold(arm, pose)
         ours = FlexibleArm(arm, arm.payload).reset(command).q
         np.testing.assert_allclose(
-            second_opinion(arm, arm.payload, 0.00025).reset(command), ours, rtol=0.0, atol=1e-12
+            second_opinion(arm, arm.payload, 0.00025).reset(command).q, ours, rtol=0.0, atol=1e-12
         )
 
 
