@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.instruments.snapshot import VARIABLES, Instruments
+from tvist_controller.instruments.snapshot import Instruments, Snapshot
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import a_list, a_pose, integer, text
 from tvist_controller.programs.arm import ProgramArm
@@ -189,11 +189,9 @@ class StateFunctions:
             raise Fault(f'get_rtde_value: only clients get "{name}", which is integrated over time')
         if self._instruments is None:
             self._instruments = Instruments(self._access.description)
-        snapshot = self._instruments.snapshot(self._access.latest(), self._access.io())
-        try:
-            value = getattr(snapshot, name) if name in VARIABLES else snapshot.register(name)
-        except AttributeError:
-            raise Fault(f'get_rtde_value: RTDE has no output "{name[:60]}"') from None
+        if name not in Snapshot.readers:
+            raise Fault(f'get_rtde_value: RTDE has no output "{name[:60]}"')
+        value = getattr(self._instruments.snapshot(self._access.latest(), self._access.io()), name)
         if isinstance(value, list):
             return a_list([whole(one) if type(one) is int else float(one) for one in value])
         return whole(value) if type(value) is int else value
