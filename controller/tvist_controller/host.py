@@ -12,7 +12,7 @@ from tvist_controller.about import info_of
 from tvist_controller.authority.session import is_holders
 from tvist_controller.authority.standing import Standing
 from tvist_controller.authority.stepping import may_step
-from tvist_controller.cell.urcap import changes
+from tvist_controller.cell.gripper import changes
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
 from tvist_controller.dispatch.setpoints import Unreadable

@@ -143,11 +143,7 @@ class Cell(_Table, frozen=True, kw_only=True):
         return next(tool for tool in self.tools if tool.name == self.gripper.tool)
 
     def check(self) -> None:
-        """Check what the types of the fields cannot express.
-
-        Raises:
-            CellError: Something contradicts something else.
-        """
+        """Check what the types of the fields cannot express."""
         self._check_wires()
         self._check_tools()
         for key, things in (("tools", self.tools), ("parts", self.parts)):
