@@ -54,6 +54,11 @@ if it has changed.
 """
 
 
+def describe(name: str) -> str:
+    """Return what an output variable is; an empty text if there is none of this name."""
+    return VARIABLES[name].what if name in VARIABLES else ""
+
+
 def _outputs() -> Iterable[tuple[str, ...]]:
     for one in VARIABLES.values():
         yield f"`{one.name}`", one.type, one.source, one.what
