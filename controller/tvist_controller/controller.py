@@ -41,8 +41,7 @@ from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.plans import Order, Plans
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
-from tvist_controller.reporting.report import Report
-from tvist_controller.reporting.reporter import Reporter, truth_of
+from tvist_controller.reporting.report import Report, Reporter, truth_of
 from tvist_controller.safety.declared_payload import DeclaredPayload
 from tvist_controller.safety.faults import Faults
 from tvist_controller.safety.robot_modes import RobotModes
