@@ -1,11 +1,11 @@
-r"""A gripper with two fingers that move at a finite speed: a Robotiq 2F's registers, and its URCap's text protocol.
+r"""A gripper whose fingers move at a finite speed: a Robotiq 2F's registers, and its text protocol.
 
 Positions are counts, as in its registers: the fingers are open at `OPEN` and meet at `CLOSED`, both of which are inside
 the range 0 to 255 of what can be requested. A request beyond the end of the way ends there.
 
-The protocol, port 63352: `SET POS 255 GTO 1\n` is answered by `ack`, `GET POS\n` by a line. A `GET POS` without a line
-feed is answered by the value alone, with leading zeros: so the URCap's own functions ask, which read a fixed number of
-bytes. There is no `\n` after `ack` for the same reason.
+The protocol, port 63352: `SET POS 255 GTO 1\n` is answered by `ack`, `GET POS\n` by a line. A `GET POS` without
+a line feed is answered by the value alone, with leading zeros: so the URCap's own functions ask, which read a
+fixed number of bytes. There is no `\n` after `ack` for the same reason.
 """
 
 import re
@@ -101,7 +101,7 @@ class Gripper:
     # ------------------------------------------------------------------ registers
 
     def write(self, values: Mapping[str, int]) -> None:
-        """Write registers of `WRITABLE` within their ranges at once; what they ask for begins with the next tick."""
+        """Write registers of `WRITABLE` at once; what they ask for begins with the next tick."""
         written, before = self._written, self._written["ACT"]
         written.update(values)
         if not written["ACT"]:
@@ -169,7 +169,7 @@ class Gripper:
         return (slow + share * (fast - slow)) * PERIOD / self.stroke * (CLOSED - OPEN)
 
     def tick(self, meet: Meet) -> Moved:
-        """Move the fingers for a tick; `meet` looks for a part between them while they close and hold nothing."""
+        """Move the fingers for a tick; `meet` looks for a part while they close and hold nothing."""
         target, position = self._target, self._position
         if target is None:
             return _NOTHING

@@ -142,7 +142,7 @@ class LiveCell:
         return self.gripper is not None and port == PORT and address.strip().lower() in THIS_MACHINE
 
     def tick(self, tick: int, q: Floats) -> None:
-        """Follow the outputs and the measured joint positions of a tick; what it does counts from the next one on."""
+        """Follow the outputs and the measured posture of a tick; what it does counts from the next on."""
         before, outputs = (self._tool, self._share), self._terminals.digital_outputs
         if self._changers:
             first = self._cell.tools[0]

@@ -87,7 +87,7 @@ class Meters:
         return [1.0 - exp(-seconds / rating.thermal_time) for rating in self._ratings]
 
     def update(self, tick: int, current: list[float], mechanical: float, *, powered: bool) -> None:
-        """Advance to a tick, with the current of each motor [A] and the power that they deliver to the arm [W].
+        """Advance to a tick, with the currents of the motors [A] and the power that they deliver [W].
 
         That power is negative while they brake. A tick that is not later than the last adds nothing.
         """

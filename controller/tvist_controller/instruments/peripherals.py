@@ -1,7 +1,7 @@
 """Terminals, registers and tool centre point of a robot: set by commands, and published as `Io`."""
 
 from collections.abc import Callable, Sequence
-from typing import ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, get_args
 
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.command_row import Call, Row
@@ -24,9 +24,10 @@ CURRENT = (0.004, 0.020)
 """Range of an analogue terminal as a current [A]."""
 VOLTAGE = (0.0, 10.0)
 """Range of an analogue terminal as a voltage [V]."""
-Number = TypeVar("Number", int, float)
-LEAST, MOST = -(2**31), 2**31 - 1
+MIN_INTEGER, MAX_INTEGER = -(2**31), 2**31 - 1
 """Range of an integer register."""
+_EMPTY: dict[str, list[Any]] = {"bit": [0] * (BITS // 32), "int": [0] * NUMBERS, "double": [0.0] * NUMBERS}
+"""Registers of each kind at the start."""
 
 
 def analog_value(share: float, *, voltage: bool) -> float:
@@ -67,8 +68,7 @@ class LoadedProgram(Protocol):
 class Peripherals:
     """Everything connected to the control box except the arm. Initially everything is off or zero.
 
-    Args:
-        on_tcp: Called with the tool centre point when it is set.
+    The tool centre point is passed on to `on_tcp` when it is set.
     """
 
     def __init__(self, *on_tcp: Callable[[tuple[float, ...]], None]) -> None:
@@ -79,10 +79,8 @@ class Peripherals:
         self._analog_ratios = [0.0, 0.0]
         self._analog_types = 0
         self._tool_analog_inputs = [0.0, 0.0]
-        self._bits: dict[Bank, list[int]] = {bank: [0] * (BITS // 32) for bank in ("input_bit", "output_bit")}
-        self._ints: dict[Bank, list[int]] = {bank: [0] * NUMBERS for bank in ("input_int", "output_int")}
-        self._doubles: dict[Bank, list[float]] = {
-            bank: [0.0] * NUMBERS for bank in ("input_double", "output_double")
+        self._registers: dict[Bank, list[Any]] = {
+            bank: list(_EMPTY[bank.partition("_")[2]]) for bank in get_args(Bank)
         }
         self._written: dict[tuple[Bank, int], int] = {}
         self._tool_voltage = 0
@@ -98,13 +96,19 @@ class Peripherals:
 
     def set_outputs(self, command: SetIo) -> None:
         """Set the outputs that the masks select."""
-        self.changed = True
-        mask = command.digital_output_mask
-        self._digital_outputs = self._digital_outputs & ~mask | command.digital_outputs & mask
+        self.set_digital_outputs(command.digital_output_mask, command.digital_outputs)
         for number, ratio in enumerate((command.standard_analog_output_0, command.standard_analog_output_1)):
             if command.standard_analog_output_mask >> number & 1:
-                self._analog_ratios[number] = ratio
+                self.set_analog_output(number, ratio)
                 self.choose_output(number, voltage=bool(command.standard_analog_output_type >> number & 1))
+
+    def set_digital_outputs(self, mask: int, values: int) -> None:
+        """Set the digital outputs that the mask selects."""
+        self._digital_outputs, self.changed = self._digital_outputs & ~mask | values & mask, True
+
+    def set_analog_output(self, number: int, share: float) -> None:
+        """Set an analogue output to a share of its range; it stays a voltage or a current."""
+        self._analog_ratios[number], self.changed = share, True
 
     def set_digital_inputs(self, mask: int, values: int) -> None:
         """Apply signals to the digital inputs that the mask selects."""
@@ -191,32 +195,26 @@ class Peripherals:
 
     def bit(self, bank: Bank, place: int) -> bool:
         """Return a bit register."""
-        return bool(self._bits[bank][place // 32] >> place % 32 & 1)
+        return bool(self._registers[bank][place // 32] >> place % 32 & 1)
 
     def integers(self, bank: Bank) -> Sequence[int]:
         """Return the integer registers of a bank."""
-        return self._ints[bank]
+        return self._registers[bank]
 
     def doubles(self, bank: Bank) -> Sequence[float]:
         """Return the double registers of a bank."""
-        return self._doubles[bank]
+        return self._registers[bank]
 
     def write(self, bank: Bank, place: int, value: Register) -> None:
         """Write a register whose place and value are known to be valid."""
-        if bank in self._bits:
-            word, mask = place // 32, 1 << place % 32
-            before = self._bits[bank][word]
-            self._bits[bank][word] = after = before | mask if value else before & ~mask
-            self.changed |= after != before
-            return
-        if bank in self._ints:
-            integers, integer = self._ints[bank], int(value)
-            self.changed |= integers[place] != integer
-            integers[place] = integer
+        values = self._registers[bank]
+        if bank.endswith("bit"):
+            place, mask = place // 32, 1 << place % 32
+            value = values[place] | mask if value else values[place] & ~mask
         else:
-            doubles = self._doubles[bank]
-            self.changed |= doubles[place] != value
-            doubles[place] = float(value)
+            value = int(value) if bank.endswith("int") else float(value)
+        self.changed |= values[place] != value
+        values[place] = value
 
     def written(self, bank: Bank, place: int) -> int:
         """Return the first control period after a client last wrote a register; 0 if none ever did."""
@@ -237,29 +235,18 @@ class Peripherals:
                 self._written[run.bank, place] = call.tick
 
     def set_registers(self, command: SetRegisters) -> None:
-        """Write registers: all of them, or none.
-
-        Raises:
-            RefusalError: A register does not exist, or a value is invalid for its bank.
-        """
-        bits, ints, doubles = dict(self._bits), dict(self._ints), dict(self._doubles)
+        """Write registers: all of them, or none."""
         runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
         for run in runs:
-            bank, first, values = run.bank, run.first, run.values
-            there = BITS if bank in bits else NUMBERS
-            if first + len(values) > there:
-                why = f"first is {first} with {len(values)} values; {bank} has {there} registers"
+            there = BITS if run.bank.endswith("bit") else NUMBERS
+            if run.first + len(run.values) > there:
+                why = f"first is {run.first} with {len(run.values)} values; {run.bank} has {there} registers"
                 raise RefusalError("out_of_range", "values", why, there)
-            if bank in bits:
-                bits[bank] = _with_bits(bits[bank], first, values, bank)
-            elif bank in ints:
-                ints[bank] = _with(
-                    ints[bank], first, [_integer(k, one, bank) for k, one in enumerate(values)]
-                )
-            else:
-                numbers = [_double(k, one, bank) for k, one in enumerate(values)]
-                doubles[bank] = _with(doubles[bank], first, numbers)
-        self._bits, self._ints, self._doubles = bits, ints, doubles
+            for k, value in enumerate(run.values):
+                _check(k, value, run.bank)
+        for run in runs:
+            for place, value in enumerate(run.values, run.first):
+                self.write(run.bank, place, value)
 
     def io(
         self,
@@ -270,16 +257,7 @@ class Peripherals:
         wrench: list[float] | None,
         assumed: Payload | None = None,
     ) -> Io:
-        """Return the message that publishes all this.
-
-        Args:
-            tick: First control period for which the values hold.
-            payload: Declared payload.
-            speed: The speed slider [-].
-            program: Loaded program.
-            wrench: Wrench at the tool centre point in the last tick, base frame [N, N m]; None to leave it out.
-            assumed: Payload that is assumed instead of the declared one; None if that is.
-        """
+        """Return the message that publishes all this."""
         return Io(
             tick=tick,
             actual_digital_input_bits=self._digital_inputs,
@@ -288,12 +266,7 @@ class Peripherals:
             standard_analog_output=[self._analog_output(number) for number in range(2)],
             analog_io_types=self._analog_types,
             tool_analog_input=list(self._tool_analog_inputs),
-            input_bit_register=list(self._bits["input_bit"]),
-            input_int_register=list(self._ints["input_int"]),
-            input_double_register=list(self._doubles["input_double"]),
-            output_bit_register=list(self._bits["output_bit"]),
-            output_int_register=list(self._ints["output_int"]),
-            output_double_register=list(self._doubles["output_double"]),
+            **{f"{bank}_register": list(values) for bank, values in self._registers.items()},
             tcp_offset=list(self.tcp_offset),
             payload=self._payload_at(tick, payload),
             target_speed_fraction=speed,
@@ -339,33 +312,15 @@ class Peripherals:
     )
 
 
-def _with(values: list[Number], first: int, new: list[Number]) -> list[Number]:
-    return values[:first] + new + values[first + len(new) :]
-
-
-def _with_bits(words: list[int], first: int, values: Sequence[Register], bank: Bank) -> list[int]:
-    new = list(words)
-    for k, value in enumerate(values):
-        if not isinstance(value, bool):
-            raise _wrong(k, value, bank, "true or false")
-        word, bit = divmod(first + k, 32)
-        new[word] = new[word] & ~(1 << bit) | value << bit
-    return new
-
-
-def _integer(k: int, value: Register, bank: Bank) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not LEAST <= value <= MOST:
-        raise _wrong(k, value, bank, f"an integer from {LEAST} to {MOST}")
-    return value
-
-
-def _double(k: int, value: Register, bank: Bank) -> float:
-    if isinstance(value, bool):
-        raise _wrong(k, value, bank, "a number")
-    return float(value)
-
-
-def _wrong(k: int, value: Register, bank: Bank, wanted: str) -> RefusalError:
-    return RefusalError(
-        "out_of_range", f"values[{k}]", f"values[{k}] is {value}; {bank} registers take {wanted}"
-    )
+def _check(k: int, value: Register, bank: Bank) -> None:
+    """Refuse a value that is invalid for its bank."""
+    if bank.endswith("bit"):
+        fits, wanted = isinstance(value, bool), "true or false"
+    elif bank.endswith("int"):
+        fits = not isinstance(value, bool | float) and MIN_INTEGER <= value <= MAX_INTEGER
+        wanted = f"an integer from {MIN_INTEGER} to {MAX_INTEGER}"
+    else:
+        fits, wanted = not isinstance(value, bool), "a number"
+    if not fits:
+        why = f"values[{k}] is {value}; {bank} registers take {wanted}"
+        raise RefusalError("out_of_range", f"values[{k}]", why)

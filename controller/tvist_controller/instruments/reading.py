@@ -40,7 +40,7 @@ else:
 
 
 class Reading:
-    """One tick of one robot, with what its variables are computed from; each is computed once, when it is first read.
+    """One tick of one robot, with what its variables are computed from, each when it is first read.
 
     Variables and registers are attributes by RTDE's names, such as `actual_q` or `input_int_register_7`.
     """
@@ -69,7 +69,7 @@ class Reading:
         self.temperatures = meters.temperatures
         """Temperatures of the joints [°C]."""
         self.power, self.consumed, self.dissipated = meters.power, meters.consumed, meters.dissipated
-        """Power taken from the supply [W]; energy taken from it, and returned by braking, since the first tick [J]."""
+        """Power from the supply [W]; energy from it, and returned by braking, since the first tick [J]."""
         self.rigid, self.wrench, self.ratings = rigid, wrench, ratings
 
     def __getattr__(self, name: str) -> Any:
@@ -128,7 +128,7 @@ class Reading:
 
     @computed_once
     def estimate(self) -> Floats:
-        """Force at the TCP [N, N m], then external torques on the joints [N m], by the torques, shape (6 + n,)."""
+        """Force at the TCP [N, N m], then external torques on the joints [N m], shape (6 + n,)."""
         if not self.driven:
             return np.zeros(6 + len(self.ratings))
         return self.wrench.estimate(self.motion, self.io.tcp_offset)

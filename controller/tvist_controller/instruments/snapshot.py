@@ -34,7 +34,7 @@ class Instruments:
     def follow(self, tick: int, mode: int, moment: list[float], velocity: list[float]) -> list[float]:
         """Let temperatures and energies go on to a tick whose other values nobody reads; return the currents [A].
 
-        Once for each control period is enough. Mode is the robot's; torques [N m] and velocities [rad/s] are measured.
+        Once for each control period is enough. Torques [N m] and velocities [rad/s] are measured.
         """
         current, mechanical = self._idle, 0.0
         if mode == RUNNING:

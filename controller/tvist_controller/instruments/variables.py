@@ -53,7 +53,7 @@ class Variable(NamedTuple):
     type: str
     """RTDE's word."""
     source: Literal["state", "io", "computed", "constant"]
-    """State and io: the message contains it, and RTDE reads one with `io` only when `Io` changes. Computed: from both.
+    """State and io: the message contains it; RTDE reads one with `io` only when `Io` changes. Computed: from both.
     Constant: it stands for something that is not simulated."""
     what: str
     """What it is, for the page of reference."""
@@ -176,7 +176,8 @@ def _joint_mode(r: Reading) -> int:
 # fmt: off
 
 _ROWS = (
-    _state("target_q", "VECTOR6D", "reference before shaping, which is what the program or the client asks for [rad].",
+    _state("target_q", "VECTOR6D",
+           "reference before shaping, which is what the program or the client asks for [rad].",
            lambda r: r.state.target_q if r.state.unshaped_q is None else r.state.unshaped_q),
     _state("target_qd", "VECTOR6D", "velocity of the reference before shaping [rad/s].",
            lambda r: r.state.target_qd if r.state.unshaped_qd is None else r.state.unshaped_qd),
@@ -222,7 +223,8 @@ _ROWS = (
               "power over voltage; power is 5 W per joint, the motors' heat and their mechanical power [A].",
               lambda r: r.power / BUS_VOLTAGE),
     _computed("actual_robot_energy_consumed", "DOUBLE",
-              "integral of the power that the robot consumes, since the first tick [J].", attrgetter("consumed")),
+              "integral of the power that the robot consumes, since the first tick [J].",
+              attrgetter("consumed")),
     _computed("actual_robot_braking_energy_dissipated", "DOUBLE",
               "integral of the braking power that exceeds the motors' heat, since the first tick [J].",
               attrgetter("dissipated")),
@@ -238,19 +240,22 @@ _ROWS = (
            "acceleration of the reference after shaping; a variable that only TVIST has [rad/s²].",
            lambda r: r.state.target_qdd),
     _computed("target_moment", "VECTOR6D",
-              "torque that the rigid model with the declared payload needs for the target motion [N m]. It is that of "
-              "the state, which belongs to the shaped reference, plus the difference between the two references.",
+              "torque that the rigid model with the declared payload needs for the target motion [N m]. It is "
+              "that of the state, which belongs to the shaped reference, plus the difference between the two "
+              "references.",
               _target_moment),
     _computed("target_current", "VECTOR6D",
               "target torque over torque constant; zero while the brakes hold the arm [A].", _target_current),
     _state("actual_q", "VECTOR6D", "measured angle, on the link's side of the gear [rad]."),
     _state("actual_qd", "VECTOR6D", "measured velocity [rad/s]."),
     _computed("actual_current", "VECTOR6D",
-              "measured torque over torque constant; zero while the brakes hold the arm [A].", attrgetter("current")),
+              "measured torque over torque constant; zero while the brakes hold the arm [A].",
+              attrgetter("current")),
     Variable("actual_current_window", "VECTOR6D", "constant",
              "allowed difference of the two currents, from a tenth of the joint's largest torque [A].",
              lambda r: [rating.window for rating in r.ratings]),
-    _state("actual_current_as_torque", "VECTOR6D", "measured torque; zero while the brakes hold the arm [N m].",
+    _state("actual_current_as_torque", "VECTOR6D",
+           "measured torque; zero while the brakes hold the arm [N m].",
            lambda r: r.state.actual_moment if r.driven else [0.0] * len(r.ratings)),
     _computed("joint_control_output", "VECTOR6D",
               "the measured currents, since a simulated motor has the current that its drive asks for [A].",
@@ -283,10 +288,11 @@ _ROWS = (
               "The angular acceleration is that of the shaped reference, since no sensor measures it.",
               _tool_acceleration),
     _computed("actual_TCP_force", "VECTOR6D",
-              "force at the TCP by the sensor in the flange, without the declared payload's weight [N, N m]. Without a "
-              "sensor, it is the force that explains the measured torques, through the Jacobian. The torque that the "
-              "shaped motion needs (rigid arm with the declared payload, rotors, friction) is subtracted first. Near a "
-              "singularity part of the force cannot be measured and is left out. It is zero while the arm is braked. "
+              "force at the TCP by the sensor in the flange, without the declared payload's weight [N, N m]. "
+              "Without a sensor, it is the force that explains the measured torques, through the Jacobian. "
+              "The torque that the shaped motion needs (rigid arm with the declared payload, rotors, friction) is "
+              "subtracted first. Near a singularity part of the force cannot be measured and is left out. It is "
+              "zero while the arm is braked. "
               "In either case, the force that a program has taken as zero is subtracted last.", _tool_force),
     _computed("tcp_force_scalar", "DOUBLE", "length of the TCP force's linear part [N].",
               lambda r: _length(r.actual_TCP_force)),
@@ -294,9 +300,9 @@ _ROWS = (
               "force at the TCP that explains the measured torques; see `actual_TCP_force` [N, N m].",
               _force_from_currents),
     _computed("ft_raw_wrench", "VECTOR6D",
-              "wrench that the sensor between flange and payload measures, in the flange frame [N, N m]. Without a "
-              "sensor, it is the weight and inertial force of the declared payload, from the accelerometer and "
-              "without the effect of rotation, plus the TCP force.", _raw_wrench),
+              "wrench that the sensor between flange and payload measures, in the flange frame [N, N m]. "
+              "Without a sensor, it is the weight and inertial force of the declared payload, from the "
+              "accelerometer and without the effect of rotation, plus the TCP force.", _raw_wrench),
     _computed("collision_detection_ratio", "DOUBLE",
               "largest share of a joint's torque limit by which measured torque differs from expected [-].",
               _collision_ratio),
@@ -310,15 +316,16 @@ _ROWS = (
     _io("payload", "DOUBLE", "declared mass [kg].", lambda r: r.io.payload.mass),
     _io("payload_cog", "VECTOR3D", "declared centre of mass in the flange frame [m].",
         lambda r: list(r.io.payload.com)),
-    _io("payload_inertia", "VECTOR6D", "declared inertia about the centre of mass: xx yy zz xy xz yz [kg m²].",
+    _io("payload_inertia", "VECTOR6D",
+        "declared inertia about the centre of mass: xx yy zz xy xz yz [kg m²].",
         _payload_inertia),
     _constant("target_gravity", "VECTOR3D",
               "0 0 9.81, the acceleration that is equivalent to gravity, for a robot on the floor [m/s²].",
               [0.0, 0.0, GRAVITY]),
     _constant("target_base_acceleration", "VECTOR6D", "zero; the base stands [m/s², rad/s²].", [0.0] * 6),
     _computed("target_base_wrench", "VECTOR6D",
-              "force and torque at the base of the arm with the declared payload, for the target motion [N, N m]. "
-              "The weight of the base itself is not included.",
+              "force and torque at the base of the arm with the declared payload, for the target motion "
+              "[N, N m]. The weight of the base itself is not included.",
               lambda r: r.rigid.base_wrench(r.motion[UNSHAPED], r.io.payload)),
 
     # Inputs and outputs, at the controller and in the tool.
@@ -330,20 +337,27 @@ _ROWS = (
     _io("actual_configurable_digital_output_bits", "UINT64", "bits 8–15 of the digital outputs, not shifted.",
         lambda r: r.io.actual_digital_output_bits & CONFIGURABLE),
     _io("analog_io_types", "UINT32", "bits 0–1 analogue inputs, 2–3 outputs; 0 is current, 1 voltage."),
-    _io("standard_analog_input0", "DOUBLE", "analogue input 0 [A or V].", lambda r: r.io.standard_analog_input[0]),
-    _io("standard_analog_input1", "DOUBLE", "analogue input 1 [A or V].", lambda r: r.io.standard_analog_input[1]),
-    _io("standard_analog_output0", "DOUBLE", "analogue output 0 [A or V].", lambda r: r.io.standard_analog_output[0]),
-    _io("standard_analog_output1", "DOUBLE", "analogue output 1 [A or V].", lambda r: r.io.standard_analog_output[1]),
+    _io("standard_analog_input0", "DOUBLE", "analogue input 0 [A or V].",
+        lambda r: r.io.standard_analog_input[0]),
+    _io("standard_analog_input1", "DOUBLE", "analogue input 1 [A or V].",
+        lambda r: r.io.standard_analog_input[1]),
+    _io("standard_analog_output0", "DOUBLE", "analogue output 0 [A or V].",
+        lambda r: r.io.standard_analog_output[0]),
+    _io("standard_analog_output1", "DOUBLE", "analogue output 1 [A or V].",
+        lambda r: r.io.standard_analog_output[1]),
     _constant("io_current", "DOUBLE", "0; nothing draws current from the terminals [mA].", 0.0),
     _computed("tool_mode", "UINT32", "from the robot's mode, with the numbers of `joint_mode`.", _joint_mode),
     _io("tool_analog_input_types", "UINT32",
         "types of the tool's analogue inputs, bits 0–1; 0 is current, 1 voltage."),
-    _io("tool_analog_input0", "DOUBLE", "analogue input 0 of the tool [A or V].", lambda r: r.io.tool_analog_input[0]),
-    _io("tool_analog_input1", "DOUBLE", "analogue input 1 of the tool [A or V].", lambda r: r.io.tool_analog_input[1]),
+    _io("tool_analog_input0", "DOUBLE", "analogue input 0 of the tool [A or V].",
+        lambda r: r.io.tool_analog_input[0]),
+    _io("tool_analog_input1", "DOUBLE", "analogue input 1 of the tool [A or V].",
+        lambda r: r.io.tool_analog_input[1]),
     _io("tool_output_voltage", "INT32", "voltage of the tool's supply; 0 if it is off [V]."),
     _constant("tool_output_current", "DOUBLE", "0; nothing draws current from it [mA].", 0.0),
     _computed("tool_temperature", "DOUBLE",
-              "temperature of the last joint, which holds the tool's electronics [°C].", lambda r: r.temperatures[-1]),
+              "temperature of the last joint, which holds the tool's electronics [°C].",
+              lambda r: r.temperatures[-1]),
     _io("tool_output_mode", "UINT8", "0, the tool's outputs are digital ones; 1, they are a second supply."),
     _io("tool_digital_output0_mode", "UINT8", "1, the output sinks; 2, it sources; 3, both."),
     _io("tool_digital_output1_mode", "UINT8", "1, the output sinks; 2, it sources; 3, both."),

@@ -1,6 +1,6 @@
 """Functions for registers and flags."""
 
-from tvist_controller.instruments.peripherals import LEAST, MOST
+from tvist_controller.instruments.peripherals import MAX_INTEGER, MIN_INTEGER
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number
 from tvist_controller.programs.arm import ProgramArm
@@ -56,7 +56,7 @@ class RegisterFunctions:
     @costs(8)
     def write_output_integer_register(self, address: object, value: object) -> None:
         """Write an output integer of 32 bits, which clients read."""
-        place, wanted = integer("address", address, 0, NUMBERS - 1), integer("value", value, LEAST, MOST)
+        place, wanted = integer("address", address, 0, NUMBERS - 1), integer("value", value, MIN_INTEGER, MAX_INTEGER)
         self._arm.then(lambda: self._registers.write("output_int", place, wanted))
 
     @costs(8)
