@@ -18,8 +18,7 @@ from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
 from tvist_controller.dispatch.setpoints import Unreadable
 from tvist_controller.experience.experience import Experience
 from tvist_controller.planning.plan import Plan
-from tvist_controller.programs.socket_ports import NoPorts, SocketPorts
-from tvist_controller.programs.socket_traffic import SocketNews
+from tvist_controller.programs.socket_traffic import NoPorts, SocketNews, SocketPorts
 from tvist_controller.reporting.sink import Sink
 from tvist_controller.sources.plant_calls import told
 from tvist_plant.user_file import named
