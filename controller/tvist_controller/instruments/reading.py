@@ -1,7 +1,8 @@
 """One tick of one robot: its messages, and what several variables of RTDE are computed from."""
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ POWERED = frozenset(range(RobotMode.POWER_ON, RobotMode.RUNNING + 1))
 """Robot modes in which the arm has power."""
 
 if TYPE_CHECKING:
-    from functools import cached_property as computed_once
+    computed_once = cached_property
 else:
 
     class computed_once:  # noqa: N801  it stands for a property
@@ -34,19 +35,21 @@ else:
         def __init__(self, func: Callable[[Any], Any]) -> None:
             self.func, self.__doc__ = func, func.__doc__
 
+        def __set_name__(self, owner: type, name: str) -> None:
+            self.name = name
+
         def __get__(self, of: Any, owner: type) -> Any:
-            value = of.__dict__[self.func.__name__] = self.func(of)
+            value = of.__dict__[self.name] = self.func(of)
             return value
 
 
 class Reading:
-    """One tick of one robot, with what its variables are computed from, each when it is first read.
+    """One tick of one robot, with what its variables are computed from, each when it is first read."""
 
-    Variables and registers are attributes by RTDE's names, such as `actual_q` or `input_int_register_7`.
-    """
+    if TYPE_CHECKING:
 
-    readers: ClassVar[Mapping[str, Callable[[Any], Any]]]
-    """What reads each variable and register."""
+        def __getattr__(self, name: str) -> Any:
+            """Return a variable, which `Snapshot` adds."""
 
     def __init__(
         self,
@@ -71,13 +74,6 @@ class Reading:
         self.power, self.consumed, self.dissipated = meters.power, meters.consumed, meters.dissipated
         """Power from the supply [W]; energy from it, and returned by braking, since the first tick [J]."""
         self.rigid, self.wrench, self.ratings = rigid, wrench, ratings
-
-    def __getattr__(self, name: str) -> Any:
-        read = self.readers.get(name)
-        if read is None:
-            raise AttributeError(f"{type(self).__name__} has no {name}")
-        value = self.__dict__[name] = read(self)
-        return value
 
     @property
     def powered(self) -> bool:

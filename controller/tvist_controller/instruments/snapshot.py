@@ -1,9 +1,9 @@
 """One tick of a robot as UR's interfaces report it, under RTDE's names."""
 
 from tvist_controller.instruments.motors import Meters, joint_ratings
-from tvist_controller.instruments.reading import POWERED, Reading
+from tvist_controller.instruments.reading import POWERED, Reading, computed_once
 from tvist_controller.instruments.rigid_body import RigidBody
-from tvist_controller.instruments.variables import REGISTERS, VARIABLES
+from tvist_controller.instruments.variables import READERS
 from tvist_controller.instruments.wrench import RUNNING, ToolWrench
 from tvist_plant.description import RobotDescription
 from tvist_protocol.io import Io
@@ -11,9 +11,13 @@ from tvist_protocol.stream import State
 
 
 class Snapshot(Reading):
-    """Every output variable of RTDE is an attribute."""
+    """Variables and registers are attributes by RTDE's names, such as `actual_q` or `input_int_register_7`."""
 
-    readers = {name: variable.read for name, variable in VARIABLES.items()} | REGISTERS
+
+for _name, _read in READERS.items():
+    _once = computed_once(_read)
+    _once.__set_name__(Snapshot, _name)
+    setattr(Snapshot, _name, _once)
 
 
 class Instruments:

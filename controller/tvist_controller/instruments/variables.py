@@ -390,5 +390,5 @@ def _registers() -> Iterator[tuple[str, Read]]:
             yield from ((f"{name}_{k}", entry(name, k)) for k in range(NUMBERS))
 
 
-REGISTERS: dict[str, Read] = dict(_registers())
-"""What reads each register, by RTDE's name."""
+READERS: dict[str, Read] = {row.name: row.read for row in _ROWS} | dict(_registers())
+"""What reads each variable and register, by RTDE's name."""

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_controller.commands.refusal import RefusalError, check_joints
-from tvist_controller.instruments.snapshot import Instruments, Snapshot
+from tvist_controller.instruments.snapshot import Instruments
+from tvist_controller.instruments.variables import READERS
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.programs import arguments
@@ -189,7 +190,7 @@ class StateFunctions(Family):
             raise Fault(f'get_rtde_value: only clients get "{key}", which is integrated over time')
         if self._instruments is None:
             self._instruments = Instruments(self._access.description)
-        if key not in Snapshot.readers:
+        if key not in READERS:
             raise Fault(f'get_rtde_value: RTDE has no output "{key[:60]}"')
         value = getattr(self._instruments.snapshot(self._access.latest(), self._access.io()), key)
         if isinstance(value, list):

@@ -41,7 +41,7 @@ def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
 
 def _parts() -> Iterator[tuple[str, tuple[Part, int]]]:
     for name, one in VARIABLES.items():
-        # What is computed may be read by others as well, and is kept as an attribute.
+        # What is computed may be read by others as well: the snapshot keeps it.
         read = attrgetter(name) if one.source == "computed" else one.read
         yield name, (Part(read, Wire[one.type].value[-1], of_io=one.source == "io"), 0)
     joints = Part(attrgetter("joint_lists"), "d", len(JOINT_LISTS))
