@@ -338,7 +338,7 @@ class Controller(WholeRobot):
             self.tick_number + 1,
             self._payload.payload,
             self.motion.motions.asked_speed,
-            self.programs,
+            self.programs.published,
             self.forces.wrench() if estimated else None,
             None if self._payload.assumed == self._payload.payload else self._payload.assumed,
         )

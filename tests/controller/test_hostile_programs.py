@@ -240,7 +240,7 @@ def written(robot, *, all_places):
     places = robot.controller.peripherals
     last = 8 if all_places else 4
     return (
-        places.digital_outputs & ((1 << last) - 1), places.analog_ratio(0),
+        places.digital_outputs & ((1 << last) - 1), places.analog_shares[0],
         places.integers("output_int")[:last], places.doubles("output_double")[:last],
     )  # fmt: skip
 

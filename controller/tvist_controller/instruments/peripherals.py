@@ -1,7 +1,7 @@
 """Terminals, registers and tool centre point of a robot: set by commands, and published as `Io`."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, Protocol, get_args
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, get_args
 
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.command_row import Call, Row
@@ -17,7 +17,6 @@ from tvist_protocol.io import (
     SetTcp,
     SimulationSetInputs,
 )
-from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
 from tvist_protocol.values import Payload
 
 CURRENT = (0.004, 0.020)
@@ -42,29 +41,6 @@ def analog_share(value: float, *, voltage: bool) -> float:
     return (value - low) / (high - low)
 
 
-class LoadedProgram(Protocol):
-    """The properties of the program that are published; see `Io`."""
-
-    name: str | None
-    state: ProgramState
-
-    @property
-    def line(self) -> int:
-        """Current line, as in `Io`."""
-
-    @property
-    def label(self) -> ProgramLabel | None:
-        """Last label, as in `Io`."""
-
-    @property
-    def interpreter(self) -> Interpreter | None:
-        """Statements for the program, as in `Io`."""
-
-    @property
-    def watched(self) -> list[str]:
-        """Input registers that the program watches, as in `Io`."""
-
-
 class Peripherals:
     """Everything connected to the control box except the arm. Initially everything is off or zero.
 
@@ -73,12 +49,13 @@ class Peripherals:
 
     def __init__(self, *on_tcp: Callable[[tuple[float, ...]], None]) -> None:
         self._on_tcp = on_tcp
-        self._digital_inputs = 0
-        self._digital_outputs = 0
-        self._analog_inputs = [CURRENT[0], CURRENT[0]]
-        self._analog_ratios = [0.0, 0.0]
+        self.digital_inputs = self.digital_outputs = 0
+        """Digital terminals: bits 0–7 standard, 8–15 configurable, 16–17 tool."""
+        self.analog_inputs, self.tool_analog_inputs = [CURRENT[0], CURRENT[0]], [0.0, 0.0]
+        """Analogue inputs of the control box and of the tool [A or V]."""
+        self.analog_shares = [0.0, 0.0]
+        """Analogue outputs as shares of their ranges [-]."""
         self._analog_types = 0
-        self._tool_analog_inputs = [0.0, 0.0]
         self._registers: dict[Bank, list[Any]] = {
             bank: list(_EMPTY[bank.partition("_")[2]]) for bank in get_args(Bank)
         }
@@ -104,25 +81,25 @@ class Peripherals:
 
     def set_digital_outputs(self, mask: int, values: int) -> None:
         """Set the digital outputs that the mask selects."""
-        self._digital_outputs, self.changed = self._digital_outputs & ~mask | values & mask, True
+        self.digital_outputs, self.changed = self.digital_outputs & ~mask | values & mask, True
 
     def set_analog_output(self, number: int, share: float) -> None:
         """Set an analogue output to a share of its range; it stays a voltage or a current."""
-        self._analog_ratios[number], self.changed = share, True
+        self.analog_shares[number], self.changed = share, True
 
     def set_digital_inputs(self, mask: int, values: int) -> None:
         """Apply signals to the digital inputs that the mask selects."""
-        self._digital_inputs, self.changed = self._digital_inputs & ~mask | values & mask, True
+        self.digital_inputs, self.changed = self.digital_inputs & ~mask | values & mask, True
 
     def set_inputs(self, command: SimulationSetInputs) -> None:
         """Apply signals to inputs."""
         self.set_digital_inputs(command.digital_input_mask, command.digital_inputs)
         if command.standard_analog_input is not None:
-            self._analog_inputs = list(command.standard_analog_input)
+            self.analog_inputs = list(command.standard_analog_input)
         if command.analog_input_types is not None:
             self._analog_types = self._analog_types & ~0b11 | command.analog_input_types
         if command.tool_analog_input is not None:
-            self._tool_analog_inputs = list(command.tool_analog_input)
+            self.tool_analog_inputs = list(command.tool_analog_input)
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
@@ -131,30 +108,6 @@ class Peripherals:
             tell(offset)
 
     # ------------------------------------------------------------------ for programs
-
-    @property
-    def digital_inputs(self) -> int:
-        """Bits of the digital inputs: 0–7 standard, 8–15 configurable, 16–17 tool."""
-        return self._digital_inputs
-
-    @property
-    def digital_outputs(self) -> int:
-        """Bits of the digital outputs, as those of the inputs."""
-        return self._digital_outputs
-
-    @property
-    def analog_inputs(self) -> Sequence[float]:
-        """Analogue inputs of the control box [A or V]."""
-        return self._analog_inputs
-
-    @property
-    def tool_analog_inputs(self) -> Sequence[float]:
-        """Analogue inputs of the tool [V]."""
-        return self._tool_analog_inputs
-
-    def analog_ratio(self, number: int) -> float:
-        """Share of its range that an analogue output has [-]."""
-        return self._analog_ratios[number]
 
     def output_is_voltage(self, number: int) -> bool:
         """Return whether an analogue output is a voltage rather than a current."""
@@ -253,29 +206,29 @@ class Peripherals:
         tick: int,
         payload: Payload,
         speed: float,
-        program: LoadedProgram,
+        program: Mapping[str, Any],
         wrench: list[float] | None,
         assumed: Payload | None = None,
     ) -> Io:
-        """Return the message that publishes all this."""
+        """Return the message that publishes all this, with the fields of the loaded program and the rest."""
         return Io(
             tick=tick,
-            actual_digital_input_bits=self._digital_inputs,
-            actual_digital_output_bits=self._digital_outputs,
-            standard_analog_input=list(self._analog_inputs),
+            actual_digital_input_bits=self.digital_inputs,
+            actual_digital_output_bits=self.digital_outputs,
+            standard_analog_input=list(self.analog_inputs),
             standard_analog_output=[self._analog_output(number) for number in range(2)],
             analog_io_types=self._analog_types,
-            tool_analog_input=list(self._tool_analog_inputs),
-            **{f"{bank}_register": list(values) for bank, values in self._registers.items()},
+            tool_analog_input=list(self.tool_analog_inputs),
+            input_bit_register=list(self._registers["input_bit"]),
+            input_int_register=list(self._registers["input_int"]),
+            input_double_register=list(self._registers["input_double"]),
+            output_bit_register=list(self._registers["output_bit"]),
+            output_int_register=list(self._registers["output_int"]),
+            output_double_register=list(self._registers["output_double"]),
             tcp_offset=list(self.tcp_offset),
             payload=self._payload_at(tick, payload),
             target_speed_fraction=speed,
-            program=program.name,
-            program_state=program.state,
-            program_line=program.line,
-            program_label=program.label,
-            interpreter=program.interpreter,
-            watched=program.watched,
+            **program,
             tool_output_voltage=self._tool_voltage,
             tool_analog_input_types=self._tool_types,
             tool_output_mode=self._tool_output_mode,
@@ -302,7 +255,7 @@ class Peripherals:
         return Payload(mass=mass, com=(x, y, z), inertia=(xx, xy, xz, yy, yz, zz))
 
     def _analog_output(self, number: int) -> float:
-        return analog_value(self._analog_ratios[number], voltage=self.output_is_voltage(number))
+        return analog_value(self.analog_shares[number], voltage=self.output_is_voltage(number))
 
     rows: ClassVar[tuple[Row, ...]] = (
         Row(SetIo, lambda self, call: self.set_outputs(call.command), changes_io=True),

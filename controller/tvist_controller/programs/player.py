@@ -16,7 +16,7 @@ from tvist_controller.programs.sockets import Sockets
 from tvist_controller.programs.watchdogs import MissedTurns, Watchdogs
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_protocol.modes import RobotMode
-from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
+from tvist_protocol.programs import ProgramLabel, ProgramState
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
 from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
@@ -89,16 +89,6 @@ class ProgramPlayer:
         """Label that the program had passed at that line; None if there is none."""
 
     @property
-    def watched(self) -> list[str]:
-        """Names of the input registers that the program watches."""
-        return self._watchdogs.names
-
-    @property
-    def interpreter(self) -> Interpreter | None:
-        """State of the statements that clients have added to the program."""
-        return self.statements.published
-
-    @property
     def present_line(self) -> int:
         """Line of the main thread at this tick, unlike `line`, which is told now and then; 0 if there is none."""
         return 0 if self._main is None else self._main.machine.line
@@ -107,6 +97,15 @@ class ProgramPlayer:
     def progress(self) -> tuple[str | None, ProgramState, int, ProgramLabel | None]:
         """Fields of the program in `io`: its name, its state, its line and its label."""
         return self.name, self.state, self.line, self.label
+
+    @property
+    def published(self) -> dict[str, object]:
+        """All fields of the program in `io`."""
+        return {
+            "program": self.name, "program_state": self.state, "program_line": self.line,
+            "program_label": self.label, "interpreter": self.statements.published,
+            "watched": self._watchdogs.names,
+        }  # fmt: skip
 
     # ------------------------------------------------------------------ ticks and events
 

@@ -112,10 +112,7 @@ class ForceFunctions(Family):
         """Let the arm be moved by hand in all directions."""
         yield from self.freedrive_mode(np.ones(6))
 
-    @costs(100)
-    def end_teach_mode(self) -> None:
-        """Hold the position again."""
-        self._arm.hold_again(by_hand=True)
+    end_teach_mode = end_freedrive_mode
 
     def ft_rtde_input_enable(
         self,

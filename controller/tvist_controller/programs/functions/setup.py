@@ -178,8 +178,7 @@ class SetupFunctions(Family):
     def high_holding_torque_enable(self) -> None:
         """Do nothing: the drives of the simulated arm hold it with the same torque at all times."""
 
-    def high_holding_torque_disable(self) -> None:
-        """Do nothing: the drives of the simulated arm hold it with the same torque at all times."""
+    high_holding_torque_disable = high_holding_torque_enable
 
     def _act(self, what: str, action: str) -> None:
         if action == "freedrive":

@@ -164,12 +164,9 @@ class TerminalFunctions(Family):
     @costs(10)
     def set_analog_out(self, n: Bit, f: Share) -> None:
         """Set an analogue output to a share of its range."""
-        self.set_standard_analog_out(n, f)
-
-    @costs(10)
-    def set_standard_analog_out(self, n: Bit, f: Share) -> None:
-        """Set an analogue output to a share of its range."""
         self._arm.then(lambda: self._terminals.set_analog_output(n, f))
+
+    set_standard_analog_out = set_analog_out
 
     def set_analog_outputdomain(self, port: Bit, domain: Voltage) -> None:
         """Make an analogue output a current (0) or a voltage (1)."""
@@ -215,11 +212,9 @@ class TerminalFunctions(Family):
 
     def get_analog_out(self, n: Bit) -> float:
         """Return an analogue output as a share of its range."""
-        return self.get_standard_analog_out(n)
+        return self._terminals.analog_shares[n]
 
-    def get_standard_analog_out(self, n: Bit) -> float:
-        """Return an analogue output as a share of its range."""
-        return self._terminals.analog_ratio(n)
+    get_standard_analog_out = get_analog_out
 
     def _set(self, bit: int, on: bool) -> None:
         self._arm.then(lambda: self._terminals.set_digital_outputs(1 << bit, on << bit))
