@@ -40,8 +40,7 @@ from tvist_controller.planning.plan import Order, Plan, Plans
 from tvist_controller.planning.snapshot import Snapshot
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
-from tvist_controller.reporting.report import Report
-from tvist_controller.reporting.reporter import Reporter, truth_of
+from tvist_controller.reporting.report import Report, Reporter, truth_of
 from tvist_controller.safety.faults import Faults
 from tvist_controller.safety.monitors import Overload, ShaperMonitor
 from tvist_controller.safety.own_controller import REFUSED, Supervision, Watching
@@ -340,7 +339,7 @@ class Controller(WholeRobot):
             self.tick_number + 1,
             self.payload.declared,
             self.motion.motions.asked_speed,
-            self.programs,
+            self.programs.published,
             self.forces.wrench() if estimated else None,
             None if self.payload.assumed == self.payload.declared else self.payload.assumed,
         )

@@ -11,14 +11,13 @@ import msgspec
 from tvist_controller.about import info_of
 from tvist_controller.authority.session import is_holders
 from tvist_controller.authority.stepping import Standing, may_step
-from tvist_controller.cell.urcap import changes
+from tvist_controller.cell.gripper import changes
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
 from tvist_controller.dispatch.setpoints import Unreadable
 from tvist_controller.experience.experience import Experience
 from tvist_controller.planning.plan import Plan
-from tvist_controller.programs.socket_ports import NoPorts, SocketPorts
-from tvist_controller.programs.socket_traffic import SocketNews
+from tvist_controller.programs.socket_traffic import NoPorts, SocketNews, SocketPorts
 from tvist_controller.reporting.sink import Sink
 from tvist_plant.foreign import told
 from tvist_plant.user_file import named

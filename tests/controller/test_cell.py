@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 from tests.own_arm import OwnArm
 
 from tvist_controller.cell.description import Wire
-from tvist_controller.cell.gripper import ACTIVATION, CLOSED, OPEN, Gripper
-from tvist_controller.cell.live_cell import TRANSFER
-from tvist_controller.cell.urcap import Requests, answer
-from tvist_controller.cell.wires import Wires
+from tvist_controller.cell.gripper import ACTIVATION, CLOSED, OPEN, Gripper, Requests, answer
+from tvist_controller.cell.live_cell import TRANSFER, Wires
 from tvist_controller.host import Host
 from tvist_controller.setup import Setup
 from tvist_lab.replay import replay

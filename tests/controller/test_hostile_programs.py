@@ -12,9 +12,8 @@ from tvist_controller.dispatch.planner import Planner
 from tvist_controller.foresight.stopper import Outlook
 from tvist_controller.kinematics.straight_step import LOST, pseudo_inverse, straight_step
 from tvist_controller.kinematics.tool import ToolKinematics
-from tvist_controller.programs.allowance import PAUSE
-from tvist_controller.programs.functions.poses import PoseFunctions
-from tvist_controller.programs.journey import DELAY
+from tvist_controller.programs.functions.state import PoseFunctions
+from tvist_controller.programs.journey import DELAY, PAUSE
 from tvist_controller.trajectory.speed import TRIES
 from tvist_protocol import motions as m
 from tvist_protocol.commands import UnlockProtectiveStop
@@ -239,7 +238,7 @@ def written(robot, *, all_places):
     places = robot.controller.peripherals
     last = 8 if all_places else 4
     return (
-        places.digital_outputs & ((1 << last) - 1), places.analog_ratio(0),
+        places.digital_outputs & ((1 << last) - 1), places.analog_shares[0],
         places.integers("output_int")[:last], places.doubles("output_double")[:last],
     )  # fmt: skip
 

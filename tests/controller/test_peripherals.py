@@ -1,7 +1,5 @@
 """Inputs, outputs, registers and the tool centre point: what is set is told, and nothing else changes."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -21,15 +19,12 @@ from .robots import Q1, UR5E, Robot
 BITS18 = st.integers(0, 2**18 - 1)
 
 
-NO_PROGRAM = SimpleNamespace(name=None, state="STOPPED", line=0, label=None, watched=[], interpreter=None)
-
-
 def bare():
     return Peripherals(lambda _: None)
 
 
 def told(peripherals: Peripherals):
-    return peripherals.io(1, paper_payload(UR5E), 1.0, NO_PROGRAM, [0.0] * 6)
+    return peripherals.io(1, paper_payload(UR5E), 1.0, {"program": None}, [0.0] * 6)
 
 
 def test_a_push_at_the_tool_is_told_in_io():

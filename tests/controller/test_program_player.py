@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from tvist_controller.programs.built_in import built_in
+from tvist_controller.programs.compiling import built_in
 from tvist_protocol import commands as c
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused

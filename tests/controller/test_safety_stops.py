@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.instruments.status import _SAFETY_BITS
+from tvist_controller.instruments.variables import SAFETY_BITS
 from tvist_controller.line.differentiator import Target
 from tvist_controller.safety.brakes import brake
 from tvist_controller.setup import body, paper_payload
@@ -180,7 +180,7 @@ def test_a_reset_to_a_mode_ends_every_stop():
 
 def test_every_safety_mode_has_its_bit():
     """RTDE's numbers: bit 5 system emergency stop, 6 robot, 7 either, 8 violation, 9 fault, 10 stopped by safety."""
-    bits = {mode: {bit for bit in range(11) if _SAFETY_BITS[mode] >> bit & 1} for mode in _SAFETY_BITS}
+    bits = {mode: {bit for bit in range(11) if SAFETY_BITS[mode] >> bit & 1} for mode in SAFETY_BITS}
     assert bits[SafetyMode.SAFEGUARD_STOP] == {4, 10}
     assert bits[SafetyMode.SYSTEM_EMERGENCY_STOP] == {5, 7, 10}
     assert bits[SafetyMode.ROBOT_EMERGENCY_STOP] == {6, 7, 10}

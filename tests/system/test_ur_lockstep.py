@@ -11,7 +11,7 @@ from tests.conformance.wire import Wire
 from tests.places import own_address
 from tests.server.ur import decoders, rtde_client
 
-from tvist_controller.programs.built_in import PAPER, built_in
+from tvist_controller.programs.compiling import PAPER, built_in
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_plant.description import load

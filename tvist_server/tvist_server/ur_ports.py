@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct
 
-from tvist_controller.cell.urcap import PORT
+from tvist_controller.cell.gripper import PORT
 
 InterfaceName = Literal[
     "dashboard", "primary", "secondary", "realtime", "rtde", "interpreter",

@@ -17,7 +17,7 @@ Terminal = Literal[
     "tool 0", "tool 1",
 ]  # fmt: skip
 """Name of a digital terminal, in the order of the bits of inputs and outputs."""
-MOST = 100
+MAX_THINGS = 100
 """Largest number of wires, tools and parts, each."""
 STROKES = {"2F-85": 0.085, "2F-140": 0.14}
 """Opening of each gripper [m]."""
@@ -119,13 +119,13 @@ class Part(_Table, frozen=True, kw_only=True):
 class Cell(_Table, frozen=True, kw_only=True):
     """A cell: what stands around one robot."""
 
-    wires: Annotated[tuple[Wire, ...], Meta(max_length=MOST)] = ()
+    wires: Annotated[tuple[Wire, ...], Meta(max_length=MAX_THINGS)] = ()
     """Wires between terminals."""
-    tools: Annotated[tuple[Tool, ...], Meta(max_length=MOST)] = ()
+    tools: Annotated[tuple[Tool, ...], Meta(max_length=MAX_THINGS)] = ()
     """Tools; the first one is on the flange."""
     gripper: GripperModel | None = None
     """Gripper; None if there is none."""
-    parts: Annotated[tuple[Part, ...], Meta(max_length=MOST)] = ()
+    parts: Annotated[tuple[Part, ...], Meta(max_length=MAX_THINGS)] = ()
     """Parts that it can grip."""
     world: Annotated[str, Meta(min_length=1, max_length=4096)] | None = None
     """Scene in which the arm stands, as of `tvist serve --world`: its bodies are gripped, and there are no parts."""
@@ -143,11 +143,7 @@ class Cell(_Table, frozen=True, kw_only=True):
         return next(tool for tool in self.tools if tool.name == self.gripper.tool)
 
     def check(self) -> None:
-        """Check what the types of the fields cannot express.
-
-        Raises:
-            CellError: Something contradicts something else.
-        """
+        """Check what the types of the fields cannot express."""
         self._check_wires()
         self._check_tools()
         for key, things in (("tools", self.tools), ("parts", self.parts)):

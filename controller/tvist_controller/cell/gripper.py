@@ -1,9 +1,14 @@
-"""A gripper with two fingers that move at a finite speed, with the registers of a Robotiq 2F.
+r"""A gripper whose fingers move at a finite speed: a Robotiq 2F's registers, and its text protocol.
 
 Positions are counts, as in its registers: the fingers are open at `OPEN` and meet at `CLOSED`, both of which are inside
 the range 0 to 255 of what can be requested. A request beyond the end of the way ends there.
+
+The protocol, port 63352: `SET POS 255 GTO 1\n` is answered by `ack`, `GET POS\n` by a line. A `GET POS` without
+a line feed is answered by the value alone, with leading zeros: so the URCap's own functions ask, which read a
+fixed number of bytes. There is no `\n` after `ack` for the same reason.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -26,6 +31,22 @@ WRITABLE: Mapping[str, int] = MappingProxyType(
 )
 """Registers that can be written, and their largest values."""
 
+PORT: Final = 63352
+"""TCP port on which the URCap listens."""
+SLAVES = ("9", "1")
+"""Numbers by which clients select the only gripper, SID."""
+UNKNOWN: Final = b"?"
+"""Answer to what is not understood."""
+LONGEST: Final = 1024
+"""Longest line [bytes]."""
+_DIGITS = {"PRE": 3, "POS": 3, "SPE": 3, "FOR": 3, "MSC": 3, "FLT": 2}
+"""Digits of a value that is answered alone; 1 for others."""
+_BARE_GET = re.compile(rb"GET [A-Z]{3}")
+_LIST = b"[9]"
+"""Numbers of the grippers that are there."""
+_LIST_BYTES = 17
+"""Length of the list of grippers, for up to four of them."""
+
 Meet = Callable[[float, float], float | None]
 """Returns the opening at which closing fingers meet a part on their way between two openings, or None [m]."""
 
@@ -46,12 +67,7 @@ _NOTHING = Moved()
 
 
 class Gripper:
-    """The fingers and their registers.
-
-    Args:
-        stroke: Opening [m].
-        activated: Whether it is activated at the start.
-    """
+    """The fingers, with their opening [m], and their registers."""
 
     def __init__(self, stroke: float, *, activated: bool) -> None:
         self.stroke = stroke
@@ -85,11 +101,7 @@ class Gripper:
     # ------------------------------------------------------------------ registers
 
     def write(self, values: Mapping[str, int]) -> None:
-        """Write registers at once; what they ask for begins with the next tick.
-
-        Args:
-            values: Values of some of `WRITABLE`, each within its range.
-        """
+        """Write registers of `WRITABLE` at once; what they ask for begins with the next tick."""
         written, before = self._written, self._written["ACT"]
         written.update(values)
         if not written["ACT"]:
@@ -157,11 +169,7 @@ class Gripper:
         return (slow + share * (fast - slow)) * PERIOD / self.stroke * (CLOSED - OPEN)
 
     def tick(self, meet: Meet) -> Moved:
-        """Move the fingers for a tick.
-
-        Args:
-            meet: Looks for a part between the fingers; called while they close and hold nothing.
-        """
+        """Move the fingers for a tick; `meet` looks for a part while they close and hold nothing."""
         target, position = self._target, self._position
         if target is None:
             return _NOTHING
@@ -196,3 +204,61 @@ class Gripper:
 
     def _opening(self, position: float) -> float:
         return (CLOSED - position) / (CLOSED - OPEN) * self.stroke
+
+
+# ---------------------------------------------------------------------- the text protocol
+
+
+class Requests:
+    """What has arrived on one connection, cut into requests."""
+
+    def __init__(self) -> None:
+        self._received = b""
+
+    def cut(self, data: bytes) -> list[bytes]:
+        """Return the requests that are complete with what has arrived now.
+
+        A request without a line feed is one that has arrived by itself: else its line feed may be under way.
+        """
+        if not self._received and _BARE_GET.fullmatch(data):
+            return [data]
+        *lines, rest = (self._received + data).split(b"\n")
+        requests = [line + b"\n" for line in lines if line.strip()]
+        if len(rest) > LONGEST:
+            requests.append(rest[:LONGEST])
+            rest = b""
+        self._received = rest
+        return requests
+
+
+def changes(request: bytes) -> bool:
+    """Return whether a request may change something, so that a journal needs it."""
+    return not request.startswith(b"GET ")
+
+
+def answer(gripper: Gripper, request: bytes) -> bytes:
+    """Carry out a request that `Requests` has cut; return the answer."""
+    alone = not request.endswith(b"\n")
+    match request.decode("ascii", "replace").split():
+        case ["GET", "SID"]:
+            return _LIST.ljust(_LIST_BYTES) if alone else b"SID " + _LIST + b"\n"
+        case ["GET", name] if (value := gripper.read(name)) is not None:
+            digits = _DIGITS.get(name, 1)
+            return (f"{value:0{digits}d}" if alone else f"{name} {value}\n").encode()
+        case ["SET", "SCN_BLOCK", _]:  # looks for grippers no more
+            return b"ack"
+        case ["SET", "SID", slave]:
+            return b"ack" if slave in SLAVES else b""  # nobody answers for a gripper that is not there
+        case ["SET", *pairs] if pairs and len(pairs) % 2 == 0:
+            return _set(gripper, pairs)
+    return UNKNOWN
+
+
+def _set(gripper: Gripper, pairs: list[str]) -> bytes:
+    values: dict[str, int] = {}
+    for name, text in zip(pairs[::2], pairs[1::2], strict=True):
+        if not (text.isascii() and text.isdigit() and int(text) <= WRITABLE.get(name, -1)):
+            return UNKNOWN
+        values[name] = int(text)
+    gripper.write(values)
+    return b"ack"

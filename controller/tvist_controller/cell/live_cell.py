@@ -1,19 +1,19 @@
 """A cell in time: what it does in every tick."""
 
+from collections import deque
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
+import pinocchio as pin
 
-from tvist_controller.cell.bodies import joined, part_body, tool_body
-from tvist_controller.cell.description import Cell, Tool, bit_of
-from tvist_controller.cell.gripper import Gripper
-from tvist_controller.cell.urcap import PORT, answer
-from tvist_controller.cell.wires import Wires
+from tvist_controller.cell.description import Cell, Part, Tool, Wire, bit_of
+from tvist_controller.cell.gripper import PORT, Gripper, answer
 from tvist_controller.commands.events import Emit
 from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.paths.poses import Placement, placement
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.model import Floats
+from tvist_plant.model import Floats, payload_inertia
 from tvist_plant.plant import Plant
 from tvist_protocol.values import Pose
 
@@ -43,18 +43,44 @@ class Terminals(Protocol):
         """Declare the tool centre point in the flange frame."""
 
 
+class Wires:
+    """The wires of a cell, which follow after a number of ticks."""
+
+    def __init__(self, wires: Sequence[Wire]) -> None:
+        self._wires = [(bit_of(one.output), bit_of(one.input), one.ticks, one.inverted) for one in wires]
+        self._outputs: int | None = None
+        """Outputs of the last tick; None before the first."""
+        # Those of one wire are in order of time, as its delay is always the same.
+        self._under_way: list[deque[tuple[int, bool]]] = [deque() for _ in wires]
+        self._left = 0
+
+    def tick(self, tick: int, outputs: int) -> tuple[int, int]:
+        """Return which inputs change for the tick after this one, and to what, as bits: a mask and values.
+
+        Inputs change only when their wire does, so that other signals stay until then.
+        """
+        if outputs == self._outputs and not self._left:
+            return 0, 0
+        before, self._outputs = self._outputs, outputs
+        mask = values = 0
+        for (output, input_, ticks, inverted), waiting in zip(self._wires, self._under_way, strict=True):
+            on = bool(outputs & output) != inverted
+            if before is None:  # as if the outputs had been so for a long time
+                mask, values = mask | input_, values | (input_ if on else 0)
+            elif (before ^ outputs) & output:
+                waiting.append((tick + ticks, on))
+                self._left += 1
+            while waiting and waiting[0][0] <= tick + 1:
+                _, on = waiting.popleft()
+                self._left -= 1
+                mask, values = mask | input_, values & ~input_ | (input_ if on else 0)
+        return mask, values
+
+
 class LiveCell:
-    """A cell around a robot.
+    """A cell, which has been checked, around a robot.
 
-    Args:
-        cell: The cell, which has been checked.
-        description: The robot.
-        plant: Its arm; what that carries at the start is the first tool unless a test wants something else.
-        terminals: What the wires connect.
-        emit: Emits events.
-
-    Raises:
-        ValueError: Parts or tools would change what the arm carries, and the plant cannot.
+    What the plant carries at the start is the first tool unless a test wants something else.
     """
 
     def __init__(
@@ -86,11 +112,7 @@ class LiveCell:
         return self._first_load
 
     def begin(self, load: Payload) -> None:
-        """Begin as at the start.
-
-        Args:
-            load: What the arm carries, without a part.
-        """
+        """Begin as at the start, with what the arm carries without a part."""
         self._wires = Wires(self._cell.wires)
         if self.gripper is not None:
             self.gripper.begin()
@@ -109,11 +131,7 @@ class LiveCell:
         """Ticks of `TRANSFER` by which its weight has gone over to the arm."""
 
     def answer(self, request: bytes) -> bytes:
-        """Carry out a request of the gripper's protocol; see `urcap`.
-
-        Raises:
-            ValueError: There is no gripper.
-        """
+        """Carry out a request of the gripper's protocol; see `gripper`."""
         if self.gripper is None:
             raise ValueError("the cell has no gripper")
         return answer(self.gripper, request)
@@ -123,12 +141,7 @@ class LiveCell:
         return self.gripper is not None and port == PORT and address.strip().lower() in THIS_MACHINE
 
     def tick(self, tick: int, q: Floats) -> None:
-        """Follow the outputs and the arm; what the cell does counts from the next tick on.
-
-        Args:
-            tick: Number of the tick that has been computed.
-            q: Measured joint positions, shape (n,) [rad].
-        """
+        """Follow the outputs and the measured posture of a tick; what it does counts from the next on."""
         before, outputs = (self._tool, self._share), self._terminals.digital_outputs
         if self._changers:
             first = self._cell.tools[0]
@@ -142,7 +155,7 @@ class LiveCell:
         elif self._share:
             self._share -= 1
         if (self._tool, self._share) != before and self._plant.can(Plant.load):
-            self._plant.load(joined(self._load, self._part, self._share / TRANSFER))
+            self._plant.load(_joined(self._load, self._part, self._share / TRANSFER))
         mask, values = self._wires.tick(tick, outputs)
         if mask:
             self._terminals.set_digital_inputs(mask, values)
@@ -156,7 +169,7 @@ class LiveCell:
             self._put_down(q)
             self._share = 0  # it stays behind with the tool
         self._tool = tool
-        self._load = self._first_load if tool is self._cell.tools[0] else tool_body(tool)
+        self._load = self._first_load if tool is self._cell.tools[0] else _tool_body(tool)
         self._emit("text", why=f"cell: the tool {tool.name} ({tool.mass:g} kg) is on the flange")
 
     def _move_real_fingers(self, gripper: Gripper, hand: Plant) -> None:
@@ -207,7 +220,7 @@ class LiveCell:
     def _pick_up(self, number: int, q: Floats) -> None:
         part = self._cell.parts[number]
         self._grip = self._flange(q).inverse @ self._places[number]
-        self._held, self._part, self._share = number, part_body(part, self._grip), 0
+        self._held, self._part, self._share = number, _part_body(part, self._grip), 0
         self._emit("text", why=f"cell: the gripper holds {part.name} ({part.mass:g} kg)")
 
     def _put_down(self, q: Floats) -> None:
@@ -229,3 +242,28 @@ class LiveCell:
             why=f"the gripper closed on nothing: {name} lies {1e3 * distance:.1f} mm and {angle:.2f} rad from the tool "
             f"centre point; it is gripped within {1e3 * limits.tolerance:g} mm and {limits.angle_tolerance:g} rad",
         )
+
+
+def _tool_body(tool: Tool) -> Payload:
+    """Return a tool as a payload."""
+    return Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
+
+
+def _part_body(part: Part, place: Placement) -> Payload:
+    """Return a part as a payload, from the pose of its frame in that of the flange."""
+    own = Payload(mass=part.mass, com=part.cog, inertia=part.inertia)
+    return _payload(pin.SE3(place.rotation, place.position).act(payload_inertia(own)))
+
+
+def _joined(tool: Payload, part: Payload, share: float) -> Payload:
+    """Return a tool and a part as one body; the part counts with a share of its mass and inertia, 0 to 1."""
+    if share == 0.0 or part.mass == 0.0:
+        return tool
+    own = payload_inertia(part)
+    return _payload(payload_inertia(tool) + pin.Inertia(share * own.mass, own.lever, share * own.inertia))
+
+
+def _payload(inertia: pin.Inertia) -> Payload:
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.inertia.tolist()
+    x, y, z = inertia.lever.tolist()
+    return Payload(mass=float(inertia.mass), com=(x, y, z), inertia=(xx, xy, xz, yy, yz, zz))

@@ -7,8 +7,7 @@ from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.plan import Planning
 from tvist_controller.planning.snapshot import SCRIPT
-from tvist_controller.programs.compiling import ScriptCompiler
-from tvist_controller.programs.kept import Kept
+from tvist_controller.programs.compiling import Kept, ScriptCompiler
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_protocol import programs as p
 from tvist_protocol.modes import RobotMode

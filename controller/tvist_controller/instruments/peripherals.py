@@ -1,7 +1,7 @@
 """Terminals, registers and tool centre point of a robot: set by commands, and published as `Io`."""
 
-from collections.abc import Callable, Sequence
-from typing import ClassVar, Protocol, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, get_args
 
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.command_row import Call, Row
@@ -17,16 +17,16 @@ from tvist_protocol.io import (
     SetTcp,
     SimulationSetInputs,
 )
-from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
 from tvist_protocol.values import Payload
 
 CURRENT = (0.004, 0.020)
 """Range of an analogue terminal as a current [A]."""
 VOLTAGE = (0.0, 10.0)
 """Range of an analogue terminal as a voltage [V]."""
-Number = TypeVar("Number", int, float)
-LEAST, MOST = -(2**31), 2**31 - 1
+MIN_INTEGER, MAX_INTEGER = -(2**31), 2**31 - 1
 """Range of an integer register."""
+_EMPTY: dict[str, list[Any]] = {"bit": [0] * (BITS // 32), "int": [0] * NUMBERS, "double": [0.0] * NUMBERS}
+"""Registers of each kind at the start."""
 
 
 def analog_value(share: float, *, voltage: bool) -> float:
@@ -41,48 +41,23 @@ def analog_share(value: float, *, voltage: bool) -> float:
     return (value - low) / (high - low)
 
 
-class LoadedProgram(Protocol):
-    """The properties of the program that are published; see `Io`."""
-
-    name: str | None
-    state: ProgramState
-
-    @property
-    def line(self) -> int:
-        """Current line, as in `Io`."""
-
-    @property
-    def label(self) -> ProgramLabel | None:
-        """Last label, as in `Io`."""
-
-    @property
-    def interpreter(self) -> Interpreter | None:
-        """Statements for the program, as in `Io`."""
-
-    @property
-    def watched(self) -> list[str]:
-        """Input registers that the program watches, as in `Io`."""
-
-
 class Peripherals:
     """Everything connected to the control box except the arm. Initially everything is off or zero.
 
-    Args:
-        on_tcp: Called with the tool centre point when it is set.
+    The tool centre point is passed on to `on_tcp` when it is set.
     """
 
     def __init__(self, *on_tcp: Callable[[tuple[float, ...]], None]) -> None:
         self._on_tcp = on_tcp
-        self._digital_inputs = 0
-        self._digital_outputs = 0
-        self._analog_inputs = [CURRENT[0], CURRENT[0]]
-        self._analog_ratios = [0.0, 0.0]
+        self.digital_inputs = self.digital_outputs = 0
+        """Digital terminals: bits 0–7 standard, 8–15 configurable, 16–17 tool."""
+        self.analog_inputs, self.tool_analog_inputs = [CURRENT[0], CURRENT[0]], [0.0, 0.0]
+        """Analogue inputs of the control box and of the tool [A or V]."""
+        self.analog_shares = [0.0, 0.0]
+        """Analogue outputs as shares of their ranges [-]."""
         self._analog_types = 0
-        self._tool_analog_inputs = [0.0, 0.0]
-        self._bits: dict[Bank, list[int]] = {bank: [0] * (BITS // 32) for bank in ("input_bit", "output_bit")}
-        self._ints: dict[Bank, list[int]] = {bank: [0] * NUMBERS for bank in ("input_int", "output_int")}
-        self._doubles: dict[Bank, list[float]] = {
-            bank: [0.0] * NUMBERS for bank in ("input_double", "output_double")
+        self._registers: dict[Bank, list[Any]] = {
+            bank: list(_EMPTY[bank.partition("_")[2]]) for bank in get_args(Bank)
         }
         self._written: dict[tuple[Bank, int], int] = {}
         self._tool_voltage = 0
@@ -98,27 +73,33 @@ class Peripherals:
 
     def set_outputs(self, command: SetIo) -> None:
         """Set the outputs that the masks select."""
-        self.changed = True
-        mask = command.digital_output_mask
-        self._digital_outputs = self._digital_outputs & ~mask | command.digital_outputs & mask
+        self.set_digital_outputs(command.digital_output_mask, command.digital_outputs)
         for number, ratio in enumerate((command.standard_analog_output_0, command.standard_analog_output_1)):
             if command.standard_analog_output_mask >> number & 1:
-                self._analog_ratios[number] = ratio
+                self.set_analog_output(number, ratio)
                 self.choose_output(number, voltage=bool(command.standard_analog_output_type >> number & 1))
+
+    def set_digital_outputs(self, mask: int, values: int) -> None:
+        """Set the digital outputs that the mask selects."""
+        self.digital_outputs, self.changed = self.digital_outputs & ~mask | values & mask, True
+
+    def set_analog_output(self, number: int, share: float) -> None:
+        """Set an analogue output to a share of its range; it stays a voltage or a current."""
+        self.analog_shares[number], self.changed = share, True
 
     def set_digital_inputs(self, mask: int, values: int) -> None:
         """Apply signals to the digital inputs that the mask selects."""
-        self._digital_inputs, self.changed = self._digital_inputs & ~mask | values & mask, True
+        self.digital_inputs, self.changed = self.digital_inputs & ~mask | values & mask, True
 
     def set_inputs(self, command: SimulationSetInputs) -> None:
         """Apply signals to inputs."""
         self.set_digital_inputs(command.digital_input_mask, command.digital_inputs)
         if command.standard_analog_input is not None:
-            self._analog_inputs = list(command.standard_analog_input)
+            self.analog_inputs = list(command.standard_analog_input)
         if command.analog_input_types is not None:
             self._analog_types = self._analog_types & ~0b11 | command.analog_input_types
         if command.tool_analog_input is not None:
-            self._tool_analog_inputs = list(command.tool_analog_input)
+            self.tool_analog_inputs = list(command.tool_analog_input)
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
@@ -127,30 +108,6 @@ class Peripherals:
             tell(offset)
 
     # ------------------------------------------------------------------ for programs
-
-    @property
-    def digital_inputs(self) -> int:
-        """Bits of the digital inputs: 0–7 standard, 8–15 configurable, 16–17 tool."""
-        return self._digital_inputs
-
-    @property
-    def digital_outputs(self) -> int:
-        """Bits of the digital outputs, as those of the inputs."""
-        return self._digital_outputs
-
-    @property
-    def analog_inputs(self) -> Sequence[float]:
-        """Analogue inputs of the control box [A or V]."""
-        return self._analog_inputs
-
-    @property
-    def tool_analog_inputs(self) -> Sequence[float]:
-        """Analogue inputs of the tool [V]."""
-        return self._tool_analog_inputs
-
-    def analog_ratio(self, number: int) -> float:
-        """Share of its range that an analogue output has [-]."""
-        return self._analog_ratios[number]
 
     def output_is_voltage(self, number: int) -> bool:
         """Return whether an analogue output is a voltage rather than a current."""
@@ -191,32 +148,26 @@ class Peripherals:
 
     def bit(self, bank: Bank, place: int) -> bool:
         """Return a bit register."""
-        return bool(self._bits[bank][place // 32] >> place % 32 & 1)
+        return bool(self._registers[bank][place // 32] >> place % 32 & 1)
 
     def integers(self, bank: Bank) -> Sequence[int]:
         """Return the integer registers of a bank."""
-        return self._ints[bank]
+        return self._registers[bank]
 
     def doubles(self, bank: Bank) -> Sequence[float]:
         """Return the double registers of a bank."""
-        return self._doubles[bank]
+        return self._registers[bank]
 
     def write(self, bank: Bank, place: int, value: Register) -> None:
         """Write a register whose place and value are known to be valid."""
-        if bank in self._bits:
-            word, mask = place // 32, 1 << place % 32
-            before = self._bits[bank][word]
-            self._bits[bank][word] = after = before | mask if value else before & ~mask
-            self.changed |= after != before
-            return
-        if bank in self._ints:
-            integers, integer = self._ints[bank], int(value)
-            self.changed |= integers[place] != integer
-            integers[place] = integer
+        values = self._registers[bank]
+        if bank.endswith("bit"):
+            place, mask = place // 32, 1 << place % 32
+            value = values[place] | mask if value else values[place] & ~mask
         else:
-            doubles = self._doubles[bank]
-            self.changed |= doubles[place] != value
-            doubles[place] = float(value)
+            value = int(value) if bank.endswith("int") else float(value)
+        self.changed |= values[place] != value
+        values[place] = value
 
     def written(self, bank: Bank, place: int) -> int:
         """Return the first control period after a client last wrote a register; 0 if none ever did."""
@@ -237,72 +188,47 @@ class Peripherals:
                 self._written[run.bank, place] = call.tick
 
     def set_registers(self, command: SetRegisters) -> None:
-        """Write registers: all of them, or none.
-
-        Raises:
-            RefusalError: A register does not exist, or a value is invalid for its bank.
-        """
-        bits, ints, doubles = dict(self._bits), dict(self._ints), dict(self._doubles)
+        """Write registers: all of them, or none."""
         runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
         for run in runs:
-            bank, first, values = run.bank, run.first, run.values
-            there = BITS if bank in bits else NUMBERS
-            if first + len(values) > there:
-                why = f"first is {first} with {len(values)} values; {bank} has {there} registers"
+            there = BITS if run.bank.endswith("bit") else NUMBERS
+            if run.first + len(run.values) > there:
+                why = f"first is {run.first} with {len(run.values)} values; {run.bank} has {there} registers"
                 raise RefusalError("out_of_range", "values", why, there)
-            if bank in bits:
-                bits[bank] = _with_bits(bits[bank], first, values, bank)
-            elif bank in ints:
-                ints[bank] = _with(
-                    ints[bank], first, [_integer(k, one, bank) for k, one in enumerate(values)]
-                )
-            else:
-                numbers = [_double(k, one, bank) for k, one in enumerate(values)]
-                doubles[bank] = _with(doubles[bank], first, numbers)
-        self._bits, self._ints, self._doubles = bits, ints, doubles
+            for k, value in enumerate(run.values):
+                _check(k, value, run.bank)
+        for run in runs:
+            for place, value in enumerate(run.values, run.first):
+                self.write(run.bank, place, value)
 
     def io(
         self,
         tick: int,
         payload: Payload,
         speed: float,
-        program: LoadedProgram,
+        program: Mapping[str, Any],
         wrench: list[float] | None,
         assumed: Payload | None = None,
     ) -> Io:
-        """Return the message that publishes all this.
-
-        Args:
-            tick: First control period for which the values hold.
-            payload: Declared payload.
-            speed: The speed slider [-].
-            program: Loaded program.
-            wrench: Wrench at the tool centre point in the last tick, base frame [N, N m]; None to leave it out.
-            assumed: Payload that is assumed instead of the declared one; None if that is.
-        """
+        """Return the message that publishes all this, with the fields of the loaded program and the rest."""
         return Io(
             tick=tick,
-            actual_digital_input_bits=self._digital_inputs,
-            actual_digital_output_bits=self._digital_outputs,
-            standard_analog_input=list(self._analog_inputs),
+            actual_digital_input_bits=self.digital_inputs,
+            actual_digital_output_bits=self.digital_outputs,
+            standard_analog_input=list(self.analog_inputs),
             standard_analog_output=[self._analog_output(number) for number in range(2)],
             analog_io_types=self._analog_types,
-            tool_analog_input=list(self._tool_analog_inputs),
-            input_bit_register=list(self._bits["input_bit"]),
-            input_int_register=list(self._ints["input_int"]),
-            input_double_register=list(self._doubles["input_double"]),
-            output_bit_register=list(self._bits["output_bit"]),
-            output_int_register=list(self._ints["output_int"]),
-            output_double_register=list(self._doubles["output_double"]),
+            tool_analog_input=list(self.tool_analog_inputs),
+            input_bit_register=list(self._registers["input_bit"]),
+            input_int_register=list(self._registers["input_int"]),
+            input_double_register=list(self._registers["input_double"]),
+            output_bit_register=list(self._registers["output_bit"]),
+            output_int_register=list(self._registers["output_int"]),
+            output_double_register=list(self._registers["output_double"]),
             tcp_offset=list(self.tcp_offset),
             payload=self._payload_at(tick, payload),
             target_speed_fraction=speed,
-            program=program.name,
-            program_state=program.state,
-            program_line=program.line,
-            program_label=program.label,
-            interpreter=program.interpreter,
-            watched=program.watched,
+            **program,
             tool_output_voltage=self._tool_voltage,
             tool_analog_input_types=self._tool_types,
             tool_output_mode=self._tool_output_mode,
@@ -329,7 +255,7 @@ class Peripherals:
         return Payload(mass=mass, com=(x, y, z), inertia=(xx, xy, xz, yy, yz, zz))
 
     def _analog_output(self, number: int) -> float:
-        return analog_value(self._analog_ratios[number], voltage=self.output_is_voltage(number))
+        return analog_value(self.analog_shares[number], voltage=self.output_is_voltage(number))
 
     rows: ClassVar[tuple[Row, ...]] = (
         Row(SetIo, lambda self, call: self.set_outputs(call.command), changes_io=True),
@@ -339,33 +265,15 @@ class Peripherals:
     )
 
 
-def _with(values: list[Number], first: int, new: list[Number]) -> list[Number]:
-    return values[:first] + new + values[first + len(new) :]
-
-
-def _with_bits(words: list[int], first: int, values: Sequence[Register], bank: Bank) -> list[int]:
-    new = list(words)
-    for k, value in enumerate(values):
-        if not isinstance(value, bool):
-            raise _wrong(k, value, bank, "true or false")
-        word, bit = divmod(first + k, 32)
-        new[word] = new[word] & ~(1 << bit) | value << bit
-    return new
-
-
-def _integer(k: int, value: Register, bank: Bank) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not LEAST <= value <= MOST:
-        raise _wrong(k, value, bank, f"an integer from {LEAST} to {MOST}")
-    return value
-
-
-def _double(k: int, value: Register, bank: Bank) -> float:
-    if isinstance(value, bool):
-        raise _wrong(k, value, bank, "a number")
-    return float(value)
-
-
-def _wrong(k: int, value: Register, bank: Bank, wanted: str) -> RefusalError:
-    return RefusalError(
-        "out_of_range", f"values[{k}]", f"values[{k}] is {value}; {bank} registers take {wanted}"
-    )
+def _check(k: int, value: Register, bank: Bank) -> None:
+    """Refuse a value that is invalid for its bank."""
+    if bank.endswith("bit"):
+        fits, wanted = isinstance(value, bool), "true or false"
+    elif bank.endswith("int"):
+        fits = not isinstance(value, bool | float) and MIN_INTEGER <= value <= MAX_INTEGER
+        wanted = f"an integer from {MIN_INTEGER} to {MAX_INTEGER}"
+    else:
+        fits, wanted = not isinstance(value, bool), "a number"
+    if not fits:
+        why = f"values[{k}] is {value}; {bank} registers take {wanted}"
+        raise RefusalError("out_of_range", f"values[{k}]", why)

@@ -1,34 +1,27 @@
 """One tick of a robot as UR's interfaces report it, under RTDE's names."""
 
-from tvist_controller.instruments.joints import JointValues
-from tvist_controller.instruments.meters import Meters
-from tvist_controller.instruments.ratings import joint_ratings
-from tvist_controller.instruments.reading import POWERED, Reading
+from tvist_controller.instruments.motors import Meters, joint_ratings
+from tvist_controller.instruments.reading import POWERED, Reading, computed_once
 from tvist_controller.instruments.rigid_body import RigidBody
-from tvist_controller.instruments.status import StatusValues
-from tvist_controller.instruments.terminals import TerminalValues
-from tvist_controller.instruments.tool import ToolValues
-from tvist_controller.instruments.variables import variables
+from tvist_controller.instruments.variables import READERS
 from tvist_controller.instruments.wrench import RUNNING, ToolWrench
 from tvist_plant.description import RobotDescription
 from tvist_protocol.io import Io
 from tvist_protocol.stream import State
 
 
-class Snapshot(StatusValues, JointValues, ToolValues, TerminalValues):
-    """Every output variable of RTDE is an attribute; expensive ones are computed on first access."""
+class Snapshot(Reading):
+    """Variables and registers are attributes by RTDE's names, such as `actual_q` or `input_int_register_7`."""
 
 
-VARIABLES = variables(Reading, *Snapshot.__bases__)
-"""RTDE's word for the type of each output variable that is no register, by name."""
+for _name, _read in READERS.items():
+    _once = computed_once(_read)
+    _once.__set_name__(Snapshot, _name)
+    setattr(Snapshot, _name, _once)
 
 
 class Instruments:
-    """Reads a robot's values tick by tick; if ticks are skipped, temperatures and energies are less accurate.
-
-    Args:
-        description: The robot.
-    """
+    """Reads a robot's values tick by tick; if ticks are skipped, temperatures and energies are less accurate."""
 
     def __init__(self, description: RobotDescription) -> None:
         self._rigid, self._wrench = RigidBody(description), ToolWrench(description)
@@ -38,23 +31,14 @@ class Instruments:
         self._meters = Meters(self._ratings)
 
     def snapshot(self, state: State, io: Io) -> Snapshot:
-        """Return the values of a tick.
-
-        Args:
-            state: State of the tick.
-            io: Terminals and registers at that tick.
-        """
+        """Return the values of a tick, from its state and the terminals and registers at that tick."""
         current = self.follow(state.tick, state.robot_mode, state.actual_moment, state.actual_qd)
         return Snapshot(state, io, self._rigid, self._wrench, self._ratings, current, self._meters)
 
     def follow(self, tick: int, mode: int, moment: list[float], velocity: list[float]) -> list[float]:
         """Let temperatures and energies go on to a tick whose other values nobody reads; return the currents [A].
 
-        Args:
-            tick: Number of the control period; once for each period is enough.
-            mode: Robot mode.
-            moment: Measured torques [N m].
-            velocity: Measured velocities [rad/s].
+        Once for each control period is enough. Torques [N m] and velocities [rad/s] are measured.
         """
         current, mechanical = self._idle, 0.0
         if mode == RUNNING:

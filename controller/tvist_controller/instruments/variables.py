@@ -1,47 +1,394 @@
-"""Types of the values, by RTDE's words for them: a property that returns one of these is an output variable of RTDE."""
+"""RTDE's output variables, as rows: name, type, source, meaning, and what reads it from a tick."""
 
-from collections.abc import Callable
-from typing import Annotated, Any, Generic, Self, TypeAlias, TypeVar, get_origin, overload
+from collections.abc import Callable, Iterator
+from math import sqrt
+from operator import attrgetter
+from typing import Any, Final, Literal, NamedTuple
 
-T = TypeVar("T")
+import numpy as np
 
-Double: TypeAlias = Annotated[float, "DOUBLE"]
-Vector3D: TypeAlias = Annotated[list[float], "VECTOR3D"]
-Vector6D: TypeAlias = Annotated[list[float], "VECTOR6D"]
-Vector6Int32: TypeAlias = Annotated[list[int], "VECTOR6INT32"]
-Int32: TypeAlias = Annotated[int, "INT32"]
-Uint8: TypeAlias = Annotated[int, "UINT8"]
-Uint32: TypeAlias = Annotated[int, "UINT32"]
-Uint64: TypeAlias = Annotated[int, "UINT64"]
+from tvist_controller.instruments.force_sensor import at_tool, without_weight
+from tvist_controller.instruments.joint_lists import ACTUAL_Q, ACTUAL_QD, SHAPED, UNSHAPED
+from tvist_controller.instruments.motors import BUS_VOLTAGE
+from tvist_controller.instruments.reading import Reading
+from tvist_controller.instruments.rigid_body import add, carried, cross
+from tvist_controller.instruments.wrench import since_zeroed
+from tvist_plant.plant import GRAVITY
+from tvist_protocol.io import BITS, NUMBERS
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+
+START: Final = 40.0
+"""Time of tick 0 on UR's interfaces [s]; a smaller time makes clients believe that the robot is still booting."""
+JOINT_MODES: dict[int, int] = {RobotMode.RUNNING: 253, RobotMode.POWER_OFF: 239, RobotMode.BACKDRIVE: 238}
+"""RTDE's joint mode for each robot mode; in all others the joints idle."""
+JOINT_IDLE: Final = 255
+CONFIGURABLE: Final = 0xFF00
+"""Bits 8–15, the configurable terminals."""
+DEVIATION: Final = 0.05
+"""Difference between measured and shaped angle that counts as 1 [rad]."""
+_STOPPED, _EMERGENCY = 1 << 10, 1 << 7
+SAFETY_BITS: dict[int, int] = {
+    SafetyMode.NORMAL: 1 << 0,
+    SafetyMode.REDUCED: 1 << 1,
+    SafetyMode.PROTECTIVE_STOP: 1 << 2 | _STOPPED,
+    SafetyMode.RECOVERY: 1 << 3,
+    SafetyMode.SAFEGUARD_STOP: 1 << 4 | _STOPPED,
+    SafetyMode.SYSTEM_EMERGENCY_STOP: 1 << 5 | _EMERGENCY | _STOPPED,
+    SafetyMode.ROBOT_EMERGENCY_STOP: 1 << 6 | _EMERGENCY | _STOPPED,
+    SafetyMode.VIOLATION: 1 << 8 | _STOPPED,
+    SafetyMode.FAULT: 1 << 9 | _STOPPED,
+}
+"""Bits of `safety_status_bits` for each safety mode."""
+_RUNNING: set[int] = {
+    RuntimeState.STOPPING, RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESUMING,
+}  # fmt: skip
+
+Read = Callable[[Reading], Any]
 
 
-def variables(*values: type) -> dict[str, str]:
-    """Return RTDE's word for the type of each output variable, by name, in the order of classes and their properties.
+class Variable(NamedTuple):
+    """An output variable of RTDE that is no register."""
 
-    Args:
-        values: The classes whose own properties are looked at.
-    """
-    found: dict[str, str] = {}
-    for name, value in (item for each in values for item in vars(each).items()):
-        read = getattr(value, "fget", None) or getattr(value, "func", None)  # of a property, or a cached one
-        returned: Any = getattr(read, "__annotations__", {}).get("return")
-        if get_origin(returned) is Annotated:
-            found[name] = returned.__metadata__[0]
-    return found
+    name: str
+    type: str
+    """RTDE's word."""
+    source: Literal["state", "io", "computed", "constant"]
+    """State and io: the message contains it; RTDE reads one with `io` only when `Io` changes. Computed: from both.
+    Constant: it stands for something that is not simulated."""
+    what: str
+    """What it is, for the page of reference."""
+    read: Read
 
 
-class computed_once(Generic[T]):  # noqa: N801  it stands for a property
-    """A property that is computed when it is first read; `cached_property` of Python 3.11 takes a lock as well."""
+def _state(name: str, type_: str, what: str, read: Read | None = None) -> Variable:
+    return Variable(name, type_, "state", what, read or attrgetter(f"state.{name}"))
 
-    def __init__(self, func: Callable[[Any], T]) -> None:
-        self.func, self.__doc__ = func, func.__doc__
 
-    @overload
-    def __get__(self, of: None, owner: type) -> Self: ...
-    @overload
-    def __get__(self, of: object, owner: type) -> T: ...
-    def __get__(self, of: object | None, owner: type) -> Self | T:
-        if of is None:
-            return self
-        value = of.__dict__[self.func.__name__] = self.func(of)
-        return value
+def _io(name: str, type_: str, what: str, read: Read | None = None) -> Variable:
+    return Variable(name, type_, "io", what, read or attrgetter(f"io.{name}"))
+
+
+def _computed(name: str, type_: str, what: str, read: Read) -> Variable:
+    return Variable(name, type_, "computed", what, read)
+
+
+def _constant(name: str, type_: str, what: str, value: object = 0) -> Variable:
+    return Variable(name, type_, "constant", what, lambda _: value)
+
+
+# ---------------------------------------------------------------------- what takes more than an expression
+
+
+def _runtime_state(r: Reading) -> int:
+    moving = r.state.runtime_state
+    match r.io.program_state:
+        case "PLAYING":
+            return RuntimeState.PLAYING
+        case "PAUSED" if moving in {RuntimeState.STOPPING, RuntimeState.PAUSING}:
+            return RuntimeState.PAUSING
+        case "PAUSED":
+            return RuntimeState.PAUSED
+    return moving
+
+
+def _speed_scaling(r: Reading) -> float:
+    slider = r.io.target_speed_fraction
+    if r.io.program_state == "PAUSED" or slider <= 0.0:
+        return 0.0
+    return min(r.state.speed_scaling / slider, 1.0)
+
+
+def _target_moment(r: Reading) -> list[float]:
+    moment = r.state.target_moment
+    if r.state.unshaped_q is None:
+        return moment
+    unshaped = r.rigid.moment(r.motion[UNSHAPED], r.io.payload)
+    shaped = r.rigid.moment(r.motion[SHAPED], r.io.payload)
+    return [m + (u - s) for m, u, s in zip(moment, unshaped, shaped, strict=True)]
+
+
+def _target_current(r: Reading) -> list[float]:
+    if not r.driven:
+        return [0.0] * len(r.ratings)
+    return [m / rating.torque_constant for m, rating in zip(r.target_moment, r.ratings, strict=True)]
+
+
+def _deviation(r: Reading) -> float:
+    return max(abs(a - t) for a, t in zip(r.state.actual_q, r.state.target_q, strict=True)) / DEVIATION
+
+
+def _tool_acceleration(r: Reading) -> list[float]:
+    linear: list[float] = (r.rotation @ np.array(r.state.actual_tool_accelerometer)).tolist()
+    linear[2] -= GRAVITY
+    alpha: list[float] = r.shaped[15:].tolist()
+    offset = r.io.tcp_offset
+    if any(offset[:3]):
+        arm: list[float] = (r.rotation @ np.array(offset[:3])).tolist()
+        linear = add(linear, carried(r.state.actual_TCP_speed[3:], alpha, arm))
+    return linear + alpha
+
+
+def _tool_force(r: Reading) -> list[float]:
+    raw, zero = r.state.flange_wrench, r.io.tcp_force_zero
+    if raw is None:
+        return since_zeroed(r.estimate[:6].tolist(), zero)
+    felt = without_weight(np.array(raw), r.rotation, r.io.payload)
+    sensed: list[float] = at_tool(felt if zero is None else felt - zero, r.rotation, r.io.tcp_offset).tolist()
+    return sensed
+
+
+def _force_from_currents(r: Reading) -> list[float]:
+    force: list[float] = r.estimate[:6].tolist()
+    return force if r.state.flange_wrench is not None else since_zeroed(force, r.io.tcp_force_zero)
+
+
+def _raw_wrench(r: Reading) -> list[float]:
+    if r.state.flange_wrench is not None:
+        return r.state.flange_wrench
+    payload, force = r.io.payload, r.estimate
+    carries = [-payload.mass * felt for felt in r.state.actual_tool_accelerometer]
+    pushes: list[float] = (force[:3] @ r.rotation).tolist()
+    turns: list[float] = (force[3:6] @ r.rotation).tolist()
+    torque = add(turns, add(cross(payload.com, carries), cross(r.io.tcp_offset, pushes)))
+    return add(carries, pushes) + torque
+
+
+def _collision_ratio(r: Reading) -> float:
+    felt: list[float] = r.estimate[6:].tolist()
+    return max(abs(torque) / rating.torque for torque, rating in zip(felt, r.ratings, strict=True))
+
+
+def _length(vector: list[float]) -> float:
+    x, y, z, *_ = vector
+    return sqrt(x * x + y * y + z * z)
+
+
+def _payload_inertia(r: Reading) -> list[float]:
+    xx, xy, xz, yy, yz, zz = r.io.payload.inertia
+    return [xx, yy, zz, xy, xz, yz]
+
+
+def _joint_mode(r: Reading) -> int:
+    return JOINT_MODES.get(r.state.robot_mode, JOINT_IDLE)
+
+
+# ---------------------------------------------------------------------- the rows
+# fmt: off
+
+_ROWS = (
+    _state("target_q", "VECTOR6D",
+           "reference before shaping, which is what the program or the client asks for [rad].",
+           lambda r: r.state.target_q if r.state.unshaped_q is None else r.state.unshaped_q),
+    _state("target_qd", "VECTOR6D", "velocity of the reference before shaping [rad/s].",
+           lambda r: r.state.target_qd if r.state.unshaped_qd is None else r.state.unshaped_qd),
+    _state("target_qdd", "VECTOR6D", "acceleration of the reference before shaping [rad/s²].",
+           lambda r: r.state.target_qdd if r.state.unshaped_qdd is None else r.state.unshaped_qdd),
+
+    # Time, modes and the controller's own figures.
+    _state("timestamp", "DOUBLE", "tick time plus 40 s, for clients that wait until a robot has booted [s].",
+           lambda r: START + r.state.timestamp),
+    _state("control_step", "UINT64", "number of the control period.", lambda r: r.state.tick),
+    _constant("actual_execution_time", "DOUBLE",
+              "0; telemetry has the duration of a tick, which differs between equal runs [ms].", 0.0),
+    _constant("target_execution_time", "DOUBLE", "2, the control period [ms].", 2.0),
+    _state("robot_mode", "INT32", "RTDE's number; 3 is POWER_OFF, 5 IDLE, 7 RUNNING."),
+    _computed("joint_mode", "VECTOR6INT32",
+              "from the robot's mode; 253 is running, 239 power off, 238 backdrive, 255 idle.",
+              lambda r: [_joint_mode(r)] * len(r.state.target_q)),
+    _state("safety_mode", "INT32",
+           "RTDE's number; 1 is NORMAL, 2 REDUCED, 3 PROTECTIVE_STOP, 5 to 9 stops of the safety system."),
+    _state("safety_status", "INT32", "the safety mode again; the additional numbers of RTDE do not occur.",
+           lambda r: r.state.safety_mode),
+    _computed("runtime_state", "UINT32",
+              "that of the program; of the motion if no program runs; 1 is STOPPED, 2 PLAYING, 4 PAUSED. "
+              "A paused program whose arm still moves is PAUSING, 3.", _runtime_state),
+    _computed("robot_status_bits", "UINT32",
+              "from the modes; bit 0 is power on, bit 1 running; bits 2 and 3, of two buttons, are 0.",
+              lambda r: int(r.powered) | (r.runtime_state in _RUNNING) << 1),
+    _computed("safety_status_bits", "UINT32",
+              "from the safety mode, which has a bit of its own; stops also set bit 10, emergency stops bit 7.",
+              lambda r: SAFETY_BITS.get(r.state.safety_mode, 0)),
+    _computed("speed_scaling", "DOUBLE",
+              "what limits the speed besides the slider, as reduced mode does [-]; 0 while a program is paused.",
+              _speed_scaling),
+    _io("target_speed_fraction", "DOUBLE", "the speed slider [-]."),
+    _constant("time_scale_source", "INT32", "0; the cause of a slower motion is not distinguished."),
+    _io("script_control_line", "UINT32",
+        "line of the program, counted from 1; 0 if no program runs. It is up to date to a tenth of a second.",
+        lambda r: r.io.program_line),
+    _constant("actual_main_voltage", "DOUBLE", "48, the safety board's supply [V].", BUS_VOLTAGE),
+    Variable("actual_robot_voltage", "DOUBLE", "constant", "48 while the arm has power, else 0 [V].",
+             lambda r: BUS_VOLTAGE if r.powered else 0.0),
+    _computed("actual_robot_current", "DOUBLE",
+              "power over voltage; power is 5 W per joint, the motors' heat and their mechanical power [A].",
+              lambda r: r.power / BUS_VOLTAGE),
+    _computed("actual_robot_energy_consumed", "DOUBLE",
+              "integral of the power that the robot consumes, since the first tick [J].",
+              attrgetter("consumed")),
+    _computed("actual_robot_braking_energy_dissipated", "DOUBLE",
+              "integral of the braking power that exceeds the motors' heat, since the first tick [J].",
+              attrgetter("dissipated")),
+
+    # Motion, torque and electricity of the joints.
+    _state("shaped_q", "VECTOR6D",
+           "reference after shaping, which the drives follow; a variable that only TVIST has [rad].",
+           lambda r: r.state.target_q),
+    _state("shaped_qd", "VECTOR6D",
+           "velocity of the reference after shaping; a variable that only TVIST has [rad/s].",
+           lambda r: r.state.target_qd),
+    _state("shaped_qdd", "VECTOR6D",
+           "acceleration of the reference after shaping; a variable that only TVIST has [rad/s²].",
+           lambda r: r.state.target_qdd),
+    _computed("target_moment", "VECTOR6D",
+              "torque that the rigid model with the declared payload needs for the target motion [N m]. It is "
+              "that of the state, which belongs to the shaped reference, plus the difference between the two "
+              "references.",
+              _target_moment),
+    _computed("target_current", "VECTOR6D",
+              "target torque over torque constant; zero while the brakes hold the arm [A].", _target_current),
+    _state("actual_q", "VECTOR6D", "measured angle, on the link's side of the gear [rad]."),
+    _state("actual_qd", "VECTOR6D", "measured velocity [rad/s]."),
+    _computed("actual_current", "VECTOR6D",
+              "measured torque over torque constant; zero while the brakes hold the arm [A].",
+              attrgetter("current")),
+    Variable("actual_current_window", "VECTOR6D", "constant",
+             "allowed difference of the two currents, from a tenth of the joint's largest torque [A].",
+             lambda r: [rating.window for rating in r.ratings]),
+    _state("actual_current_as_torque", "VECTOR6D",
+           "measured torque; zero while the brakes hold the arm [N m].",
+           lambda r: r.state.actual_moment if r.driven else [0.0] * len(r.ratings)),
+    _computed("joint_control_output", "VECTOR6D",
+              "the measured currents, since a simulated motor has the current that its drive asks for [A].",
+              attrgetter("current")),
+    Variable("actual_joint_voltage", "VECTOR6D", "constant", "48 while the arm has power, else 0 [V].",
+             lambda r: [BUS_VOLTAGE if r.powered else 0.0] * len(r.ratings)),
+    _computed("joint_temperatures", "VECTOR6D",
+              "one body per joint in air of 25 °C, heated by its electronics and R i² in about 20 minutes [°C].",
+              attrgetter("temperatures")),
+    _computed("joint_position_deviation_ratio", "DOUBLE",
+              "largest difference of measured and shaped angle, divided by 0.05 rad [-].", _deviation),
+
+    # Motion and forces of tool and payload, in the base frame unless stated otherwise.
+    _io("tcp_offset", "VECTOR6D", "tool centre point in the flange frame [m, rad]."),
+    _state("actual_TCP_pose", "VECTOR6D", "kinematics of the measured angles with the TCP offset [m, rad]."),
+    _state("actual_TCP_speed", "VECTOR6D",
+           "kinematics of measured angles and velocities with the TCP offset [m/s, rad/s]."),
+    _state("actual_tool_accelerometer", "VECTOR3D",
+           "specific force in the flange frame; at rest it points up with 9.81 [m/s²]."),
+    _computed("target_TCP_pose", "VECTOR6D", "kinematics of the target angles with the TCP offset [m, rad].",
+              lambda r: r.target[:6].tolist()),
+    _computed("target_TCP_speed", "VECTOR6D",
+              "kinematics of target angles and velocities with the TCP offset [m/s, rad/s].",
+              lambda r: r.target[6:12].tolist()),
+    _computed("target_TCP_acceleration", "VECTOR6D",
+              "kinematics of target angles, velocities and accelerations with the TCP offset [m/s², rad/s²].",
+              lambda r: r.target[12:].tolist()),
+    _computed("actual_TCP_acceleration", "VECTOR6D",
+              "the accelerometer's value without gravity, in the base frame and at the TCP [m/s², rad/s²]. "
+              "The angular acceleration is that of the shaped reference, since no sensor measures it.",
+              _tool_acceleration),
+    _computed("actual_TCP_force", "VECTOR6D",
+              "force at the TCP by the sensor in the flange, without the declared payload's weight [N, N m]. "
+              "Without a sensor, it is the force that explains the measured torques, through the Jacobian. "
+              "The torque that the shaped motion needs (rigid arm with the declared payload, rotors, friction) is "
+              "subtracted first. Near a singularity part of the force cannot be measured and is left out. It is "
+              "zero while the arm is braked. "
+              "In either case, the force that a program has taken as zero is subtracted last.", _tool_force),
+    _computed("tcp_force_scalar", "DOUBLE", "length of the TCP force's linear part [N].",
+              lambda r: _length(r.actual_TCP_force)),
+    _computed("wrench_calc_from_currents", "VECTOR6D",
+              "force at the TCP that explains the measured torques; see `actual_TCP_force` [N, N m].",
+              _force_from_currents),
+    _computed("ft_raw_wrench", "VECTOR6D",
+              "wrench that the sensor between flange and payload measures, in the flange frame [N, N m]. "
+              "Without a sensor, it is the weight and inertial force of the declared payload, from the "
+              "accelerometer and without the effect of rotation, plus the TCP force.", _raw_wrench),
+    _computed("collision_detection_ratio", "DOUBLE",
+              "largest share of a joint's torque limit by which measured torque differs from expected [-].",
+              _collision_ratio),
+    _computed("actual_momentum", "DOUBLE",
+              "length of the linear momentum of links and declared payload, as measured [kg m/s].",
+              lambda r: r.rigid.momentum(r.motion[ACTUAL_Q], r.motion[ACTUAL_QD], r.io.payload)),
+    _computed("elbow_position", "VECTOR3D",
+              "measured position where upper arm and forearm meet on the elbow's axis [m]. "
+              "For an arm with fewer than three joints, it is the flange.", lambda r: r.elbow[0]),
+    _computed("elbow_velocity", "VECTOR3D", "velocity of the elbow's position [m/s].", lambda r: r.elbow[1]),
+    _io("payload", "DOUBLE", "declared mass [kg].", lambda r: r.io.payload.mass),
+    _io("payload_cog", "VECTOR3D", "declared centre of mass in the flange frame [m].",
+        lambda r: list(r.io.payload.com)),
+    _io("payload_inertia", "VECTOR6D",
+        "declared inertia about the centre of mass: xx yy zz xy xz yz [kg m²].",
+        _payload_inertia),
+    _constant("target_gravity", "VECTOR3D",
+              "0 0 9.81, the acceleration that is equivalent to gravity, for a robot on the floor [m/s²].",
+              [0.0, 0.0, GRAVITY]),
+    _constant("target_base_acceleration", "VECTOR6D", "zero; the base stands [m/s², rad/s²].", [0.0] * 6),
+    _computed("target_base_wrench", "VECTOR6D",
+              "force and torque at the base of the arm with the declared payload, for the target motion "
+              "[N, N m]. The weight of the base itself is not included.",
+              lambda r: r.rigid.base_wrench(r.motion[UNSHAPED], r.io.payload)),
+
+    # Inputs and outputs, at the controller and in the tool.
+    _io("actual_digital_input_bits", "UINT64",
+        "digital inputs; bits 0–7 standard, 8–15 configurable, 16–17 tool."),
+    _io("actual_digital_output_bits", "UINT64", "digital outputs, with the same bits."),
+    _io("actual_configurable_digital_input_bits", "UINT64", "bits 8–15 of the digital inputs, not shifted.",
+        lambda r: r.io.actual_digital_input_bits & CONFIGURABLE),
+    _io("actual_configurable_digital_output_bits", "UINT64", "bits 8–15 of the digital outputs, not shifted.",
+        lambda r: r.io.actual_digital_output_bits & CONFIGURABLE),
+    _io("analog_io_types", "UINT32", "bits 0–1 analogue inputs, 2–3 outputs; 0 is current, 1 voltage."),
+    _io("standard_analog_input0", "DOUBLE", "analogue input 0 [A or V].",
+        lambda r: r.io.standard_analog_input[0]),
+    _io("standard_analog_input1", "DOUBLE", "analogue input 1 [A or V].",
+        lambda r: r.io.standard_analog_input[1]),
+    _io("standard_analog_output0", "DOUBLE", "analogue output 0 [A or V].",
+        lambda r: r.io.standard_analog_output[0]),
+    _io("standard_analog_output1", "DOUBLE", "analogue output 1 [A or V].",
+        lambda r: r.io.standard_analog_output[1]),
+    _constant("io_current", "DOUBLE", "0; nothing draws current from the terminals [mA].", 0.0),
+    _computed("tool_mode", "UINT32", "from the robot's mode, with the numbers of `joint_mode`.", _joint_mode),
+    _io("tool_analog_input_types", "UINT32",
+        "types of the tool's analogue inputs, bits 0–1; 0 is current, 1 voltage."),
+    _io("tool_analog_input0", "DOUBLE", "analogue input 0 of the tool [A or V].",
+        lambda r: r.io.tool_analog_input[0]),
+    _io("tool_analog_input1", "DOUBLE", "analogue input 1 of the tool [A or V].",
+        lambda r: r.io.tool_analog_input[1]),
+    _io("tool_output_voltage", "INT32", "voltage of the tool's supply; 0 if it is off [V]."),
+    _constant("tool_output_current", "DOUBLE", "0; nothing draws current from it [mA].", 0.0),
+    _computed("tool_temperature", "DOUBLE",
+              "temperature of the last joint, which holds the tool's electronics [°C].",
+              lambda r: r.temperatures[-1]),
+    _io("tool_output_mode", "UINT8", "0, the tool's outputs are digital ones; 1, they are a second supply."),
+    _io("tool_digital_output0_mode", "UINT8", "1, the output sinks; 2, it sources; 3, both."),
+    _io("tool_digital_output1_mode", "UINT8", "1, the output sinks; 2, it sources; 3, both."),
+    _constant("euromap67_input_bits", "UINT32", "0; no Euromap 67 interface is fitted."),
+    _constant("euromap67_output_bits", "UINT32", "0; no Euromap 67 interface is fitted."),
+    _constant("euromap67_24V_voltage", "DOUBLE", "0; no Euromap 67 interface is fitted [V].", 0.0),
+    _constant("euromap67_24V_current", "DOUBLE", "0; no Euromap 67 interface is fitted [mA].", 0.0),
+    _constant("encoder0_raw", "INT32", "0; no conveyor's encoder is connected."),
+    _constant("encoder1_raw", "INT32", "0; no conveyor's encoder is connected."),
+)
+# fmt: on
+
+VARIABLES = {row.name: row for row in _ROWS}
+"""Every output variable of RTDE that is no register, by name and in the order of the page of reference."""
+
+
+def _registers() -> Iterator[tuple[str, Read]]:
+    def entry(bank: str, number: int) -> Read:
+        return lambda r: getattr(r.io, bank)[number]
+
+    def bit(bank: str, number: int) -> Read:
+        return lambda r: bool(getattr(r.io, bank)[number // 32] >> number % 32 & 1)
+
+    for bank in ("input", "output"):
+        yield from ((f"{bank}_bit_registers{bits}", entry(f"{bank}_bit_register", number))
+                    for number, bits in enumerate(("0_to_31", "32_to_63")))  # fmt: skip
+        yield from ((f"{bank}_bit_register_{k}", bit(f"{bank}_bit_register", k)) for k in range(BITS))
+        for kind in ("int", "double"):
+            name = f"{bank}_{kind}_register"
+            yield from ((f"{name}_{k}", entry(name, k)) for k in range(NUMBERS))
+
+
+READERS: dict[str, Read] = {row.name: row.read for row in _ROWS} | dict(_registers())
+"""What reads each variable and register, by RTDE's name."""

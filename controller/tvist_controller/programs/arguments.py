@@ -1,18 +1,61 @@
-"""Checks of what a program passes to a function, and conversion to the controller's types.
+"""What a program passes to a function: checks by annotation, and conversion to the controller's types.
 
-Bounds are those of the protocol: beyond them, a plan may take all memory.
+A parameter's annotation has the check as metadata, or is a number of the protocol with its bounds, such as
+`Mass`: beyond them, a plan may take all memory. What has no such annotation is passed on as the program has it.
 """
 
+import inspect
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
-from typing import get_args
+from types import MethodType, NoneType
+from typing import Annotated, Any, Final, get_args, get_origin
+
+from msgspec import Meta
 
 from tvist_protocol import values
 from tvist_protocol.values import Coordinate
 from tvist_urscript import Array, Fault, Pose
 
 Value = object
+Check = Callable[[str, Value], Any]
+"""Takes a parameter's name and a program's value; returns what the function gets, or raises a `Fault`."""
+OF_JOINTS: Final = "joints"
+"""Stands for `several` with as many numbers as the arm has joints, which no annotation knows."""
+
+
+def checked(method: MethodType, joints: int) -> Callable[..., Any]:
+    """Return a method that checks its arguments as annotated; scripts give all of them, in order.
+
+    Joints is the number of the arm's, which lists that are annotated by `Joints` must have.
+    """
+    checks = _checks(method.__func__, joints)
+    if not any(check for _, check in checks):
+        return method
+
+    def call(*given: Value) -> Any:
+        pairs = zip(checks, given, strict=True)
+        return method(*[value if check is None else check(name, value) for (name, check), value in pairs])
+
+    return call
+
+
+@cache
+def _checks(function: Callable[..., Any], joints: int) -> list[tuple[str, Check | None]]:
+    _, *parameters = inspect.signature(function).parameters.values()
+    return [(one.name, _check_of(one.annotation, joints)) for one in parameters]
+
+
+def _check_of(annotation: Any, joints: int) -> Check | None:
+    if get_origin(annotation) is not Annotated:
+        parts = get_args(annotation)
+        inner = _check_of(parts[0], joints) if NoneType in parts else None
+        return None if inner is None else lambda name, value: None if value is None else inner(name, value)
+    check: Any = get_args(annotation)[1]
+    if isinstance(check, Meta):
+        return within(*bounds(annotation))
+    found: Check = several(joints) if check == OF_JOINTS else check
+    return found
 
 
 @cache
@@ -22,12 +65,11 @@ def bounds(kind: object) -> tuple[float, float]:
     return meta.ge if meta.gt is None else meta.gt, meta.le
 
 
-def number(name: str, value: Value, least: float = -math.inf, most: float = math.inf) -> float:
-    """Return a finite number within bounds.
+# ---------------------------------------------------------------------- checks
 
-    Raises:
-        Fault: It is none.
-    """
+
+def number(name: str, value: Value, least: float = -math.inf, most: float = math.inf) -> float:
+    """Return a finite number within bounds."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise Fault(f"{name} is {shown(value)}: it must be a number")
     if not least <= value <= most or not math.isfinite(value):
@@ -35,24 +77,25 @@ def number(name: str, value: Value, least: float = -math.inf, most: float = math
     return float(value)
 
 
-def positive(name: str, value: Value, most: float = math.inf) -> float:
-    """Return a finite number above zero.
+def within(least: float = -math.inf, most: float = math.inf) -> Check:
+    """Return the check for a finite number within bounds."""
+    return lambda name, value: number(name, value, least, most)
 
-    Raises:
-        Fault: It is none.
-    """
-    found = number(name, value, most=most)
-    if found <= 0.0:
-        raise Fault(f"{name} is {found:g}: it must be above 0")
-    return found
+
+def above_zero(most: float = math.inf) -> Check:
+    """Return the check for a finite number above zero."""
+
+    def check(name: str, value: Value) -> float:
+        found = number(name, value, most=most)
+        if found <= 0.0:
+            raise Fault(f"{name} is {found:g}: it must be above 0")
+        return found
+
+    return check
 
 
 def integer(name: str, value: Value, least: int, most: int) -> int:
-    """Return an integer within bounds; a float without a fraction counts as one.
-
-    Raises:
-        Fault: It is none.
-    """
+    """Return an integer within bounds; a float without a fraction counts as one."""
     if isinstance(value, bool) or not isinstance(value, int | float) or value != value // 1:
         raise Fault(f"{name} is {shown(value)}: it must be an integer")
     if not least <= value <= most:
@@ -60,13 +103,20 @@ def integer(name: str, value: Value, least: int, most: int) -> int:
     return int(value)
 
 
+def whole(least: int, most: int) -> Check:
+    """Return the check for an integer within bounds."""
+    return lambda name, value: integer(name, value, least, most)
+
+
+def either(name: str, value: Value) -> bool:
+    """Return an integer, 0 or 1, as a truth value."""
+    return bool(integer(name, value, 0, 1))
+
+
 def numbers(name: str, value: Value, count: int, kind: object = Coordinate) -> tuple[float, ...]:
     """Return the numbers of a list or a pose.
 
     The protocol's type of one of them bounds each; angles and speeds have the bounds of coordinates.
-
-    Raises:
-        Fault: It is no list of so many numbers.
     """
     if not isinstance(value, Array):
         raise Fault(f"{name} is {shown(value)}: it must be a list of {count} numbers")
@@ -77,12 +127,13 @@ def numbers(name: str, value: Value, count: int, kind: object = Coordinate) -> t
     return tuple([number(f"{name}[{k}]", item, least, most) for k, item in enumerate(items)])
 
 
-def pose(name: str, value: Value, kind: object = Coordinate) -> values.Pose:
-    """Return the six numbers of a pose; a list of six numbers counts as one.
+def several(count: int, kind: object = Coordinate) -> Check:
+    """Return the check for a list or a pose of so many numbers, see `numbers`."""
+    return lambda name, value: numbers(name, value, count, kind)
 
-    Raises:
-        Fault: It is none.
-    """
+
+def pose(name: str, value: Value, kind: object = Coordinate) -> values.Pose:
+    """Return the six numbers of a pose; a list of six numbers counts as one."""
     x, y, z, rx, ry, rz = numbers(name, value, 6, kind)
     return x, y, z, rx, ry, rz
 
@@ -93,25 +144,43 @@ def is_pose(value: Value) -> bool:
 
 
 def flag(name: str, value: Value) -> bool:
-    """Return a truth value; numbers count as such.
-
-    Raises:
-        Fault: It is none.
-    """
+    """Return a truth value; numbers count as such."""
     if not isinstance(value, bool | int | float):
         raise Fault(f"{name} is {shown(value)}: it must be True or False")
     return bool(value)
 
 
 def text(name: str, value: Value) -> str:
-    """Return a text.
-
-    Raises:
-        Fault: It is none.
-    """
+    """Return a text."""
     if not isinstance(value, str):
         raise Fault(f"{name} is {shown(value)}: it must be a text")
     return value
+
+
+def word(*known: str) -> Check:
+    """Return the check for one of some words."""
+    *others, last = [f'"{one}"' for one in known]
+
+    def check(name: str, value: Value) -> Value:
+        if value not in known:
+            raise Fault(f"{name} is {shown(value)}: it must be {', '.join(others)} or {last}")
+        return value
+
+    return check
+
+
+Number = Annotated[float, within()]
+Positive = Annotated[float, above_zero()]
+Share = Annotated[float, within(0.0, 1.0)]
+Bit = Annotated[int, whole(0, 1)]
+Flag = Annotated[bool, flag]
+Text = Annotated[str, text]
+Joints = Annotated[tuple[float, ...], OF_JOINTS]
+Vector3 = Annotated[tuple[float, ...], several(3)]
+Vector6 = Annotated[tuple[float, ...], several(6)]
+Target = Annotated[values.Pose, pose]
+
+# ---------------------------------------------------------------------- what programs get, and texts
 
 
 def a_list(values: Sequence[float]) -> Array:

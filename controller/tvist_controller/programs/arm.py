@@ -5,8 +5,7 @@ from contextlib import contextmanager
 
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.programs.access import Access
-from tvist_controller.programs.allowance import Allowance
-from tvist_controller.programs.journey import Journey, Turns
+from tvist_controller.programs.journey import Journey, RateLimit, Turns
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import Segment
 from tvist_protocol.stream import Event
@@ -28,11 +27,8 @@ TAKEN = "another thread is controlling the robot: only one thread of a program c
 class ProgramArm:
     """Carries out the motions of one robot's programs.
 
-    Args:
-        access: The robot.
-        thread: Returns the program that runs now and the number of its thread.
-        lives: Returns whether a thread still runs.
-        spend: Takes evaluations from the budget of the program that runs.
+    `thread` returns the program that runs now and its thread's number, `lives` whether a thread still runs;
+    `spend` takes evaluations from the budget of the program that runs.
     """
 
     def __init__(
@@ -44,7 +40,7 @@ class ProgramArm:
     ) -> None:
         self._access, self._motion, self._thread, self.spend = access, access.motion, thread, spend
         self._lives = lives
-        self._allowance = Allowance(access.motion, access.latest)
+        self._rate_limit = RateLimit(access.motion, access.latest)
         self._inside: object | None = None
         """Thread whose move has not returned."""
         self.driver: tuple[Machine, int] | None = None
@@ -68,15 +64,11 @@ class ProgramArm:
     # ------------------------------------------------------------------ planned moves
 
     def follow(self, segment: Segment) -> Turns:
-        """Move along a part of a path. If it is blended into the next, the call returns for the program to go on.
-
-        Raises:
-            Fault: Another thread moves the arm, or there is no such motion.
-        """
+        """Move along a part of a path. If it is blended into the next, the program goes on meanwhile."""
         self._check_alone()
         journey = self._present()
         if journey is None:
-            journey = Journey(self._access, self._thread(), self._allowance, self._come_to_rest)
+            journey = Journey(self._access, self._thread(), self._rate_limit, self._come_to_rest)
             self._journeys[self._thread()] = journey
         journey.add(segment)
         if journey.begun:
@@ -87,11 +79,7 @@ class ProgramArm:
             yield from self._until(journey, lambda: not journey.full)
 
     def begin(self) -> None:
-        """Begin the moves of this thread that wait for a further one, which may still come while they are under way.
-
-        Raises:
-            Fault: Another thread moves the arm, or there is no such motion.
-        """
+        """Begin the moves of this thread that wait for a further one, which may still come under way."""
         journey = self._present()
         if journey is not None and not journey.begun:
             self._check_alone()
@@ -124,11 +112,7 @@ class ProgramArm:
         return waits and self._access.force.compliant is not None
 
     def _present(self) -> Journey | None:
-        """Return the moves of this thread that may be blended with a further one.
-
-        Raises:
-            Fault: One of them could not be made.
-        """
+        """Return the moves of this thread that may be blended with a further one."""
         journey = self._journeys.get(self._thread())
         if journey is None or not journey.over:
             return journey
@@ -169,7 +153,7 @@ class ProgramArm:
         if motion.activity in {Activity.GUIDED, Activity.MOVING, Activity.PAUSED}:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
         while (
-            motion.activity.moving or motion.activity.protective or self._allowance.waits or self._asked > 0
+            motion.activity.moving or motion.activity.protective or self._rate_limit.waits or self._asked > 0
         ):
             yield
 
@@ -178,17 +162,13 @@ class ProgramArm:
     def guide(self, start: Callable[[bool], int | None], wait: Callable[[], Iterator[None]]) -> Turns:
         """Begin or change a guided motion, which goes on when the call returns.
 
-        Args:
-            start: Begins it, shaped or not; returns its number, or None if there is nothing to move.
-            wait: Lets time pass until the call returns.
-
-        Raises:
-            Fault: Another thread moves the arm, or the motion is not possible.
+        `start` begins it, shaped or not, and returns its number, or None if there is nothing to move;
+        `wait` lets time pass until the call returns.
         """
         yield from self.finish()
         with self._moving():
             yield from self.regain()
-            while self.stopping or self._allowance.waits:
+            while self.stopping or self._rate_limit.waits:
                 yield
             self.steer(start)
             yield from wait()
@@ -202,8 +182,7 @@ class ProgramArm:
     def regain(self) -> Turns:
         """Wait for the end of a stop, and for force mode if the program has lost it and a thread begins it again.
 
-        Raises:
-            Fault: None does.
+        A `Fault` says that none does.
         """
         left = AGAIN
         while self.stopping or (self.lost and left > 0):
@@ -218,14 +197,7 @@ class ProgramArm:
         return self._gives is self._thread()[0] and self._access.force.compliant is None
 
     def give_way(self, start: Callable[[], int]) -> Turns:
-        """Let the arm give way to forces, or change how it does, beside what else moves it.
-
-        Args:
-            start: Begins it; returns its number.
-
-        Raises:
-            Fault: A client streams set-points to the arm, or it is not possible.
-        """
+        """Let the arm give way to forces, or change how; `start` begins that and returns its number."""
         yield from self.finish()
         motion = self._motion
         self._asked += 1
@@ -233,7 +205,7 @@ class ProgramArm:
             while (
                 (motion.activity.moving or motion.activity.protective)
                 and after(motion.activity, "force_mode") is None
-            ) or self._allowance.waits:
+            ) or self._rate_limit.waits:
                 if motion.activity is Activity.STREAMING:
                     raise Fault(STREAMED)
                 yield
@@ -279,14 +251,7 @@ class ProgramArm:
                 return
 
     def halt(self, stop: Callable[[], None]) -> Turns:
-        """Stop the arm, and wait until it is at rest.
-
-        Args:
-            stop: Begins the stop of a motion.
-
-        Raises:
-            Fault: Another thread moves the arm.
-        """
+        """Stop the arm by what begins the stop of a motion, and wait until it is at rest."""
         yield from self.finish()
         with self._moving():
             self.brake(stop)
@@ -307,13 +272,11 @@ class ProgramArm:
     def brake(self, stop: Callable[[], None], *, wholly: bool = False) -> None:
         """Begin a stop of what moves, which is the program's own will.
 
-        Args:
-            stop: Stops everything.
-            wholly: Whether also what gives way to forces ends, which otherwise goes on.
+        What gives way to forces goes on, unless the stop is to end that, too (`wholly`).
         """
         guidance = self._access.guidance
         if self._motion.activity.moving:
-            self._allowance.owe()
+            self._rate_limit.charge()
         self._own = True  # so that `hear` does not take this stop for one that ends the program
         try:
             if wholly or guidance.compliant is None:
@@ -351,7 +314,7 @@ class ProgramArm:
 
     def settle(self) -> None:
         """Stop a motion whose thread has ended without another that took it over; called at the end of each turn."""
-        self._allowance.planning = max(self._allowance.planning - 1, 0)
+        self._rate_limit.planning = max(self._rate_limit.planning - 1, 0)
         journey = self._journey
         if journey is not None and not (journey.over or self._lives(journey.owner)):
             self._abandoned |= journey.number is not None
@@ -367,7 +330,7 @@ class ProgramArm:
         """Forget all motions, since the program has ended."""
         self._inside = self.driver = self._journey = self._guided = self._gives = None
         self._journeys.clear()
-        self._abandoned, self._allowance.planning = False, 0
+        self._abandoned, self._rate_limit.planning = False, 0
 
     def hear(self, event: Event) -> bool:
         """Handle an event of the robot; return whether it ended a motion of the program against its will."""

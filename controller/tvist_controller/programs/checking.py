@@ -30,14 +30,11 @@ class Finding:
 
 
 def check_program(text: str) -> list[Finding]:
-    """Return what is wrong with a program, in the order of its text; empty if nothing is.
+    """Return what is wrong with the text of a program, in its order; empty if nothing is.
 
     Errors are those of the compiler: syntax, unknown names, calls that do not fit their functions. Warnings are the
     calls of functions that this controller does not simulate, what a robot of UR's refuses or reads otherwise, and
     that a text of functions alone does nothing.
-
-    Args:
-        text: The program: a `def` or `sec` with its `end`, or statements.
     """
     findings = [_error(error) for error in check(text, known_signatures())]
     # Without these functions, the same check finds the places where they are called.

@@ -1,9 +1,10 @@
-"""Programs of one robot, compiled from their text."""
+"""The programs of one robot: built-in ones, those kept under a name, and how a text is compiled."""
 
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from typing import Final, NamedTuple
 
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.programs.built_in import built_in
 from tvist_controller.programs.interpreter import WAITS
 from tvist_controller.programs.library import MOVING, known_signatures
 from tvist_plant.description import RobotDescription
@@ -12,14 +13,16 @@ from tvist_urscript import Script, ScriptError
 
 KEPT = 8
 """Compiled programs that are kept, since many clients send the same text again and again."""
+MAX_KEPT = 100
+"""Number of programs that are kept under their names."""
+WAIT: Final = "wait_program.urp"
+"""Plays until it is stopped, so that clients can try out play, pause and stop."""
+PAPER: Final = "paper.urp"
+"""Visits the poses in order, and returns the same way."""
 
 
 class ScriptCompiler:
-    """Compiles programs, which takes many ticks for long ones that are new.
-
-    Args:
-        description: The robot.
-    """
+    """Compiles programs, which takes many ticks for long ones that are new."""
 
     def __init__(self, description: RobotDescription) -> None:
         self._built_in = built_in(description)
@@ -33,11 +36,7 @@ class ScriptCompiler:
         compile_script("sync()", known_signatures(), compile_script("sync()", known_signatures()))
 
     def compile(self, command: ProgramLoad | ProgramRun) -> Script | None:
-        """Return the program of a command; None if it names a program without giving its text that is not built in.
-
-        Raises:
-            RefusalError: The text is not valid.
-        """
+        """Return the program of a command; None if it has no text and names none that is built in."""
         text = command.text
         if text is None:
             assert isinstance(command, ProgramLoad)
@@ -48,15 +47,7 @@ class ScriptCompiler:
 
     @staticmethod
     def compile_statement(text: str, after: Script | None) -> Script:
-        """Return a statement for a running program.
-
-        Args:
-            text: Its text.
-            after: The program, or what was added to it last; None if no program takes statements.
-
-        Raises:
-            RefusalError: The text is not valid, or no program takes statements.
-        """
+        """Return a statement that comes after a program, or after the last one that was added to it."""
         if after is None:
             why = f"no program is running that waits for statements: it has to call {WAITS}()"
             raise RefusalError("wrong_mode", "", why)
@@ -87,3 +78,55 @@ def _compiled(text: str, after: Script | None = None) -> Script:
 
 def _refusal(line: int, column: int, text: str) -> RefusalError:
     return RefusalError("script_error", f"text:{line}:{column}", text)
+
+
+def built_in(description: RobotDescription) -> dict[str, str]:
+    """Return the texts of the programs by file name; one without moves waits until it is stopped."""
+    names = list(description.poses)
+    programs = {WAIT: "def wait_program():\n  while True:\n    sync()\n  end\nend\n"}
+    if names:
+        programs[PAPER] = _moves("paper", [*names, *names[-2::-1]], description)
+    return programs | {f"{name}.urp": _moves(name, [name], description) for name in names}
+
+
+def _moves(title: str, names: Sequence[str], description: RobotDescription) -> str:
+    """A program that moves to poses."""
+    moves = [
+        f"  movej({[float(angle) for angle in description.poses[name]]}, a=2.0, v=1.5)" for name in names
+    ]
+    return "\n".join((f"def {title}():", *moves, "end", ""))
+
+
+class Kept(NamedTuple):
+    """A program, and who sent it."""
+
+    script: Script
+    origin: str | None
+    """Address of the machine that sent its text; None if it is unknown."""
+
+
+class KeptPrograms:
+    """The built-in programs, which are compiled when they are loaded, and those that clients sent."""
+
+    def __init__(self, built_in: Iterable[str]) -> None:
+        self._built_in = frozenset(built_in)
+        self._kept: dict[str, Kept] = {}
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all, sorted."""
+        return sorted(self._built_in | set(self._kept))
+
+    def keep(self, name: str, kept: Kept) -> None:
+        """Keep a program under its name, in place of one that had it before."""
+        if name not in self._kept and len(self._kept) >= MAX_KEPT:
+            why = f"{MAX_KEPT} programs are kept already: send this one with program.run"
+            raise RefusalError("busy", "name", why, MAX_KEPT)
+        self._kept[name] = kept
+
+    def find(self, name: str) -> Kept:
+        """Return a program that was kept."""
+        if name not in self._kept:
+            why = f"name is {name!r}: must be one of {', '.join(self.names)}"
+            raise RefusalError("out_of_range", "name", why)
+        return self._kept[name]

@@ -12,7 +12,7 @@ from tvist_controller.programs.journey import Turns
 from tvist_protocol.programs import MAX_SCRIPT, Interpreter
 from tvist_urscript import Fault, Machine, Script
 
-MOST = 1000
+MAX_STATEMENTS = 1000
 """Statements, of `MAX_SCRIPT` characters together, that a program takes before it is told to forget them."""
 HELD = 2
 """Statements that a program holds until it has forgotten the first ones, in units of the limits above."""
@@ -25,12 +25,6 @@ class StatementQueue:
 
     A program that calls `interpreter_mode` anywhere takes statements from its start on; they are carried out while it
     waits in that function.
-
-    Args:
-        machine: Returns the program that runs now.
-        arm: Its arm.
-        peripherals: What is published with the state of the statements.
-        emit: Emits events.
     """
 
     def __init__(
@@ -84,15 +78,7 @@ class StatementQueue:
         self._program = self._last = None
 
     def carry_out(self, *, clear_queue: bool, clear_at_end: bool) -> Turns:
-        """Carry out statements until `end` is called.
-
-        Args:
-            clear_queue: Whether statements that came before are dropped.
-            clear_at_end: Whether the program forgets its statements at the end.
-
-        Raises:
-            Fault: The program carries out statements already, or this is not its main thread.
-        """
+        """Carry out statements until `end` is called."""
         machine = self._machine()
         if machine is not self._program or self._waiting or machine.thread != 0:
             where = "in a statement" if self._waiting and machine.thread == 0 else "in a thread"
@@ -122,11 +108,7 @@ class StatementQueue:
         self._ending = True
 
     def clear(self) -> None:
-        """Forget all statements so far and what they have defined, when the one that calls this has ended.
-
-        Raises:
-            Fault: The program does not wait for statements.
-        """
+        """Forget all statements so far and what they have defined, when the one that calls this has ended."""
         if not self._waiting or self._machine() is not self._program:
             raise Fault(f"{CLEAR} can only be called while the program waits in {WAITS}()")
         self._clearing = True
@@ -159,11 +141,7 @@ class StatementQueue:
     # ------------------------------------------------------------------ for clients
 
     def interpret(self, script: Script) -> int:
-        """Add a statement, and return its number.
-
-        Raises:
-            RefusalError: The program has taken too many.
-        """
+        """Add a statement, and return its number."""
         assert self._program is not None, "the statement was compiled after a program"
         clears = CLEAR in script.used
         self._check_room(len(script.text), clears=clears)
@@ -182,11 +160,12 @@ class StatementQueue:
 
         Those that are held until they are forgotten have room for twice as many, since a client need not wait for that.
         """
-        added = self._interpreted - self._forgotten >= MOST or self._added + length > MAX_SCRIPT
-        held = len(self._lengths) >= HELD * MOST or self._held + length > HELD * MAX_SCRIPT
+        added = self._interpreted - self._forgotten >= MAX_STATEMENTS or self._added + length > MAX_SCRIPT
+        held = len(self._lengths) >= HELD * MAX_STATEMENTS or self._held + length > HELD * MAX_SCRIPT
         if held or (added and not clears):
-            why = f"the program has taken {MOST} statements or {MAX_SCRIPT} characters: clear them with {CLEAR}()"
-            raise RefusalError("busy", "text", why, MOST)
+            taken = f"{MAX_STATEMENTS} statements or {MAX_SCRIPT} characters"
+            why = f"the program has taken {taken}: clear them with {CLEAR}()"
+            raise RefusalError("busy", "text", why, MAX_STATEMENTS)
 
     def skip(self, what: Literal["statements", "move"]) -> None:
         """Leave out the statements that wait, or the move that the program makes."""

@@ -3,15 +3,16 @@
 from collections.abc import Callable, Generator
 
 from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.plan import Plan
-from tvist_controller.programs.access import Access
-from tvist_controller.programs.allowance import PAUSE, Allowance
-from tvist_controller.programs.moves import command_of
+from tvist_controller.programs.access import OWN_TOKEN, Access
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
-from tvist_protocol.motions import MoveL, MovePath, Segment
+from tvist_protocol.motions import JointSegment, LineSegment, MoveL, MovePath, Segment
 from tvist_protocol.replies import Accepted
+from tvist_protocol.stream import State
+from tvist_protocol.transitions import Activity
 from tvist_urscript import Fault
 
 Turns = Generator[None, None, None]
@@ -34,8 +35,37 @@ AHEAD = 150
 """Number of moves ahead of the arm from which on no further ones are planned."""
 SPARE = 4
 """Ticks more for which the running motion stays as it is, since a change of its rate looks ahead."""
+PAUSE = 300
+"""Ticks that a stop, or a plan of a `movej` within a tick, is paid with. These two take longer than all else in a tick,
+so fewer than one tick in a hundred may have one.
+"""
 _UNREACHABLE = frozenset({"no_solution", "singular", "collision", "limit_position"})
 """Reasons for which a motion that a program has begun ends in a protective stop."""
+
+
+class RateLimit:
+    """Counts the stops and plans of a robot's programs."""
+
+    def __init__(self, motion: MotionControl, latest: Callable[[], State]) -> None:
+        self._motion, self._latest = motion, latest
+        self.planning = 0
+        """Ticks for which the last plan that was ordered is still being made."""
+        self._paid = 0
+        """Tick at which all stops and plans are paid."""
+
+    @property
+    def debt(self) -> int:
+        """Ticks until all stops and plans are paid."""
+        return max(self._paid - self._latest().tick, 0)
+
+    def charge(self) -> None:
+        """Note a stop or a plan."""
+        self._paid = self._latest().tick + self.debt + PAUSE
+
+    @property
+    def waits(self) -> bool:
+        """Whether the next motion has to wait, since stops and plans were too close to each other."""
+        return self._motion.activity is Activity.REST and self.debt > 2 * PAUSE
 
 
 class Journey:
@@ -43,20 +73,14 @@ class Journey:
 
     The motion begins when the last move is known, or as many as are planned at once; `step` carries it on in every tick
     while the thread goes on to further moves. Each plan ends at rest, so the arm stops where no further move comes in
-    time.
-
-    Args:
-        access: The robot.
-        owner: The thread.
-        allowance: Counts plans within a tick.
-        rest: Stops what still moves, and lets time pass until a motion may begin.
+    time. `rest` stops what still moves, and lets time pass until a motion may begin.
     """
 
     def __init__(
-        self, access: Access, owner: object, allowance: Allowance, rest: Callable[[], Turns]
+        self, access: Access, owner: object, rate_limit: RateLimit, rest: Callable[[], Turns]
     ) -> None:
         self._access, self._motion, self.owner = access, access.motion, owner
-        self._allowance, self._rest = allowance, rest
+        self._rate_limit, self._rest = rate_limit, rest
         self.legs: list[Segment] = []
         """Moves that the arm has not passed."""
         self._effects: list[list[Effect]] = []
@@ -189,15 +213,15 @@ class Journey:
     def _planned(self, legs: list[Segment]) -> Generator[None, None, Plan]:
         """The plan of a move. Lines and paths, and joint moves in debt, begin a fixed time after it is ordered."""
         plans, command = self._access.plans, self._command(legs)
-        if isinstance(command, MoveJ) and self._allowance.debt < PAUSE:
-            self._allowance.owe()
+        if isinstance(command, MoveJ) and self._rate_limit.debt < PAUSE:
+            self._rate_limit.charge()
             return plans.now(command, within_tick=True)
         while True:
-            while self._allowance.planning > 0:  # of a thread that was killed meanwhile: one after the other
+            while self._rate_limit.planning > 0:  # of a thread that was killed meanwhile: one after the other
                 yield
-            self._allowance.planning = DELAY + DELAY_PER_PART * (len(legs) - 1)
+            self._rate_limit.planning = DELAY + DELAY_PER_PART * (len(legs) - 1)
             ordered = plans.later(command)
-            for _ in range(self._allowance.planning):
+            for _ in range(self._rate_limit.planning):
                 yield
             yield from self._rest()  # a client may have moved the arm meanwhile
             self._check_ready()
@@ -265,3 +289,29 @@ class Journey:
         if isinstance(command_of(legs), MoveJ) or reply.code not in _UNREACHABLE:
             raise Fault(reply.why)
         self._motion.protect(f"the program's move was refused: {reply.why}", reply.code)
+
+
+def command_of(legs: list[Segment], *, goes_on: bool = False) -> MoveJ | MoveL | MovePath:
+    """Return the command for moves that are blended into one motion: the simplest that does.
+
+    Only a path goes on to further moves that come while the motion runs.
+    """
+    token = OWN_TOKEN
+    match [] if goes_on else legs:
+        case [JointSegment() as leg]:
+            return MoveJ(
+                token=token,
+                q=leg.q,
+                velocity=leg.velocity,
+                acceleration=leg.acceleration,
+                duration=leg.duration,
+            )
+        case [LineSegment() as leg]:
+            return MoveL(
+                token=token,
+                pose=leg.pose,
+                velocity=leg.velocity,
+                acceleration=leg.acceleration,
+                duration=leg.duration,
+            )
+    return MovePath(token=token, segments=tuple(legs))

@@ -18,12 +18,9 @@ PoseNumbers = tuple[float, float, float, float, float, float]
 
 
 class ProgramKinematics:
-    """Kinematics of one robot's tool centre point in the base frame.
+    """Kinematics of a robot's tool centre point, the present one or another, in the base frame.
 
-    Args:
-        description: The robot.
-        motion: Its motion, which has the present tool centre point.
-        spend: Takes evaluations from the budget of the program that runs.
+    `spend` takes evaluations from the budget of the program that runs.
     """
 
     def __init__(
@@ -43,12 +40,7 @@ class ProgramKinematics:
         return self._tool
 
     def tool_pose(self, q: Floats, tcp: Sequence[float] | None = None) -> PoseNumbers:
-        """Return the pose of the tool at joint positions, x y z [m] and rotation vector [rad].
-
-        Args:
-            q: Joint positions, shape (n,) [rad].
-            tcp: Tool centre point in the flange frame; None for the present one.
-        """
+        """Return the pose of the tool at joint positions, x y z [m] and rotation vector [rad]."""
         return placement_vector(*self._with(tcp).pose(q))
 
     def jacobian(self, q: Floats, tcp: Sequence[float] | None = None) -> Floats:
@@ -58,16 +50,7 @@ class ProgramKinematics:
     def posture(
         self, pose: Sequence[float], near: Sequence[float], tcp: Sequence[float] | None = None
     ) -> tuple[float, ...]:
-        """Return the joint positions nearest to others at which the tool has a pose [rad].
-
-        Args:
-            pose: Pose: x y z [m] and rotation vector [rad].
-            near: Joint positions [rad].
-            tcp: Tool centre point in the flange frame; None for the present one.
-
-        Raises:
-            Fault: There are none.
-        """
+        """Return the joint positions nearest to others at which the tool has a pose [rad]."""
         tool = placement(self._motion.tcp if tcp is None else tcp)
         flange = placement(pose) @ tool.inverse
         try:

@@ -3,22 +3,20 @@
 from dataclasses import dataclass
 
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.programs.access import Access
+from tvist_controller.programs.access import Access, Steadiness
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.arm import ProgramArm
-from tvist_controller.programs.built_in import built_in
+from tvist_controller.programs.compiling import Kept, KeptPrograms, built_in
+from tvist_controller.programs.functions.family import Parts
+from tvist_controller.programs.indicators import Popups, RunstateOutputs
 from tvist_controller.programs.interpreter import StatementQueue
-from tvist_controller.programs.kept import Kept, KeptPrograms
+from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.programs.library import MOVING, functions
-from tvist_controller.programs.missed_turns import MissedTurns
-from tvist_controller.programs.popups import Popups
-from tvist_controller.programs.runstate import RunstateOutputs
 from tvist_controller.programs.sockets import Sockets
-from tvist_controller.programs.steadiness import Steadiness
-from tvist_controller.programs.watchdogs import Watchdogs
+from tvist_controller.programs.watchdogs import MissedTurns, Watchdogs
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_protocol.modes import RobotMode
-from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
+from tvist_protocol.programs import ProgramLabel, ProgramState
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
 from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
@@ -46,10 +44,6 @@ class ProgramPlayer:
     Their motions are ordinary motions: they have numbers and events, and a client may pause them; stopping one ends the
     program. A protective stop pauses the program: after the stop is unlocked, playing resumes with the move that was
     stopped.
-
-    Args:
-        access: The robot.
-        safety: The safety system's stops.
     """
 
     def __init__(self, access: Access, safety: SafetyControl) -> None:
@@ -63,9 +57,13 @@ class ProgramPlayer:
         )
         self.statements = StatementQueue(self._machine, self.arm, access.peripherals, access.emit)
         self._runstate = RunstateOutputs(access.peripherals)
+        kinematics = ProgramKinematics(access.description, access.motion, self.arm.spend)
         self._functions = functions(
-            access, self.arm, self.popups, self._watchdogs, self.sockets, self.statements, self._runstate
-        )
+            Parts(
+                access, self.arm, kinematics, self.popups, self._watchdogs, self.sockets, self.statements,
+                self._runstate,
+            )
+        )  # fmt: skip
         self.kept = KeptPrograms(built_in(access.description))
         """The programs that can be loaded."""
         self.name: str | None = None
@@ -91,16 +89,6 @@ class ProgramPlayer:
         """Label that the program had passed at that line; None if there is none."""
 
     @property
-    def watched(self) -> list[str]:
-        """Names of the input registers that the program watches."""
-        return self._watchdogs.names
-
-    @property
-    def interpreter(self) -> Interpreter | None:
-        """State of the statements that clients have added to the program."""
-        return self.statements.published
-
-    @property
     def present_line(self) -> int:
         """Line of the main thread at this tick, unlike `line`, which is told now and then; 0 if there is none."""
         return 0 if self._main is None else self._main.machine.line
@@ -109,6 +97,15 @@ class ProgramPlayer:
     def progress(self) -> tuple[str | None, ProgramState, int, ProgramLabel | None]:
         """Fields of the program in `io`: its name, its state, its line and its label."""
         return self.name, self.state, self.line, self.label
+
+    @property
+    def published(self) -> dict[str, object]:
+        """All fields of the program in `io`."""
+        return {
+            "program": self.name, "program_state": self.state, "program_line": self.line,
+            "program_label": self.label, "interpreter": self.statements.published,
+            "watched": self._watchdogs.names,
+        }  # fmt: skip
 
     # ------------------------------------------------------------------ ticks and events
 
@@ -123,11 +120,7 @@ class ProgramPlayer:
         return not self._all and self._left >= EVALUATIONS
 
     def advance(self, tick: int) -> None:
-        """Give every thread its turn; called first in every tick.
-
-        Args:
-            tick: Number of the tick.
-        """
+        """Give every thread its turn; called first in every tick."""
         # Evaluations are counted rather than timed, so that a run is the same live, in lockstep and in a replay
         # (decision 26). What a tick takes beyond them, the next ticks pay.
         self.sockets.answer()
@@ -194,11 +187,7 @@ class ProgramPlayer:
             self.end(event.why or event.kind)
 
     def end(self, why: str) -> None:
-        """End all programs without stopping what moves.
-
-        Args:
-            why: The reason, for people.
-        """
+        """End all programs without stopping what moves."""
         for running in tuple(self._all):
             self._close(running, why)
 
@@ -279,13 +268,7 @@ class ProgramPlayer:
     # ------------------------------------------------------------------ for commands
 
     def load(self, name: str, program: Kept, why: str) -> None:
-        """Make a program the one that is played next; one that is running ends, and the arm stops.
-
-        Args:
-            name: Its name.
-            program: The program.
-            why: Why a running one ends, for people.
-        """
+        """Make a program the one that is played next; one that is running ends, and the arm stops."""
         if self._main is not None:
             self._close(self._main, why)
             self._motion.stop(None, why)
@@ -301,11 +284,7 @@ class ProgramPlayer:
         self.statements.open(self._main.machine)
 
     def play_beside(self, script: Script, origin: str | None) -> None:
-        """Begin a secondary program; `origin` as for `play`.
-
-        Raises:
-            RefusalError: Too many are running.
-        """
+        """Begin a secondary program; `origin` as for `play`."""
         if sum(running is not self._main for running in self._all) >= MAX_BESIDE:
             why = f"{MAX_BESIDE} secondary programs are running: wait until one of them has ended"
             raise RefusalError("busy", "", why, MAX_BESIDE)

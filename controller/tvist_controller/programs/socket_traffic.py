@@ -3,7 +3,8 @@
 Orders go out after programs had their turn; news come in before a tick.
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
 
 from tvist_protocol.journal import Entry, SocketChange
 
@@ -19,11 +20,7 @@ class SocketNews(NamedTuple):
 
     @classmethod
     def of(cls, entry: Entry) -> "SocketNews":
-        """Return the news that an entry of the journal contains.
-
-        Raises:
-            ValueError: It contains none.
-        """
+        """Return the news that an entry of the journal contains."""
         if entry.socket is None or entry.change is None:
             raise ValueError(
                 f"the journal's socket entry before tick {entry.tick} has no number or no change"
@@ -86,3 +83,18 @@ class Expire(NamedTuple):
 
 
 SocketOrder = Open | Send | Close | Taken | Wait | Waited | Expire
+
+
+class SocketPorts(Protocol):
+    """Carries the sockets of one robot's programs. What happens to them reaches the host by `Host.socket`."""
+
+    def carry_out(self, orders: Sequence[SocketOrder]) -> Sequence[SocketNews]:
+        """Carry out orders without blocking; return news that are known at once, which count after this tick."""
+
+
+class NoPorts(SocketPorts):
+    """No network: sockets cannot be opened."""
+
+    def carry_out(self, orders: Sequence[SocketOrder]) -> Sequence[SocketNews]:
+        """Report that a socket could not be opened."""
+        return [SocketNews(order.socket, "failed") for order in orders if isinstance(order, Open)]

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from math import ceil
 from typing import Any, TypeVar
 
+from tvist_controller.cell.gripper import Requests
 from tvist_controller.cell.live_cell import LiveCell
-from tvist_controller.cell.urcap import Requests
 from tvist_controller.commands.events import Emit
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.socket_traffic import (
@@ -53,11 +53,8 @@ class _Socket:
 class Sockets:
     """The sockets of one robot's programs. Each program has its own, by name.
 
-    Args:
-        emit: Emits events.
-        owner: Returns the program that runs now.
-        origin: Returns the address of the machine that sent and started that program; None if it is unknown.
-        cell: The cell, whose gripper programs reach; None if there is none.
+    `owner` returns the program that runs now, `origin` the address of the machine that sent and started it, if it
+    is known. The gripper of the cell is reached by programs, too.
     """
 
     def __init__(
@@ -104,18 +101,9 @@ class Sockets:
     # ------------------------------------------------------------------ what programs call
 
     def connect(self, name: str, address: str, port: int) -> Generator[None, None, bool]:
-        """Connect a socket, and wait until it is open or this has failed, which the network decides.
+        """Connect a socket, and wait until the network has opened it or failed to; return whether it is open.
 
-        Args:
-            name: Name of the socket; one of the same name is closed first.
-            address: Name or IP address of the machine.
-            port: Its port.
-
-        Returns:
-            True if it was opened.
-
-        Raises:
-            Fault: The program has too many sockets.
+        One of the same name is closed first.
         """
         self.disconnect(name)
         owner = self._owner()
@@ -166,20 +154,12 @@ class Sockets:
     def read(
         self, name: str, take: Take[T], timeout: float, meanwhile: Callable[[int], Generator[None, None, Any]]
     ) -> Generator[None, None, T | None]:
-        """Read from a socket, and wait until what is read has arrived.
+        """Read from a socket what `take` finds, and wait until it has arrived.
 
         What has arrived incompletely stays for the next call. A read that fails takes at least a tick, so that a loop
-        of them lets time pass.
-
-        Args:
-            name: Name of the socket.
-            take: Finds what is read.
-            timeout: Time to wait at most [s], counted in robot time, but not less on the wall; for ever if it is not
-                above 0.
-            meanwhile: Called with the number of ticks that the call has waited so far, before each further one.
-
-        Returns:
-            The message; None if the time is over, or if the socket was closed before all of it had arrived.
+        of them lets time pass; it returns None if the time is over, or if the socket was closed before.
+        The time-out [s] is counted in robot time, but not less on the wall; it is for ever if it is not above 0.
+        `meanwhile` is called with the number of ticks that have passed, before each further one.
         """
         socket = self._named.get((self._owner(), name))
         if socket is None:

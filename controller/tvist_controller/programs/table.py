@@ -27,12 +27,12 @@ an arm has no closed form."""
 def page() -> str:
     """Return the page of reference that lists all functions."""
     parts = [HEAD]
-    for functions, title in FAMILIES.items():
+    for functions in FAMILIES:
         rows = [
             (f"`{_call(name, one)}`", "waits" if one.blocks else "", _what(functions, name))
             for name, one in signatures(functions).items()
         ]
-        parts.append(f"## {title}\n\n{_table(('function', '', 'what'), rows)}\n")
+        parts.append(f"## {functions.title}\n\n{_table(('function', '', 'what'), rows)}\n")
     costs = sorted({one.cost for one in known_signatures().values() if one.cost > 1}, reverse=True)
     dear = [
         (

@@ -1,13 +1,17 @@
-"""Watchdogs of programs: what happens when a client writes an input register too rarely."""
+"""What watches programs: clients that write too rarely, and threads that miss turns."""
 
 import re
 from dataclasses import dataclass
 
+from tvist_controller.commands.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
+from tvist_controller.programs.arm import ProgramArm
 from tvist_plant.plant import PERIOD
 from tvist_protocol.io import BITS, NUMBERS, Bank
-from tvist_urscript import Fault
+from tvist_urscript import EVALUATIONS, Fault
 
+SILENT = 5
+"""Missed turns in a row after which the arm no longer keeps the velocity that was commanded last."""
 _NAME = re.compile(r"input_(int|double|bit)_register_(\d+)|input_bit_registers(\d+)_to_(\d+)")
 
 
@@ -23,11 +27,7 @@ class _Watchdog:
 
 
 class Watchdogs:
-    """The watchdogs of one robot's program.
-
-    Args:
-        peripherals: Its registers.
-    """
+    """The watchdogs of one robot's program, which watch input registers."""
 
     def __init__(self, peripherals: Peripherals) -> None:
         self._peripherals = peripherals
@@ -35,15 +35,9 @@ class Watchdogs:
         self._tick = 0
 
     def watch(self, name: str, frequency: float, action: str) -> None:
-        """Watch an input of RTDE from now on.
+        """Watch an input of RTDE from now on, which has to be written with at least this frequency [Hz].
 
-        Args:
-            name: Its name.
-            frequency: Lowest frequency with which it has to be written [Hz].
-            action: `pause`, `stop`, or `ignore` to watch it no more.
-
-        Raises:
-            Fault: There is no such register.
+        The action is `pause`, `stop`, or `ignore` to watch it no more.
         """
         bank, place = _register(name)
         self._peripherals.changed = True
@@ -90,3 +84,37 @@ def _register(name: str) -> tuple[Bank, int]:
     if int(place) >= (BITS if kind == "bit" else NUMBERS):
         raise Fault(f'"{name}" does not exist: the bank has {BITS if kind == "bit" else NUMBERS} registers')
     return bank, int(place)
+
+
+class MissedTurns:
+    """Warns of a thread that guides the arm and misses turns, since the budget of a tick is spent before.
+
+    It slows the arm down if the thread misses several in a row.
+    """
+
+    def __init__(self, arm: ProgramArm, emit: Emit) -> None:
+        self._arm, self._emit = arm, emit
+        self._missed = 0
+        self._warned = False
+
+    def clear(self) -> None:
+        """Warn anew, since another program begins."""
+        self._missed, self._warned = 0, False
+
+    def look(self, starved: set[object]) -> None:
+        """Look at the thread that guides the arm, after all turns; of starved programs, no thread had one."""
+        driver = self._arm.driver
+        if driver is None or not (driver[0] in starved or driver[0].missed(driver[1])):
+            self._missed = 0
+            return
+        self._missed += 1
+        name, line = driver[0].place(driver[1])
+        what = f"{name}, line {line}, guides the arm but had no turn within the {EVALUATIONS} evaluations of a tick"
+        if not self._warned:
+            self._warned = True
+            self._emit("warning", why=f"{what}: its last command goes on; compute less between its commands")
+        if self._missed == SILENT:
+            self._emit(
+                "warning", why=f"{what}, {SILENT} times in a row: the arm slows down until its next command"
+            )
+            self._arm.slow_down()

@@ -72,11 +72,7 @@ def gather(
     f_d: Floats,
     zeta: Floats,
 ) -> int:
-    """Collect the numbers that every state has, after the first; arguments as in `write_state`.
-
-    Returns:
-        Place after them.
-    """
+    """Collect the numbers that every state has, after the first, and return the place after them."""
     n: int = q.shape[0]
     modes: int = f_d.shape[0]
     k: int = append(numbers, 1, signals[: TORQUE + 1])
@@ -96,55 +92,30 @@ def gather(
 
 @compiled_for_ticks
 def write_state(
-    out: Bytes,
-    places: Integers,
-    integers: Integers,
+    out: Bytes,  # of such a state; to return an array would take a microsecond more
+    places: Integers,  # of each of its numbers, in the order of its fields
+    integers: Integers,  # place and encoded size of the tick and of the sequence number, shape (2, 2)
     tick: int,
-    sequence: int,
-    period: float,
-    speed: float,
-    delay: float,
-    signals: Floats,
-    before: Floats,
-    middle: Floats,
+    sequence: int,  # of the set-point, if there is one
+    period: float,  # [s]
+    speed: float,  # share of the programmed speed [-]
+    delay: float,  # of the shaper and of the drives [s]
+    signals: Floats,  # before the arm, shape (9, n), see `line_tick`
+    before: Floats,  # references without the filter, shape (n,) [rad]; (0,) if the target is what they tell
+    middle: Floats,  # the one of the target
     last: Floats,
-    q: Floats,
+    q: Floats,  # as measured, shape (n,) [rad]
     qd: Floats,
     moment: Floats,
-    accelerometer: Floats,
-    chain: Floats,
+    accelerometer: Floats,  # shape (3,) [m/s^2]
+    chain: Floats,  # see `tool_motion`
     tool: Floats,
-    f_d: Floats,
+    f_d: Floats,  # damped frequencies, shape (modes,) [Hz]
     zeta: Floats,
-    motors: Floats,
-    wrench: Floats,
+    motors: Floats,  # velocities, accelerations and torques, if there are any, shape (3, n) or (0, n)
+    wrench: Floats,  # by the sensor in the flange, if there is one, shape (6,) or (0,)
 ) -> None:
-    """Write a state.
-
-    Args:
-        out: Bytes of such a state, which become those of this one; to return an array would take a microsecond more.
-        places: Place of each of its numbers, in the order of its fields.
-        integers: Place and encoded size of the tick and of the set-point's sequence number, shape (2, 2).
-        tick: Number of the tick.
-        sequence: Sequence number of the set-point, if there is one.
-        period: Tick [s].
-        speed: Share of the programmed speed [-].
-        delay: Delay of the shaper and of the drives [s].
-        signals: Signals before the arm, shape (9, n), see `line_tick`.
-        before: First of three references without the filter, shape (n,) [rad]; (0,) if the target is what they tell.
-        middle: Second reference, that of the target.
-        last: Third reference.
-        q: Measured angles, shape (n,) [rad].
-        qd: Measured velocities, shape (n,) [rad/s].
-        moment: Measured torques, shape (n,) [N m].
-        accelerometer: Shape (3,) [m/s^2].
-        chain: Links of the arm, see `tool_motion`.
-        tool: Tool centre point, see `tool_motion`.
-        f_d: Damped frequencies, shape (modes,) [Hz].
-        zeta: Damping ratios, shape (modes,) [-].
-        motors: Velocities, accelerations and torques of the motors, if there are any, shape (3, n) or (0, n).
-        wrench: Force and torque by the sensor in the flange, if there is one, shape (6,) or (0,).
-    """
+    """Write the numbers of a state into the bytes of such a state."""
     numbers = np.empty(places.shape[0])
     numbers[0] = tick * period
     end = gather(numbers, speed, delay, signals, q, qd, moment, accelerometer, chain, tool, f_d, zeta)

@@ -70,11 +70,7 @@ def _of_fields(kind: type[msgspec.Struct]) -> dict[str, ColumnMeaning]:
 def _of_rtde(column: str) -> ColumnMeaning:
     from tvist_server.gateways.ur.rtde.table import describe
 
-    try:
-        _, what = describe(column)
-    except (AttributeError, ValueError):
-        return ColumnMeaning("")
-    return _described(what, whole=False)
+    return _described(describe(column), whole=False)
 
 
 def _described(text: str, whole: bool) -> ColumnMeaning:

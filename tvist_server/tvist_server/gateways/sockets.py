@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from typing import Final
 
-from tvist_controller.programs.socket_ports import SocketPorts
 from tvist_controller.programs.socket_traffic import (
     Close,
     Expire,
@@ -15,6 +14,7 @@ from tvist_controller.programs.socket_traffic import (
     Send,
     SocketNews,
     SocketOrder,
+    SocketPorts,
     Taken,
     Wait,
     Waited,

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tvist_controller.instruments.ratings import joint_ratings
+from tvist_controller.instruments.motors import joint_ratings
 from tvist_controller.line.kinematics import ForwardKinematics
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand

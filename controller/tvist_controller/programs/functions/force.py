@@ -1,12 +1,25 @@
 """Functions that control the force at the tool, let the arm be moved by hand, and detect contacts."""
 
+from typing import Annotated, Any
+
 import numpy as np
 
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.motion.task_frame import Feature
-from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import bounds, flag, integer, number, numbers, pose, shown
-from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.arguments import (
+    Flag,
+    Target,
+    Vector6,
+    integer,
+    number,
+    numbers,
+    pose,
+    several,
+    shown,
+    whole,
+    within,
+)
+from tvist_controller.programs.functions.family import Family, Parts
 from tvist_controller.programs.journey import Turns
 from tvist_controller.trajectory import ForceTask
 from tvist_protocol.forces import Push
@@ -14,57 +27,76 @@ from tvist_protocol.io import Length
 from tvist_protocol.values import Mass
 from tvist_urscript import Array, Fault, costs
 
-MOST_LIMIT = 1e3
+MAX_LIMIT = 1e3
 """Largest limit of an axis that is passed on: nothing reaches it [m/s, m, rad]."""
-ALL = Array((1,) * 6)
-NOWHERE = Array((0,) * 3)
+ALL: Any = Array((1,) * 6)
+NOWHERE: Any = Array((0,) * 3)
 
 
-class ForceFunctions:
-    """Lets one robot give way to forces.
+def _axes(name: str, value: object) -> Floats:
+    return np.array(
+        [integer(f"{name}[{k}]", one, 0, 1) for k, one in enumerate(numbers(name, value, 6))], float
+    )
 
-    Args:
-        access: The robot.
-        arm: Its arm.
-    """
 
-    def __init__(self, access: Access, arm: ProgramArm) -> None:
-        self._access, self._arm = access, arm
+def _limits(name: str, value: object) -> Floats:
+    found = [number(f"{name}[{k}]", one, 0.0) for k, one in enumerate(numbers(name, value, 6))]
+    return np.minimum(found, MAX_LIMIT)
+
+
+def _feature(name: str, value: object) -> Feature:
+    if isinstance(value, Array):
+        return pose(name, value)
+    if value == "base":
+        return "base"
+    if value == "tool":
+        return "tool"
+    raise Fault(f'{name} is {shown(value)}: it must be "base", "tool" or a pose')
+
+
+Axes = Annotated[Floats, _axes]
+Place = Annotated[tuple[float, ...], several(3, Length)]
+
+
+class ForceFunctions(Family):
+    """Lets one robot give way to forces."""
+
+    title = "Force"
+
+    def __init__(self, on: Parts) -> None:
+        super().__init__(on)
         self._damping, self._gain = ForceTask.damping, ForceTask.gain
 
     @costs(120)
     def force_mode(
-        self, task_frame: object, selection_vector: object, wrench: object, type: object, limits: object
+        self,
+        task_frame: Target,
+        selection_vector: Axes,
+        wrench: Annotated[tuple[float, ...], several(6, Push)],
+        type: Annotated[int, whole(1, 3)],
+        limits: Annotated[Floats, _limits],
     ) -> Turns:
         """Give way along the axes of a frame that are selected until a wrench is reached, and go on in the others."""
-        feature, kind = pose("task_frame", task_frame), integer("type", type, 1, 3)
-        task = ForceTask(
-            _choice("selection_vector", selection_vector),
-            np.array(numbers("wrench", wrench, 6, Push)),
-            _limits(limits),
-            self._damping,
-            self._gain,
-        )
-        yield from self._arm.give_way(lambda: self._access.force.begin(task, feature, kind))
+        task = ForceTask(selection_vector, np.array(wrench), limits, self._damping, self._gain)
+        yield from self._arm.give_way(lambda: self._access.force.begin(task, task_frame, type))
 
     @costs(100)
     def end_force_mode(self) -> None:
         """Hold the position again; a motion in the other axes ends, too."""
         self._arm.hold_again(by_hand=False)
 
-    def force_mode_set_damping(self, damping: object) -> None:
+    def force_mode_set_damping(self, damping: Annotated[float, within(0.0, 1.0)]) -> None:
         """Set how quickly the arm slows down in force mode where nothing touches it, from 0 to 1."""
-        self._damping = number("damping", damping, 0.0, 1.0)
+        self._damping = damping
 
-    def force_mode_set_gain_scaling(self, scaling: object) -> None:
+    def force_mode_set_gain_scaling(self, scaling: Annotated[float, within(0.0, 2.0)]) -> None:
         """Scale how strongly force mode answers a difference of forces, from 0 to 2; above 1 it may get unstable."""
-        self._gain = number("scaling", scaling, 0.0, 2.0)
+        self._gain = scaling
 
     @costs(120)
-    def freedrive_mode(self, freeAxes: object = ALL, feature: object = "base") -> Turns:
+    def freedrive_mode(self, freeAxes: Axes = ALL, feature: Annotated[Feature, _feature] = "base") -> Turns:
         """Let the arm be moved by hand along and about the axes of a frame that are free."""
-        axes, frame = _choice("freeAxes", freeAxes), _feature(feature)
-        yield from self._arm.give_way(lambda: self._access.force.free(axes, frame))
+        yield from self._arm.give_way(lambda: self._access.force.free(freeAxes, feature))
 
     @costs(100)
     def end_freedrive_mode(self) -> None:
@@ -78,56 +110,28 @@ class ForceFunctions:
     @costs(120)
     def teach_mode(self) -> Turns:
         """Let the arm be moved by hand in all directions."""
-        yield from self.freedrive_mode()
+        yield from self.freedrive_mode(np.ones(6))
 
-    @costs(100)
-    def end_teach_mode(self) -> None:
-        """Hold the position again."""
-        self._arm.hold_again(by_hand=True)
+    end_teach_mode = end_freedrive_mode
 
     def ft_rtde_input_enable(
         self,
-        enable: object,
-        sensor_mass: object = 0,
-        sensor_measuring_offset: object = NOWHERE,
-        sensor_cog: object = NOWHERE,
+        enable: Flag,
+        sensor_mass: Mass = 0,
+        sensor_measuring_offset: Place = NOWHERE,
+        sensor_cog: Place = NOWHERE,
     ) -> Turns:
         """Use the force sensor whose values clients write by RTDE; its mass is part of the payload to declare."""
-        number("sensor_mass", sensor_mass, *bounds(Mass))
-        numbers("sensor_cog", sensor_cog, 3, Length)
-        offset = numbers("sensor_measuring_offset", sensor_measuring_offset, 3, Length)
         if self._access.force.compliant is not None:
             raise Fault(
                 "the force sensor stays the same in force mode and freedrive: call end_force_mode before"
             )
-        self._access.force.external.use(offset if flag("enable", enable) else None)
+        self._access.force.external.use(sensor_measuring_offset if enable else None)
         yield  # what the program asks for next is told by that sensor
 
     enable_external_ft_sensor = ft_rtde_input_enable
 
     @costs(250)
-    def tool_contact(self, direction: object = None) -> int:
+    def tool_contact(self, direction: Vector6 | None = None) -> int:
         """Return the number of steps since just before the tool touched something in a direction; 0 if it does not."""
-        way = (0.0,) * 3 if direction is None else numbers("direction", direction, 6)[:3]
-        return self._access.force.touched(way)
-
-
-def _choice(name: str, value: object) -> Floats:
-    return np.array(
-        [integer(f"{name}[{k}]", one, 0, 1) for k, one in enumerate(numbers(name, value, 6))], float
-    )
-
-
-def _limits(value: object) -> Floats:
-    found = [number(f"limits[{k}]", one, 0.0) for k, one in enumerate(numbers("limits", value, 6))]
-    return np.minimum(found, MOST_LIMIT)
-
-
-def _feature(value: object) -> Feature:
-    if isinstance(value, Array):
-        return pose("feature", value)
-    if value == "base":
-        return "base"
-    if value == "tool":
-        return "tool"
-    raise Fault(f'feature is {shown(value)}: it must be "base", "tool" or a pose')
+        return self._access.force.touched((0.0,) * 3 if direction is None else direction[:3])

@@ -5,11 +5,11 @@ the gripper over a socket.
 """
 
 from math import ceil, floor
+from typing import Annotated
 
 from tvist_controller.cell.gripper import CLOSED, MOVING, OPEN, Gripper
-from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import integer, number
-from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.arguments import number, whole
+from tvist_controller.programs.functions.family import Family
 from tvist_controller.programs.journey import Turns
 from tvist_urscript import Fault
 
@@ -17,16 +17,15 @@ _ONE = "1"
 """Gripper that a call does not name. The cell has one, so the name makes no difference."""
 
 
-class GripperFunctions:
-    """Moves the fingers of the cell's gripper, and tells what they do.
+Counts = Annotated[int, whole(0, 255)]
+Percent = Annotated[int, lambda name, value: ceil(number(name, value, 0.0, 100.0) / 100.0 * 255.0)]
+"""A percentage, as counts."""
 
-    Args:
-        access: The robot.
-        arm: Its arm: what is asked of the gripper after a move that is blended begins where the blend does.
-    """
 
-    def __init__(self, access: Access, arm: ProgramArm) -> None:
-        self._cell, self._arm = access.cell, arm
+class GripperFunctions(Family):
+    """Moves the fingers of the cell's gripper, and tells what they do."""
+
+    title = "Gripper"
 
     # ------------------------------------------------------------------ activation
 
@@ -43,11 +42,11 @@ class GripperFunctions:
         while self._gripper.read("STA") != 3:
             yield
 
-    def rq_reset(self, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+    def rq_reset(self, gripper_socket: object = _ONE) -> None:
         """Deactivate the gripper; its fingers stay where they are."""
         self._write(ACT=0, ATR=0)
 
-    def rq_is_gripper_activated(self, gripper_socket: object = _ONE) -> bool:  # noqa: ARG002
+    def rq_is_gripper_activated(self, gripper_socket: object = _ONE) -> bool:
         """Return whether the gripper is active."""
         return self._gripper.read("STA") == 3
 
@@ -69,33 +68,33 @@ class GripperFunctions:
         """Close the fingers, or until they meet a part."""
         return self.rq_move_and_wait(255, gripper_socket)
 
-    def rq_move(self, pos: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+    def rq_move(self, pos: Counts, gripper_socket: object = _ONE) -> None:
         """Begin to move the fingers to a position: 0 is open, 255 closed."""
-        self._write(POS=integer("pos", pos, 0, 255), GTO=1)
+        self._write(POS=pos, GTO=1)
 
-    def rq_move_and_wait(self, pos: object, gripper_socket: object = _ONE) -> Turns:
+    def rq_move_and_wait(self, pos: Counts, gripper_socket: object = _ONE) -> Turns:
         """Move the fingers to a position, 0 to 255, or until they meet a part."""
         yield from self._arm.finish()
         self.rq_move(pos, gripper_socket)
         yield from self.rq_wait(gripper_socket)
 
-    def rq_move_and_wait_norm(self, pos_norm: object, gripper_socket: object = _ONE) -> Turns:
+    def rq_move_and_wait_norm(self, pos_norm: Percent, gripper_socket: object = _ONE) -> Turns:
         """Move the fingers to a position, 0 to 100, or until they meet a part."""
-        return self.rq_move_and_wait(_from_percent("pos_norm", pos_norm), gripper_socket)
+        return self.rq_move_and_wait(pos_norm, gripper_socket)
 
     def rq_move_and_wait_mm(self, pos_in_mm: object, gripper_socket: object = _ONE) -> Turns:
         """Move the fingers until they are so many millimetres apart, or meet a part."""
         return self.rq_move_and_wait(self._counts(pos_in_mm), gripper_socket)
 
-    def rq_stop(self, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+    def rq_stop(self, gripper_socket: object = _ONE) -> None:
         """Stop the fingers."""
         self._write(GTO=0)
 
-    def rq_go_to(self, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+    def rq_go_to(self, gripper_socket: object = _ONE) -> None:
         """Let the fingers move to the position that was set."""
         self._write(GTO=1)
 
-    def rq_wait(self, gripper_socket: object = _ONE) -> Turns:  # noqa: ARG002
+    def rq_wait(self, gripper_socket: object = _ONE) -> Turns:
         """Wait until the fingers have stopped."""
         yield from self._arm.finish()
         gripper = self._gripper
@@ -106,37 +105,37 @@ class GripperFunctions:
 
     # ------------------------------------------------------------------ settings
 
-    def rq_set_pos(self, pos: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+    def rq_set_pos(self, pos: Counts, gripper_socket: object = _ONE) -> None:
         """Set the position to which `rq_go_to` moves the fingers, 0 to 255."""
-        self._write(GTO=0, POS=integer("pos", pos, 0, 255))
+        self._write(GTO=0, POS=pos)
 
-    def rq_set_speed(self, speed: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+    def rq_set_speed(self, speed: Counts, gripper_socket: object = _ONE) -> None:
         """Set the speed of the fingers, 0 to 255."""
-        self._write(SPE=integer("speed", speed, 0, 255))
+        self._write(SPE=speed)
 
-    def rq_set_speed_norm(self, speed_norm: object, gripper_socket: object = _ONE) -> None:
+    def rq_set_speed_norm(self, speed_norm: Percent, gripper_socket: object = _ONE) -> None:
         """Set the speed of the fingers, 0 to 100."""
-        self.rq_set_speed(_from_percent("speed_norm", speed_norm), gripper_socket)
+        self.rq_set_speed(speed_norm, gripper_socket)
 
-    def rq_set_force(self, force: object, gripper_socket: object = _ONE) -> None:  # noqa: ARG002
+    def rq_set_force(self, force: Counts, gripper_socket: object = _ONE) -> None:
         """Set the force of the fingers, 0 to 255. In a world it limits them; without one every grip is firm."""
-        self._write(FOR=integer("force", force, 0, 255))
+        self._write(FOR=force)
 
-    def rq_set_force_norm(self, force_norm: object, gripper_socket: object = _ONE) -> None:
+    def rq_set_force_norm(self, force_norm: Percent, gripper_socket: object = _ONE) -> None:
         """Set the force of the fingers, 0 to 100; see `rq_set_force`."""
-        self.rq_set_force(_from_percent("force_norm", force_norm), gripper_socket)
+        self.rq_set_force(force_norm, gripper_socket)
 
     # ------------------------------------------------------------------ state
 
-    def rq_is_object_detected(self, gripper_socket: object = _ONE) -> bool:  # noqa: ARG002
+    def rq_is_object_detected(self, gripper_socket: object = _ONE) -> bool:
         """Return whether a part has stopped the fingers."""
         return self._gripper.read("OBJ") in {1, 2}
 
-    def rq_is_motion_complete(self, gripper_socket: object = _ONE) -> bool:  # noqa: ARG002
+    def rq_is_motion_complete(self, gripper_socket: object = _ONE) -> bool:
         """Return whether the fingers have stopped."""
         return self._gripper.read("OBJ") != MOVING
 
-    def rq_current_pos(self, gripper_socket: object = _ONE) -> int:  # noqa: ARG002
+    def rq_current_pos(self, gripper_socket: object = _ONE) -> int:
         """Return the position of the fingers, 0 to 255."""
         return self._gripper.read("POS") or 0
 
@@ -144,7 +143,7 @@ class GripperFunctions:
         """Return the position of the fingers, 0 to 100."""
         return floor(self.rq_current_pos(gripper_socket) / 255.0 * 100.0)
 
-    def rq_current_pos_mm(self, gripper_socket: object = _ONE) -> float:  # noqa: ARG002
+    def rq_current_pos_mm(self, gripper_socket: object = _ONE) -> float:
         """Return the distance between the fingers in millimetres."""
         return 1e3 * self._gripper.opening
 
@@ -152,7 +151,8 @@ class GripperFunctions:
 
     @property
     def _gripper(self) -> Gripper:
-        gripper = None if self._cell is None else self._cell.gripper
+        cell = self._access.cell
+        gripper = None if cell is None else cell.gripper
         if gripper is None:
             raise Fault("there is no gripper: give the robot a cell that has one (--cell FILE.toml)")
         return gripper
@@ -165,7 +165,3 @@ class GripperFunctions:
         """Position at which the fingers are so many millimetres apart, to the next count."""
         stroke = 1e3 * self._gripper.stroke
         return round(CLOSED - number("pos_in_mm", millimetres, 0.0, stroke) / stroke * (CLOSED - OPEN))
-
-
-def _from_percent(name: str, value: object) -> int:
-    return ceil(number(name, value, 0.0, 100.0) / 100.0 * 255.0)

@@ -1,15 +1,17 @@
 """Functions that set the tool, the payload and gravity, and the force at the tool to zero."""
 
+from typing import Annotated
+
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.plan import Plan
-from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import bounds, number, numbers, pose
-from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.access import OWN_TOKEN
+from tvist_controller.programs.arguments import Vector3, pose, several, within
+from tvist_controller.programs.functions.family import Family
 from tvist_controller.programs.journey import DELAY, Turns
-from tvist_controller.programs.moves import OWN_TOKEN
 from tvist_plant.plant import PERIOD
 from tvist_plant.robot_checks import lacking_inertia
 from tvist_plant.robot_tables import Tensor
+from tvist_protocol import values
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.forces import ZeroFtsensor
 from tvist_protocol.io import Length, SetTcp
@@ -25,51 +27,50 @@ ORDER = (0, 3, 5, 1, 2, 4)
 """Places of Ixx Iyy Izz Ixy Ixz Iyz, as programs have them, in the order of robot files."""
 
 
-class SettingFunctions:
-    """Changes the settings of one robot.
+Centre = Annotated[tuple[float, ...], several(3, Offset)]
+Moments = Annotated[tuple[float, ...], several(6, Moment)]
+ToolPose = Annotated[values.Pose, lambda name, value: pose(name, value, Length)]
 
-    Args:
-        access: The robot.
-        arm: Its arm, whose moves are carried out before.
-    """
 
-    def __init__(self, access: Access, arm: ProgramArm) -> None:
-        self._access, self._arm = access, arm
+class SettingFunctions(Family):
+    """Changes the settings of one robot; the moves of the arm are carried out before."""
+
+    title = "Settings"
 
     @costs(5)
-    def set_tcp(self, tcp: object, tcp_name: object = "") -> Turns:
+    def set_tcp(self, tcp: ToolPose, tcp_name: object = "") -> Turns:
         """Set the tool centre point in the flange frame."""
-        del tcp_name  # names are for people
         yield from self._arm.finish()
-        self._send(SetTcp(token=OWN_TOKEN, offset=pose("tcp", tcp, Length)))
+        self._send(SetTcp(token=OWN_TOKEN, offset=tcp))
 
     @costs(20)
-    def set_payload(self, m: object, cog: object = None) -> Turns:
+    def set_payload(self, m: Mass, cog: Centre | None = None) -> Turns:
         """Declare a payload without inertia; without a centre of mass, it is at the tool centre point."""
-        com = self._access.motion.tcp[:3] if cog is None else numbers("cog", cog, 3, Offset)
-        yield from self._declare(number("m", m, *bounds(Mass)), com, (0.0,) * 6)
+        yield from self._declare(m, self._access.motion.tcp[:3] if cog is None else cog, (0.0,) * 6)
 
     @costs(20)
-    def set_payload_mass(self, m: object) -> Turns:
+    def set_payload_mass(self, m: Mass) -> Turns:
         """Change the mass of the declared payload."""
         declared = self._access.declared()
-        yield from self._declare(number("m", m, *bounds(Mass)), declared.com, declared.inertia)
+        yield from self._declare(m, declared.com, declared.inertia)
 
     @costs(20)
-    def set_payload_cog(self, cog: object) -> Turns:
+    def set_payload_cog(self, cog: Centre) -> Turns:
         """Change the centre of mass of the declared payload."""
         declared = self._access.declared()
-        yield from self._declare(declared.mass, numbers("cog", cog, 3, Offset), declared.inertia)
+        yield from self._declare(declared.mass, cog, declared.inertia)
 
     @costs(20)
     def set_target_payload(
-        self, m: object, cog: object, inertia: object = None, transition_time: object = 0
+        self,
+        m: Mass,
+        cog: Centre,
+        inertia: Moments | None = None,
+        transition_time: Annotated[float, within(0.0, 3600.0)] = 0,
     ) -> Turns:
         """Declare a payload with its inertia, Ixx Iyy Izz Ixy Ixz Iyz; clients see it change in a time."""
-        seconds = number("transition_time", transition_time, 0.0, 3600.0)
-        xx, yy, zz, xy, xz, yz = (0.0,) * 6 if inertia is None else numbers("inertia", inertia, 6, Moment)
-        full = self._as_a_body((xx, xy, xz, yy, yz, zz))
-        yield from self._declare(number("m", m, *bounds(Mass)), numbers("cog", cog, 3, Offset), full, seconds)
+        xx, yy, zz, xy, xz, yz = inertia or (0.0,) * 6
+        yield from self._declare(m, cog, self._as_a_body((xx, xy, xz, yy, yz, zz)), transition_time)
 
     def _as_a_body(self, inertia: Tensor) -> Tensor:
         """Make the moments of a body of those that were rounded, with a warning; others are left to be refused."""
@@ -85,13 +86,9 @@ class SettingFunctions:
         xx, xy, xz, yy, yz, zz = inertia
         return xx + lack, xy, xz, yy + lack, yz, zz + lack
 
-    def set_gravity(self, d: object) -> None:
-        """Accept the gravity that the arm has, which is installed upright.
-
-        Raises:
-            Fault: It is another.
-        """
-        x, y, z = numbers("d", d, 3)
+    def set_gravity(self, d: Vector3) -> None:
+        """Accept the gravity that the arm has, which is installed upright."""
+        x, y, z = d
         if max(abs(x), abs(y), abs(z - GRAVITY)) > TOLERANCE:
             raise Fault(f"set_gravity: d is [{x:g}, {y:g}, {z:g}]; the simulated arm stands upright, so it must be "
                         f"[0, 0, {GRAVITY}]")  # fmt: skip

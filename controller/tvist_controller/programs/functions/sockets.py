@@ -1,18 +1,19 @@
-"""Functions for sockets, over which programs talk to other machines."""
+"""Functions for sockets, over which programs talk to other machines, and how messages are cut."""
 
 import math
+import re
 from collections.abc import Callable, Generator
-from struct import pack
-from typing import Any, TypeVar
+from struct import pack, unpack_from
+from typing import Annotated, Any, TypeVar
 
-from tvist_controller.programs import socket_messages as cut
-from tvist_controller.programs.arguments import a_list, flag, integer, number, text
-from tvist_controller.programs.arm import ProgramArm
-from tvist_controller.programs.sockets import Sockets, Take
+from tvist_controller.programs.arguments import Flag, Number, Text, a_list, text, whole
+from tvist_controller.programs.functions.family import Family, Parts
+from tvist_controller.programs.sockets import Take
 from tvist_urscript import Value, costs, to_str
+from tvist_urscript.texts import DECIMAL
 from tvist_urscript.values import Array, to_bytes, to_text
 
-MOST = 30
+MAX_VALUES = 30
 """Most values that one call reads."""
 ANSWER = 2.0
 """Time to wait for the value of a variable [s]."""
@@ -20,129 +21,137 @@ MORE = 25
 """Ticks for which a program waits for more data before the moves start that wait to be blended into a next one."""
 _ONE = "socket_0"
 """Name of a socket that a call does not name."""
+_VARIABLE = re.compile(r"\s*(\S+)\s+([+-]?\d+)\s*", re.ASCII)
+LONGEST_NUMBER = 64
+"""Longest number in characters [bytes]."""
+LONGEST_LINE = 1023
+"""Longest line or string [bytes], as that of a text in a program."""
 T = TypeVar("T")
 
 
-class SocketFunctions:
+def _named(name: str, value: object) -> str:
+    """Return the name of a socket; a number is one, as in the functions that Robotiq's URCap brings along."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return to_str(value)
+    return text(name, value)
+
+
+Name = Annotated[str, _named]
+Int32 = Annotated[int, whole(-(2**31), 2**31 - 1)]
+Count = Annotated[int, whole(0, MAX_VALUES)]
+
+
+class SocketFunctions(Family):
     """Opens and closes sockets, and reads and writes them.
 
     Reading takes what has arrived, and waits for the rest. It waits for ever if the time-out is not above 0. What has
     arrived incompletely when the time is over stays for the next call.
-
-    Args:
-        sockets: The sockets of the robot's programs.
-        arm: Its arm: what is sent after a move that is blended is sent where the blend begins.
     """
 
-    def __init__(self, sockets: Sockets, arm: ProgramArm) -> None:
-        self._sockets, self._arm = sockets, arm
+    title = "Sockets"
+
+    def __init__(self, on: Parts) -> None:
+        super().__init__(on)
+        self._sockets = on.sockets
 
     @costs(20)
     def socket_open(
-        self, address: object, port: object, socket_name: object = _ONE
+        self, address: Text, port: Annotated[int, whole(1, 65535)], socket_name: Name = _ONE
     ) -> Generator[None, None, bool]:
         """Connect to a machine; return whether this has succeeded within 2 s.
 
         Programs may connect to the machine that sent them, to those that the server allows (`--ur-allow`), and to the
         gripper of a cell at `127.0.0.1` port 63352.
         """
-        machine, at = text("address", address), integer("port", port, 1, 65535)
-        name = _named(socket_name)
         yield from self._arm.finish()
-        return (yield from self._sockets.connect(name, machine, at))
+        return (yield from self._sockets.connect(socket_name, address, port))
 
     @costs(5)
-    def socket_close(self, socket_name: object = _ONE) -> None:
+    def socket_close(self, socket_name: Name = _ONE) -> None:
         """Close a socket. Nothing happens if it is not open."""
-        name = _named(socket_name)
-        self._arm.then(lambda: self._sockets.disconnect(name))
+        self._arm.then(lambda: self._sockets.disconnect(socket_name))
 
     @costs(10)
     def socket_read_binary_integer(
-        self, number: object, socket_name: object = _ONE, timeout: object = 2
+        self, number: Count, socket_name: Name = _ONE, timeout: Number = 2
     ) -> Generator[None, None, Array]:
         """Read integers of 32 bits, at most 30, as `[n, v1, …, vn]`; `[0, -1, …, -1]` when the time is over."""
-        return self._read_list(cut.integers, integer("number", number, 0, MOST), socket_name, timeout, -1)
+        return self._read_list(_integers, number, socket_name, timeout, -1)
 
     @costs(10)
     def socket_read_byte_list(
-        self, number: object, socket_name: object = _ONE, timeout: object = 2
+        self, number: Count, socket_name: Name = _ONE, timeout: Number = 2
     ) -> Generator[None, None, Array]:
         """Read bytes, at most 30, as `[n, v1, …, vn]`; `[0, -1, …, -1]` when the time is over."""
-        return self._read_list(cut.octets, integer("number", number, 0, MOST), socket_name, timeout, -1)
+        return self._read_list(_octets, number, socket_name, timeout, -1)
 
     @costs(20)
     def socket_read_ascii_float(
-        self, number: object, socket_name: object = _ONE, timeout: object = 2
+        self, number: Annotated[int, whole(1, MAX_VALUES)], socket_name: Name = _ONE, timeout: Number = 2
     ) -> Generator[None, None, Array]:
         """Read numbers in brackets, at most 30: `(1.5, 2)` is `[2, 1.5, 2]`; `[0, nan, …, nan]` if that fails."""
-        return self._read_list(cut.floats, integer("number", number, 1, MOST), socket_name, timeout, math.nan)
+        return self._read_list(_floats, number, socket_name, timeout, math.nan)
 
     @costs(10)
-    def socket_read_line(self, socket_name: object = _ONE, timeout: object = 2) -> Generator[None, None, str]:
+    def socket_read_line(self, socket_name: Name = _ONE, timeout: Number = 2) -> Generator[None, None, str]:
         """Read a line of at most 1023 bytes, without its end; an empty text when the time is over."""
-        found = yield from self._read(socket_name, cut.line, timeout)
+        found = yield from self._read(socket_name, _line, timeout)
         return to_text(found or b"")
 
     @costs(10)
     def socket_read_string(
         self,
-        socket_name: object = _ONE,
-        prefix: object = "",
-        suffix: object = "",
-        interpret_escape: object = False,
-        timeout: object = 2,
+        socket_name: Name = _ONE,
+        prefix: Text = "",
+        suffix: Text = "",
+        interpret_escape: Flag = False,
+        timeout: Number = 2,
     ) -> Generator[None, None, str]:
         r"""Read what has arrived, or what stands between `prefix` and `suffix`; an empty text when the time is over.
 
         Leading spaces of both do not count; with `interpret_escape` they may contain `\n`, `\r` and `\t`.
         """
-        escaped = flag("interpret_escape", interpret_escape)
         first, last = (
-            to_bytes(cut.unescaped(one) if escaped else one)
-            for one in (text("prefix", prefix).lstrip(" "), text("suffix", suffix).lstrip(" "))
+            to_bytes(_unescaped(one) if interpret_escape else one)
+            for one in (prefix.lstrip(" "), suffix.lstrip(" "))
         )
-        found = yield from self._read(socket_name, lambda got: cut.between(got, first, last), timeout)
-        return to_text((found or b"")[: cut.LONGEST_LINE])
+        found = yield from self._read(socket_name, lambda got: _between(got, first, last), timeout)
+        return to_text((found or b"")[:LONGEST_LINE])
 
     @costs(20)
-    def socket_get_var(self, name: object, socket_name: object = _ONE) -> Generator[None, None, int]:
+    def socket_get_var(self, name: Text, socket_name: Name = _ONE) -> Generator[None, None, int]:
         r"""Send `GET name\n` and return the integer of the answer `name value\n`; 0 if none comes within 2 s."""
-        wanted, socket = text("name", name), _named(socket_name)
         yield from self._arm.finish()
-        self._sockets.send(socket, to_bytes(f"GET {wanted}\n"))
-        found = yield from self._sockets.read(socket, lambda got: cut.variable(got, wanted), ANSWER, _idle)
+        self._sockets.send(socket_name, to_bytes(f"GET {name}\n"))
+        found = yield from self._sockets.read(socket_name, lambda got: _variable(got, name), ANSWER, _idle)
         return found or 0
 
     @costs(10)
-    def socket_set_var(self, name: object, value: object, socket_name: object = _ONE) -> None:
+    def socket_set_var(self, name: Text, value: Int32, socket_name: Name = _ONE) -> None:
         r"""Send `SET name value\n`."""
-        wanted, given = text("name", name), integer("value", value, -(2**31), 2**31 - 1)
-        self._send(socket_name, to_bytes(f"SET {wanted} {given}\n"))
+        self._send(socket_name, to_bytes(f"SET {name} {value}\n"))
 
     @costs(5)
-    def socket_send_int(self, value: object, socket_name: object = _ONE) -> bool:
+    def socket_send_int(self, value: Int32, socket_name: Name = _ONE) -> bool:
         """Send an integer of 32 bits in network byte order; return whether the socket is open."""
-        return self._send(socket_name, pack(">i", integer("value", value, -(2**31), 2**31 - 1)))
+        return self._send(socket_name, pack(">i", value))
 
     @costs(5)
-    def socket_send_byte(self, value: object, socket_name: object = _ONE) -> bool:
+    def socket_send_byte(self, value: Annotated[int, whole(-128, 255)], socket_name: Name = _ONE) -> bool:
         """Send a byte, 0 to 255 or -128 to 127; return whether the socket is open."""
-        return self._send(socket_name, bytes([integer("value", value, -128, 255) % 256]))
+        return self._send(socket_name, bytes([value % 256]))
 
     @costs(10)
-    def socket_send_line(self, str: Value, socket_name: object = _ONE) -> bool:
+    def socket_send_line(self, str: Value, socket_name: Name = _ONE) -> bool:
         """Send a text and a line feed; return whether the socket is open."""
         return self._send(socket_name, to_bytes(to_str(str)) + b"\n")
 
     @costs(10)
-    def socket_send_string(self, str: Value, socket_name: object = _ONE) -> bool:
+    def socket_send_string(self, str: Value, socket_name: Name = _ONE) -> bool:
         """Send a text; return whether the socket is open."""
         return self._send(socket_name, to_bytes(to_str(str)))
 
-    def _send(self, socket_name: object, data: bytes) -> bool:
-        name = _named(socket_name)
-
+    def _send(self, name: str, data: bytes) -> bool:
         def send() -> None:
             self._sockets.send(name, data)
 
@@ -153,17 +162,16 @@ class SocketFunctions:
         self,
         take: Callable[[bytes, int], tuple[tuple[Any, ...] | None, int] | None],
         count: int,
-        socket_name: object,
-        timeout: object,
+        name: str,
+        timeout: float,
         missing: float,
     ) -> Generator[None, None, Array]:
         """Read so many values; they follow their number, which is 0 if they are missing."""
-        found = yield from self._read(socket_name, lambda got: take(got, count), timeout)
+        found = yield from self._read(name, lambda got: take(got, count), timeout)
         return a_list((0,) + (missing,) * count if found is None else (count, *found))
 
-    def _read(self, socket_name: object, take: Take[T], timeout: object) -> Generator[None, None, T | None]:
-        name, longest = _named(socket_name), number("timeout", timeout)
-        return self._sockets.read(name, take, longest, self._go_on)
+    def _read(self, name: str, take: Take[T], timeout: float) -> Generator[None, None, T | None]:
+        return self._sockets.read(name, take, timeout, self._go_on)
 
     def _go_on(self, waited: int) -> Generator[None, None, None]:
         """Begin the moves that wait for a further one, if its data have not come by now; it may come under way."""
@@ -172,12 +180,81 @@ class SocketFunctions:
         yield from ()
 
 
-def _named(socket_name: object) -> str:
-    """Return the name of a socket; a number is one, as in the functions that Robotiq's URCap brings along."""
-    if isinstance(socket_name, int | float) and not isinstance(socket_name, bool):
-        return to_str(socket_name)
-    return text("socket_name", socket_name)
-
-
 def _idle(_: int) -> Generator[None, None, None]:
     yield from ()
+
+
+# ---------------------------------------------------------------------- messages
+#
+# Each function takes what has been received so far and returns the message with its length in bytes, or None as
+# long as it is incomplete. A message that is not valid is None with the length of what is thrown away.
+
+
+def _integers(received: bytes, number: int) -> tuple[tuple[int, ...], int] | None:
+    """Cut this many integers of 32 bits in network byte order."""
+    if len(received) < 4 * number:
+        return None
+    return unpack_from(f">{number}i", received), 4 * number
+
+
+def _octets(received: bytes, number: int) -> tuple[tuple[int, ...], int] | None:
+    """Cut this many bytes, each as a number."""
+    return None if len(received) < number else (tuple(received[:number]), number)
+
+
+def _line(received: bytes) -> tuple[bytes, int] | None:
+    """Cut a line; its end is LF or CR LF, which is not part of it. A longer one is cut at `LONGEST_LINE`."""
+    end = received.find(b"\n", 0, LONGEST_LINE + 1)
+    if end >= 0:
+        return received[:end].removesuffix(b"\r"), end + 1
+    return (received[:LONGEST_LINE], LONGEST_LINE) if len(received) > LONGEST_LINE else None
+
+
+def _between(received: bytes, prefix: bytes, suffix: bytes) -> tuple[bytes, int] | None:
+    """Cut what is between a prefix and a suffix, and drop what precedes the prefix.
+
+    Without a suffix it is everything that has been received, at most `LONGEST_LINE`.
+    """
+    start = received.find(prefix)
+    if start < 0:
+        return None
+    start += len(prefix)
+    end = received.find(suffix, start) if suffix else min(len(received), start + LONGEST_LINE)
+    if end < 0 or (not suffix and end == start):
+        return None
+    return received[start:end], end + len(suffix)
+
+
+def _floats(received: bytes, number: int) -> tuple[tuple[float, ...] | None, int] | None:
+    """Cut numbers in brackets, separated by commas: `( 1.414 , 3.14159, 1.616, 0.0 )`, with the line's end behind."""
+    end = received.find(b")")
+    if end < 0:
+        return None
+    rest = next((len(mark) for mark in (b"\n", b"\r\n") if received.startswith(mark, end + 1)), 0)
+    start = received.rfind(b"(", 0, end)
+    parts = received[start + 1 : end].decode("ascii", "replace").split(",")
+    short = all(len(part) <= LONGEST_NUMBER for part in parts)  # the pattern takes long for long ones
+    valid = start >= 0 and len(parts) == number and short and all(map(DECIMAL.fullmatch, parts))
+    return tuple(map(float, parts)) if valid else None, end + 1 + rest
+
+
+def _variable(received: bytes, name: str) -> tuple[int | None, int] | None:
+    """Cut the answer to a request for a variable: a line with its name and an integer; blank lines before are dropped.
+
+    One may be left of a message whose line feed came later than the rest of it.
+    """
+    begin = len(received) - len(received.lstrip(b"\r\n"))
+    found = _line(received[begin:])
+    if found is None:
+        return None
+    answer = _VARIABLE.fullmatch(found[0].decode("ascii", "replace"))
+    if answer is None or answer[1] != name or len(answer[2]) > LONGEST_NUMBER:
+        return None, begin + found[1]
+    value = int(answer[2])
+    return value if -(2**31) <= value < 2**31 else None, begin + found[1]
+
+
+def _unescaped(text: str) -> str:
+    r"""Return a text with `\n`, `\r`, `\t`, `\\` and `\"` as the characters that they stand for."""
+    known = {"n": "\n", "r": "\r", "t": "\t", "\\": "\\", '"': '"'}
+    return re.sub(r"\\(.)", lambda match: known.get(match[1], match[0]), text)

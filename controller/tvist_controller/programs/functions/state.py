@@ -1,29 +1,39 @@
-"""Functions that read the robot's state, as it was in the last tick."""
+"""Functions that read the robot's state, as it was in the last tick, and answer questions about the arm."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.instruments.snapshot import VARIABLES, Instruments
-from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import a_list, a_pose, integer, text
-from tvist_controller.programs.arm import ProgramArm
-from tvist_controller.programs.kinematics import ProgramKinematics
+from tvist_controller.commands.refusal import RefusalError, check_joints
+from tvist_controller.instruments.snapshot import Instruments
+from tvist_controller.instruments.variables import READERS
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.programs import arguments
+from tvist_controller.programs.arguments import (
+    Joints,
+    Target,
+    Text,
+    a_list,
+    a_pose,
+    integer,
+    is_pose,
+    numbers,
+)
+from tvist_controller.programs.functions.family import Family, Parts
+from tvist_controller.programs.functions.settings import ToolPose
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
 from tvist_protocol.stream import State
 from tvist_urscript import Array, Fault, Pose, Value, costs
 from tvist_urscript.values import whole
 
-INTEGRATED = frozenset(
-    (
-        "joint_temperatures",
-        "tool_temperature",
-        "actual_robot_energy_consumed",
-        "actual_robot_braking_energy_dissipated",
-    )
-)
+INTEGRATED = {
+    "joint_temperatures", "tool_temperature", "actual_robot_energy_consumed",
+    "actual_robot_braking_energy_dissipated",
+}  # fmt: skip
 """Variables of RTDE whose values need all ticks before."""
 
 
@@ -40,17 +50,13 @@ def _target(state: State) -> _Target:
     return _Target(state.unshaped_q, state.unshaped_qd, state.unshaped_qdd)
 
 
-class StateFunctions:
-    """Reads the state of one robot.
+class StateFunctions(Family):
+    """Reads the state of one robot."""
 
-    Args:
-        access: The robot.
-        arm: Its arm.
-        kinematics: Its kinematics.
-    """
+    title = "State"
 
-    def __init__(self, access: Access, arm: ProgramArm, kinematics: ProgramKinematics) -> None:
-        self._access, self._arm, self._kinematics = access, arm, kinematics
+    def __init__(self, on: Parts) -> None:
+        super().__init__(on)
         self._instruments: Instruments | None = None
         """What computes RTDE's variables, made when the first is read."""
 
@@ -178,22 +184,15 @@ class StateFunctions:
         return a_list(self._access.latest().actual_tool_accelerometer)
 
     @costs(300)
-    def get_rtde_value(self, key: object) -> Value:
-        """Return an output variable of RTDE, as it was in the last tick.
-
-        Raises:
-            Fault: There is none of this name, or only clients get it, since it is integrated over all ticks.
-        """
-        name = text("key", key)
-        if name in INTEGRATED:
-            raise Fault(f'get_rtde_value: only clients get "{name}", which is integrated over time')
+    def get_rtde_value(self, key: Text) -> Value:
+        """Return an output variable of RTDE, as it was in the last tick."""
+        if key in INTEGRATED:
+            raise Fault(f'get_rtde_value: only clients get "{key}", which is integrated over time')
         if self._instruments is None:
             self._instruments = Instruments(self._access.description)
-        snapshot = self._instruments.snapshot(self._access.latest(), self._access.io())
-        try:
-            value = getattr(snapshot, name) if name in VARIABLES else snapshot.register(name)
-        except AttributeError:
-            raise Fault(f'get_rtde_value: RTDE has no output "{name[:60]}"') from None
+        if key not in READERS:
+            raise Fault(f'get_rtde_value: RTDE has no output "{key[:60]}"')
+        value = getattr(self._instruments.snapshot(self._access.latest(), self._access.io()), key)
         if isinstance(value, list):
             return a_list([whole(one) if type(one) is int else float(one) for one in value])
         return whole(value) if type(value) is int else value
@@ -207,3 +206,91 @@ class StateFunctions:
 
     def _speed(self, q: list[float], qd: list[float]) -> Array:
         return a_list((self._kinematics.jacobian(np.array(q)) @ np.array(qd)).tolist())
+
+
+class PoseFunctions(Family):
+    """Answers questions about one robot's kinematics and dynamics."""
+
+    title = "Kinematics and dynamics"
+
+    def __init__(self, on: Parts) -> None:
+        super().__init__(on)
+        self._dynamics = InverseDynamics(on.access.description, on.access.motion.cycle.dynamics.payload)
+
+    @costs(150)
+    def get_inverse_kin(
+        self,
+        x: Target,
+        qnear: Joints | None = None,
+        maxPositionError: object = 1e-10,
+        maxOrientationError: object = 1e-10,
+        tcp: ToolPose | None = None,
+    ) -> Array:
+        """Return the joint positions nearest to others, or to the present ones, at which the tool has a pose.
+
+        The solution is exact to rounding, so both errors are met whatever they are.
+        """
+        return a_list(self._kinematics.posture(x, self._near(qnear), tcp))
+
+    @costs(150)
+    def get_inverse_kin_has_solution(
+        self,
+        x: Target,
+        qnear: Joints | None = None,
+        maxPositionError: object = 1e-10,
+        maxOrientationError: object = 1e-10,
+        tcp: ToolPose | None = None,
+    ) -> bool:
+        """Return whether `get_inverse_kin` has an answer."""
+        return self._solution(x, self._near(qnear), tcp) is not None
+
+    @costs(80)
+    def get_forward_kin(self, q: Joints | None = None, tcp: ToolPose | None = None) -> Pose:
+        """Return the pose of the tool at joint positions, or at the measured ones."""
+        return a_pose(self._kinematics.tool_pose(self._posture(q), tcp))
+
+    @costs(200)
+    def is_within_safety_limits(self, pose: object, qNear: Joints | None = None) -> bool:
+        """Return whether the arm can be at a pose or at joint positions: within their range, without a collision."""
+        if is_pose(pose):
+            q = self._solution(arguments.pose("pose", pose), self._near(qNear))
+        else:
+            q = numbers("pose", pose, self._access.description.joints)
+        if q is None:
+            return False
+        try:
+            check_joints(q, self._access.description)
+        except RefusalError:
+            return False
+        return self._access.motion.collisions.meeting(np.array(q)) is None
+
+    @costs(110)
+    def get_jacobian(self, q: Joints | None = None, tcp: ToolPose | None = None) -> Array:
+        """Return the Jacobian of the tool in the base frame, rows for velocity and angular velocity."""
+        matrix = self._kinematics.jacobian(self._posture(q), tcp)
+        return Array(tuple(a_list(row) for row in matrix.tolist()))
+
+    @costs(280)
+    def get_mass_matrix(self, q: Joints | None = None, include_rotors_inertia: object = True) -> Array:
+        """Return the inertia matrix of the joints with the declared payload [kg m^2]."""
+        self._dynamics.believe(self._access.motion.cycle.dynamics.bodies)
+        matrix = self._dynamics.inertia(self._posture(q))
+        matrix = np.triu(matrix) + np.triu(matrix, 1).T
+        if include_rotors_inertia:
+            matrix = matrix + np.diag(self._access.description.drives.rotor_inertia)
+        return Array(tuple(a_list(row) for row in matrix.tolist()))
+
+    def _solution(
+        self, goal: Sequence[float], near: Sequence[float], tcp: Sequence[float] | None = None
+    ) -> tuple[float, ...] | None:
+        """Joint positions nearest to others at which the tool has a pose; None if there are none."""
+        try:
+            return self._kinematics.posture(goal, near, tcp)
+        except Fault:
+            return None
+
+    def _near(self, near: Sequence[float] | None) -> Sequence[float]:
+        return self._access.latest().actual_q if near is None else near
+
+    def _posture(self, q: Sequence[float] | None) -> Floats:
+        return np.array(self._near(q), dtype=float)

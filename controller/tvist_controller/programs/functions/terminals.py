@@ -1,168 +1,223 @@
-"""Functions for digital and analogue inputs and outputs."""
+"""Functions for digital and analogue inputs and outputs, registers and flags."""
 
-from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import flag, integer, number, shown
-from tvist_controller.programs.arm import ProgramArm
-from tvist_controller.programs.moves import OWN_TOKEN
-from tvist_protocol.io import SetIo
+from typing import Annotated
+
+from tvist_controller.instruments.peripherals import MAX_INTEGER, MIN_INTEGER
+from tvist_controller.programs.arguments import Bit, Flag, Number, Share, either, integer, shown, whole
+from tvist_controller.programs.functions.family import Family, Parts
+from tvist_protocol.io import BITS, NUMBERS
 from tvist_urscript import Array, Fault, costs
 
 STANDARD, CONFIGURABLE, TOOL = range(8), range(8, 16), range(16, 18)
 """Bits of the digital terminals."""
+FLAGS = 32
+"""Number of flags, which only programs have."""
 
 
-class TerminalFunctions:
-    """Reads and sets the terminals of one robot.
+def _old(name: str, value: object) -> int:
+    """Bit of a digital terminal as it was numbered before configurable ones existed."""
+    number = integer(name, value, 0, 9)
+    return number if number < len(STANDARD) else TOOL[number - 8]
 
-    Args:
-        access: The robot.
-        arm: Its arm: what is set after a move that is blended is set where the blend begins.
-    """
 
-    def __init__(self, access: Access, arm: ProgramArm) -> None:
-        self._terminals, self._arm = access.peripherals, arm
+Old = Annotated[int, _old]
+Standard = Annotated[int, lambda name, value: STANDARD[whole(0, 7)(name, value)]]
+Configurable = Annotated[int, lambda name, value: CONFIGURABLE[whole(0, 7)(name, value)]]
+Tool = Annotated[int, lambda name, value: TOOL[whole(0, 1)(name, value)]]
+AnalogPort = Annotated[int, whole(0, 3)]
+Voltage = Annotated[bool, either]
+BitPlace = Annotated[int, whole(0, BITS - 1)]
+NumberPlace = Annotated[int, whole(0, NUMBERS - 1)]
+FlagPlace = Annotated[int, whole(0, FLAGS - 1)]
+
+
+class RegisterFunctions(Family):
+    """Reads and writes the registers of one robot."""
+
+    title = "Registers and flags"
+
+    def __init__(self, on: Parts) -> None:
+        super().__init__(on)
+        self._registers = on.access.peripherals
+        self._flags = [False] * FLAGS
+
+    def read_input_boolean_register(self, address: BitPlace) -> bool:
+        """Read an input bit, which clients write."""
+        return self._registers.bit("input_bit", address)
+
+    def read_input_integer_register(self, address: NumberPlace) -> int:
+        """Read an input integer, which clients write."""
+        return self._registers.integers("input_int")[address]
+
+    def read_input_float_register(self, address: NumberPlace) -> float:
+        """Read an input number, which clients write."""
+        return self._registers.doubles("input_double")[address]
+
+    def read_output_boolean_register(self, address: BitPlace) -> bool:
+        """Read an output bit, which programs write."""
+        return self._registers.bit("output_bit", address)
+
+    def read_output_integer_register(self, address: NumberPlace) -> int:
+        """Read an output integer, which programs write."""
+        return self._registers.integers("output_int")[address]
+
+    def read_output_float_register(self, address: NumberPlace) -> float:
+        """Read an output number, which programs write."""
+        return self._registers.doubles("output_double")[address]
+
+    @costs(8)
+    def write_output_boolean_register(self, address: BitPlace, value: Flag) -> None:
+        """Write an output bit, which clients read."""
+        self._arm.then(lambda: self._registers.write("output_bit", address, value))
+
+    @costs(8)
+    def write_output_integer_register(
+        self, address: NumberPlace, value: Annotated[int, whole(MIN_INTEGER, MAX_INTEGER)]
+    ) -> None:
+        """Write an output integer of 32 bits, which clients read."""
+        self._arm.then(lambda: self._registers.write("output_int", address, value))
+
+    @costs(8)
+    def write_output_float_register(self, address: NumberPlace, value: Number) -> None:
+        """Write an output number, which clients read."""
+        self._arm.then(lambda: self._registers.write("output_double", address, value))
+
+    def get_flag(self, n: FlagPlace) -> bool:
+        """Return one of 32 flags, which only programs can read and set."""
+        return self._flags[n]
+
+    @costs(3)
+    def set_flag(self, n: FlagPlace, value: Flag) -> None:
+        """Set one of the flags."""
+
+        def write() -> None:
+            self._flags[n] = value
+
+        self._arm.then(write)
+
+
+class TerminalFunctions(Family):
+    """Reads and sets the terminals of one robot."""
+
+    title = "Inputs and outputs"
+
+    def __init__(self, on: Parts) -> None:
+        super().__init__(on)
+        self._terminals = on.access.peripherals
 
     # ------------------------------------------------------------------ digital
 
     @costs(10)
-    def set_digital_out(self, n: object, b: object) -> None:
+    def set_digital_out(self, n: Old, b: Flag) -> None:
         """Set a digital output: 0 to 7 standard, 8 and 9 those of the tool, as before configurable ones existed."""
-        number_ = integer("n", n, 0, 9)
-        self._set(number_ if number_ < len(STANDARD) else TOOL[number_ - 8], flag("b", b))
+        self._set(n, b)
 
     @costs(10)
-    def set_standard_digital_out(self, n: object, b: object) -> None:
+    def set_standard_digital_out(self, n: Standard, b: Flag) -> None:
         """Set one of the eight standard digital outputs."""
-        self._set(STANDARD[integer("n", n, 0, 7)], flag("b", b))
+        self._set(n, b)
 
     @costs(10)
-    def set_configurable_digital_out(self, n: object, b: object) -> None:
+    def set_configurable_digital_out(self, n: Configurable, b: Flag) -> None:
         """Set one of the eight configurable digital outputs."""
-        self._set(CONFIGURABLE[integer("n", n, 0, 7)], flag("b", b))
+        self._set(n, b)
 
     @costs(10)
-    def set_tool_digital_out(self, n: object, b: object) -> None:
+    def set_tool_digital_out(self, n: Tool, b: Flag) -> None:
         """Set one of the two digital outputs of the tool."""
-        self._set(TOOL[integer("n", n, 0, 1)], flag("b", b))
+        self._set(n, b)
 
-    def get_digital_in(self, n: object) -> bool:
+    def get_digital_in(self, n: Old) -> bool:
         """Return a digital input, numbered as in `set_digital_out`."""
-        number_ = integer("n", n, 0, 9)
-        return self._input(number_ if number_ < len(STANDARD) else TOOL[number_ - 8])
+        return self._input(n)
 
-    def get_digital_out(self, n: object) -> bool:
+    def get_digital_out(self, n: Old) -> bool:
         """Return a digital output, numbered as in `set_digital_out`."""
-        number_ = integer("n", n, 0, 9)
-        return self._output(number_ if number_ < len(STANDARD) else TOOL[number_ - 8])
+        return self._output(n)
 
-    def get_standard_digital_in(self, n: object) -> bool:
+    def get_standard_digital_in(self, n: Standard) -> bool:
         """Return one of the eight standard digital inputs."""
-        return self._input(STANDARD[integer("n", n, 0, 7)])
+        return self._input(n)
 
-    def get_standard_digital_out(self, n: object) -> bool:
+    def get_standard_digital_out(self, n: Standard) -> bool:
         """Return one of the eight standard digital outputs."""
-        return self._output(STANDARD[integer("n", n, 0, 7)])
+        return self._output(n)
 
-    def get_configurable_digital_in(self, n: object) -> bool:
+    def get_configurable_digital_in(self, n: Configurable) -> bool:
         """Return one of the eight configurable digital inputs."""
-        return self._input(CONFIGURABLE[integer("n", n, 0, 7)])
+        return self._input(n)
 
-    def get_configurable_digital_out(self, n: object) -> bool:
+    def get_configurable_digital_out(self, n: Configurable) -> bool:
         """Return one of the eight configurable digital outputs."""
-        return self._output(CONFIGURABLE[integer("n", n, 0, 7)])
+        return self._output(n)
 
-    def get_tool_digital_in(self, n: object) -> bool:
+    def get_tool_digital_in(self, n: Tool) -> bool:
         """Return one of the two digital inputs of the tool."""
-        return self._input(TOOL[integer("n", n, 0, 1)])
+        return self._input(n)
 
-    def get_tool_digital_out(self, n: object) -> bool:
+    def get_tool_digital_out(self, n: Tool) -> bool:
         """Return one of the two digital outputs of the tool."""
-        return self._output(TOOL[integer("n", n, 0, 1)])
+        return self._output(n)
 
     # ------------------------------------------------------------------ analogue, tool and run state
 
     @costs(10)
-    def set_analog_out(self, n: object, f: object) -> None:
+    def set_analog_out(self, n: Bit, f: Share) -> None:
         """Set an analogue output to a share of its range."""
-        self.set_standard_analog_out(n, f)
+        self._arm.then(lambda: self._terminals.set_analog_output(n, f))
 
-    @costs(10)
-    def set_standard_analog_out(self, n: object, f: object) -> None:
-        """Set an analogue output to a share of its range."""
-        place, share = integer("n", n, 0, 1), number("f", f, 0.0, 1.0)
-        voltage = self._terminals.output_is_voltage(place)
-        command = SetIo(
-            token=OWN_TOKEN,
-            standard_analog_output_mask=1 << place,
-            standard_analog_output_type=int(voltage) << place,
-            standard_analog_output_0=share,
-            standard_analog_output_1=share,
-        )
-        self._arm.then(lambda: self._terminals.set_outputs(command))
+    set_standard_analog_out = set_analog_out
 
-    def set_analog_outputdomain(self, port: object, domain: object) -> None:
+    def set_analog_outputdomain(self, port: Bit, domain: Voltage) -> None:
         """Make an analogue output a current (0) or a voltage (1)."""
-        place, voltage = integer("port", port, 0, 1), bool(integer("domain", domain, 0, 1))
-        self._arm.then(lambda: self._terminals.choose_output(place, voltage=voltage))
+        self._arm.then(lambda: self._terminals.choose_output(port, voltage=domain))
 
-    def set_analog_inputrange(self, port: object, range: object) -> None:
+    def set_analog_inputrange(self, port: AnalogPort, range: Annotated[int, whole(0, 2)]) -> None:
         """Make ports 0 and 1 a voltage by ranges 0 and 2; those of the tool, 2 and 3, by 0 and 1, or a current by 2."""
-        place = integer("port", port, 0, 3)
-        which = integer("range", range, 0, 2)
-        if place > 1:
-            self._arm.then(lambda: self._terminals.choose_tool_input(place - 2, voltage=which < 2))
-        elif which == 1:
+        if port > 1:
+            self._arm.then(lambda: self._terminals.choose_tool_input(port - 2, voltage=range < 2))
+        elif range == 1:
             raise Fault("range is 1: a range from -5 to 5 V exists no more, so it must be 0 or 2")
         else:
-            self._arm.then(lambda: self._terminals.choose_input(place, voltage=True))
+            self._arm.then(lambda: self._terminals.choose_input(port, voltage=True))
 
-    def set_standard_analog_input_domain(self, port: object, domain: object) -> None:
+    def set_standard_analog_input_domain(self, port: Bit, domain: Voltage) -> None:
         """Make an analogue input a current (0) or a voltage (1)."""
-        place, voltage = integer("port", port, 0, 1), bool(integer("domain", domain, 0, 1))
-        self._arm.then(lambda: self._terminals.choose_input(place, voltage=voltage))
+        self._arm.then(lambda: self._terminals.choose_input(port, voltage=domain))
 
-    def set_tool_voltage(self, voltage: object) -> None:
+    def set_tool_voltage(self, voltage: Annotated[int, whole(0, 24)]) -> None:
         """Set the supply of the tool: 0, 12 or 24 V."""
-        wanted = integer("voltage", voltage, 0, 24)
-        if wanted not in {0, 12, 24}:
-            raise Fault(f"voltage is {wanted}: it must be 0, 12 or 24")
-        self._arm.then(lambda: self._terminals.set_tool_voltage(wanted))
+        if voltage not in {0, 12, 24}:
+            raise Fault(f"voltage is {voltage}: it must be 0, 12 or 24")
+        self._arm.then(lambda: self._terminals.set_tool_voltage(voltage))
 
     def set_runstate_outputs(self, outputs: object) -> None:
-        """Accept that no output shows whether a program runs.
-
-        Raises:
-            Fault: One should, which is not simulated.
-        """
+        """Accept that no output shows whether a program runs."""
         if not isinstance(outputs, Array):
             raise Fault(f"outputs is {shown(outputs)}: it must be a list")
         if any(bool(item) for item in outputs.items):
             raise Fault("set_runstate_outputs: outputs that show whether a program runs are not simulated")
 
-    def get_analog_in(self, n: object) -> float:
+    def get_analog_in(self, n: AnalogPort) -> float:
         """Return an analogue input: 0 and 1 of the control box, 2 and 3 of the tool [A or V]."""
-        place = integer("n", n, 0, 3)
-        return self.get_standard_analog_in(place) if place < 2 else self.get_tool_analog_in(place - 2)
+        return self.get_standard_analog_in(n) if n < 2 else self.get_tool_analog_in(n - 2)
 
-    def get_standard_analog_in(self, n: object) -> float:
+    def get_standard_analog_in(self, n: Bit) -> float:
         """Return an analogue input of the control box [A or V]."""
-        return self._terminals.analog_inputs[integer("n", n, 0, 1)]
+        return self._terminals.analog_inputs[n]
 
-    def get_tool_analog_in(self, n: object) -> float:
+    def get_tool_analog_in(self, n: Bit) -> float:
         """Return an analogue input of the tool [V]."""
-        return self._terminals.tool_analog_inputs[integer("n", n, 0, 1)]
+        return self._terminals.tool_analog_inputs[n]
 
-    def get_analog_out(self, n: object) -> float:
+    def get_analog_out(self, n: Bit) -> float:
         """Return an analogue output as a share of its range."""
-        return self.get_standard_analog_out(n)
+        return self._terminals.analog_shares[n]
 
-    def get_standard_analog_out(self, n: object) -> float:
-        """Return an analogue output as a share of its range."""
-        return self._terminals.analog_ratio(integer("n", n, 0, 1))
+    get_standard_analog_out = get_analog_out
 
     def _set(self, bit: int, on: bool) -> None:
-        command = SetIo(token=OWN_TOKEN, digital_output_mask=1 << bit, digital_outputs=int(on) << bit)
-        self._arm.then(lambda: self._terminals.set_outputs(command))
+        self._arm.then(lambda: self._terminals.set_digital_outputs(1 << bit, on << bit))
 
     def _input(self, bit: int) -> bool:
         return bool(self._terminals.digital_inputs >> bit & 1)

@@ -1,118 +1,99 @@
 """Functions of UR's controllers that this one does not simulate: each says so when it is called."""
 
-from collections.abc import Callable
+import ast
+from collections.abc import Callable, Iterator, Mapping
 
 from tvist_urscript import METHOD, Fault, Parameter, parameters
 
-_LIGHT, _CONVEYORS, _OFFSETS, _MODBUS = "the light of the base", "conveyor tracking", "path offsets", "Modbus"
-_OPERATOR, _EUROMAP, _OTHERS = (
-    "questions to an operator",
-    "Euromap 67",
-    "remote procedure calls and Ethernet/IP",
-)
-_TEMPERATURES, _LIMITS = "temperatures in programs", "limits of the force at the tool"
-_SIGNAL = parameters("signal_name")
-
-SUBJECTS: dict[str, tuple[tuple[Parameter, ...], str]] = {
-    "direct_torque": (
-        parameters("torque", friction_comp=True, viscous_scale=None, coulomb_scale=None),
-        "torque control",
+_OTHERS = "remote procedure calls and Ethernet/IP"
+_CALLS = {
+    "torque control": ("direct_torque(torque, friction_comp=True, viscous_scale=None, coulomb_scale=None)",),
+    "conveyor tracking": (
+        "conveyor_pulse_decode(type, A, B=0)",
+        "encoder_enable_pulse_decode(encoder_index, decoder_type, A, B)",
+        "encoder_enable_set_tick_count(encoder_index, range_id)",
+        "encoder_get_tick_count(encoder_index)",
+        "encoder_set_tick_count(encoder_index, count)",
+        "encoder_unwind_delta_tick_count(encoder_index, delta_tick_count)",
+        "get_conveyor_tick_count()",
+        "set_conveyor_tick_count(tick_count, absolute_encoder_resolution=0)",
+        "track_conveyor_linear(direction, ticks_per_meter, encoder_index=0)",
+        "track_conveyor_circular(center, ticks_per_revolution, rotate_tool=False, encoder_index=0)",
+        "stop_conveyor_tracking(a=20)",
     ),
-    "conveyor_pulse_decode": (parameters("type", "A", B=0), _CONVEYORS),
-    "encoder_enable_pulse_decode": (parameters("encoder_index", "decoder_type", "A", "B"), _CONVEYORS),
-    "encoder_enable_set_tick_count": (parameters("encoder_index", "range_id"), _CONVEYORS),
-    "encoder_get_tick_count": (parameters("encoder_index"), _CONVEYORS),
-    "encoder_set_tick_count": (parameters("encoder_index", "count"), _CONVEYORS),
-    "encoder_unwind_delta_tick_count": (parameters("encoder_index", "delta_tick_count"), _CONVEYORS),
-    "get_conveyor_tick_count": (parameters(), _CONVEYORS),
-    "set_conveyor_tick_count": (parameters("tick_count", absolute_encoder_resolution=0), _CONVEYORS),
-    "track_conveyor_linear": (parameters("direction", "ticks_per_meter", encoder_index=0), _CONVEYORS),
-    "track_conveyor_circular": (
-        parameters("center", "ticks_per_revolution", rotate_tool=False, encoder_index=0),
-        _CONVEYORS,
+    "path offsets": (
+        "path_offset_enable()",
+        "path_offset_get(type)",
+        "path_offset_set(offset, type)",
+        "path_offset_set_alpha_filter(alpha)",
+        "path_offset_set_max_offset(transLimit, rotLimit)",
+        "path_offset_disable(a=20)",
     ),
-    "stop_conveyor_tracking": (parameters(a=20), _CONVEYORS),
-    "path_offset_enable": (parameters(), _OFFSETS),
-    "path_offset_get": (parameters("type"), _OFFSETS),
-    "path_offset_set": (parameters("offset", "type"), _OFFSETS),
-    "path_offset_set_alpha_filter": (parameters("alpha"), _OFFSETS),
-    "path_offset_set_max_offset": (parameters("transLimit", "rotLimit"), _OFFSETS),
-    "path_offset_disable": (parameters(a=20), _OFFSETS),
-    "modbus_add_signal": (
-        parameters(
-            "IP",
-            "slave_number",
-            "signal_address",
-            "signal_type",
-            "signal_name",
-            sequential_mode=False,
-            register_count=1,
-        ),
-        _MODBUS,
+    "Modbus": (
+        """modbus_add_signal(IP, slave_number, signal_address, signal_type, signal_name,
+            sequential_mode=False, register_count=1)""",
+        """modbus_add_rw_signal(IP, slave_number, read_address, read_register_count, write_address,
+            write_register_count, signal_name, sequential_mode=False)""",
+        "modbus_delete_signal(signal_name)",
+        "modbus_get_error(signal_name, error_source=0)",
+        "modbus_get_signal_status(signal_name, is_secondary_program=False)",
+        "modbus_get_time_since_signal_invalid(signal_name)",
+        "modbus_request_update_signal_value(signal_name)",
+        "modbus_reset_connection(connection_id, is_blocking=True)",
+        "modbus_send_custom_command(IP, slave_number, function_code, data)",
+        "modbus_set_digital_input_action(signal_name, action)",
+        "modbus_set_output_register(signal_name, register_value, is_secondary_program=False)",
+        "modbus_set_output_signal(signal_name, digital_value, is_secondary_program=False)",
+        "modbus_set_runstate_dependent_choice(signal_name, runstate_choice)",
+        "modbus_set_signal_update_frequency(signal_name, update_frequency)",
+        "modbus_set_signal_watchdog(signal_name, new_timeout_in_sec)",
+        "read_port_bit(address)",
+        "read_port_register(address)",
+        "write_port_bit(address, value)",
+        "write_port_register(address, value)",
     ),
-    "modbus_add_rw_signal": (
-        parameters(
-            "IP",
-            "slave_number",
-            "read_address",
-            "read_register_count",
-            "write_address",
-            "write_register_count",
-            "signal_name",
-            sequential_mode=False,
-        ),
-        _MODBUS,
+    _OTHERS: ("rpc_factory(type, url)", "eip_reader_factory(name, size)", "eip_writer_factory(name, size)"),
+    "Euromap 67": (
+        "get_euromap_input(port_number)",
+        "get_euromap_output(port_number)",
+        "set_euromap_output(port_number, signal_value)",
+        "set_euromap_runstate_dependent_choice(port_number, runstate_choice)",
     ),
-    "modbus_delete_signal": (_SIGNAL, _MODBUS),
-    "modbus_get_error": (parameters("signal_name", error_source=0), _MODBUS),
-    "modbus_get_signal_status": (parameters("signal_name", is_secondary_program=False), _MODBUS),
-    "modbus_get_time_since_signal_invalid": (_SIGNAL, _MODBUS),
-    "modbus_request_update_signal_value": (_SIGNAL, _MODBUS),
-    "modbus_reset_connection": (parameters("connection_id", is_blocking=True), _MODBUS),
-    "modbus_send_custom_command": (parameters("IP", "slave_number", "function_code", "data"), _MODBUS),
-    "modbus_set_digital_input_action": (parameters("signal_name", "action"), _MODBUS),
-    "modbus_set_output_register": (
-        parameters("signal_name", "register_value", is_secondary_program=False),
-        _MODBUS,
+    "questions to an operator": (
+        "request_boolean_from_primary_client(message)",
+        "request_float_from_primary_client(message)",
+        "request_integer_from_primary_client(message)",
+        "request_string_from_primary_client(message)",
     ),
-    "modbus_set_output_signal": (
-        parameters("signal_name", "digital_value", is_secondary_program=False),
-        _MODBUS,
+    "the light of the base": ("set_baselight_iec()", "set_baselight_off()", "set_baselight_solid(r, g, b)"),
+    "temperatures in programs": ("get_controller_temp()", "get_joint_temp(j)", "get_tool_temp()"),
+    "limits of the force at the tool": (
+        "tool_wrench_limit_set(frame_offset, Fx, Fy, Fz, Mx, My, Mz)",
+        "tool_wrench_limit_disable()",
     ),
-    "modbus_set_runstate_dependent_choice": (parameters("signal_name", "runstate_choice"), _MODBUS),
-    "modbus_set_signal_update_frequency": (parameters("signal_name", "update_frequency"), _MODBUS),
-    "modbus_set_signal_watchdog": (parameters("signal_name", "new_timeout_in_sec"), _MODBUS),
-    "read_port_bit": (parameters("address"), _MODBUS),
-    "read_port_register": (parameters("address"), _MODBUS),
-    "write_port_bit": (parameters("address", "value"), _MODBUS),
-    "write_port_register": (parameters("address", "value"), _MODBUS),
-    "rpc_factory": (parameters("type", "url"), _OTHERS),
-    "eip_reader_factory": (parameters("name", "size"), _OTHERS),
-    "eip_writer_factory": (parameters("name", "size"), _OTHERS),
-    METHOD: ((), _OTHERS),
-    "get_euromap_input": (parameters("port_number"), _EUROMAP),
-    "get_euromap_output": (parameters("port_number"), _EUROMAP),
-    "set_euromap_output": (parameters("port_number", "signal_value"), _EUROMAP),
-    "set_euromap_runstate_dependent_choice": (parameters("port_number", "runstate_choice"), _EUROMAP),
-    "request_boolean_from_primary_client": (parameters("message"), _OPERATOR),
-    "request_float_from_primary_client": (parameters("message"), _OPERATOR),
-    "request_integer_from_primary_client": (parameters("message"), _OPERATOR),
-    "request_string_from_primary_client": (parameters("message"), _OPERATOR),
-    "set_baselight_iec": (parameters(), _LIGHT),
-    "set_baselight_off": (parameters(), _LIGHT),
-    "set_baselight_solid": (parameters("r", "g", "b"), _LIGHT),
-    "get_controller_temp": (parameters(), _TEMPERATURES),
-    "get_joint_temp": (parameters("j"), _TEMPERATURES),
-    "get_tool_temp": (parameters(), _TEMPERATURES),
-    "tool_wrench_limit_set": (parameters("frame_offset", "Fx", "Fy", "Fz", "Mx", "My", "Mz"), _LIMITS),
-    "tool_wrench_limit_disable": (parameters(), _LIMITS),
-    "estimate_payload": (parameters("poses", "wrenches"), "estimating a payload"),
-    "get_coriolis_and_centrifugal_torques": (parameters(q=None, qd=None), "Coriolis torques in programs"),
-    "get_jacobian_time_derivative": (parameters(q=None, qd=None, tcp=None), "the Jacobian's derivative"),
-    "pause_on_error_code": (parameters("code", "argument"), "error codes of the joints"),
-    "set_pos": (parameters("q"), "programs that put the arm elsewhere at once"),
-    "screw_driving": (parameters("f", "v_limit"), "screw driving"),
+    "estimating a payload": ("estimate_payload(poses, wrenches)",),
+    "Coriolis torques in programs": ("get_coriolis_and_centrifugal_torques(q=None, qd=None)",),
+    "the Jacobian's derivative": ("get_jacobian_time_derivative(q=None, qd=None, tcp=None)",),
+    "error codes of the joints": ("pause_on_error_code(code, argument)",),
+    "programs that put the arm elsewhere at once": ("set_pos(q)",),
+    "screw driving": ("screw_driving(f, v_limit)",),
 }
+"""What is not simulated, and the functions that need it, as scripts call them."""
+
+
+def _subjects(
+    calls: Mapping[str, tuple[str, ...]],
+) -> Iterator[tuple[str, tuple[tuple[Parameter, ...], str]]]:
+    for subject, texts in calls.items():
+        for text in texts:
+            call = ast.parse(text, mode="eval").body
+            assert isinstance(call, ast.Call)
+            required = [ast.unparse(one) for one in call.args]
+            defaults = {one.arg: ast.literal_eval(one.value) for one in call.keywords if one.arg is not None}
+            yield ast.unparse(call.func), (parameters(*required, **defaults), subject)
+
+
+SUBJECTS: dict[str, tuple[tuple[Parameter, ...], str]] = dict(_subjects(_CALLS)) | {METHOD: ((), _OTHERS)}
 """Parameters of each function, and what is not simulated."""
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from tvist_controller.cell.urcap import Requests
+from tvist_controller.cell.gripper import Requests
 from tvist_server.gateways.ur.base import PortSession, Send
 
 AskGripper = Callable[[bytes, Callable[[bytes], None]], None]

@@ -1,15 +1,16 @@
-"""Output variables, which clients read: the annotated properties of a snapshot, and the registers."""
+"""Output variables, which clients read, with the registers among them."""
 
 from collections.abc import Callable, Iterator
 from operator import attrgetter
 from typing import Any, NamedTuple
 
 from tvist_controller.instruments.joint_lists import JOINT_LISTS
-from tvist_controller.instruments.snapshot import VARIABLES, Snapshot
+from tvist_controller.instruments.snapshot import Snapshot
+from tvist_controller.instruments.variables import VARIABLES
 from tvist_server.gateways.ur.rtde.registers import KINDS, SINGLE_BITS, registers
 from tvist_server.rtde.wire import Wire
 
-OUTPUTS: dict[str, Wire] = {name: Wire[word] for name, word in VARIABLES.items()} | {
+OUTPUTS: dict[str, Wire] = {name: Wire[one.type] for name, one in VARIABLES.items()} | {
     name: wire for kind in KINDS for name, wire in registers(kind)
 }
 """Type of every output variable by name."""
@@ -39,9 +40,10 @@ def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
 
 
 def _parts() -> Iterator[tuple[str, tuple[Part, int]]]:
-    for name, word in VARIABLES.items():
-        of_io = (getattr(Snapshot, name).__doc__ or "").startswith("Io:")
-        yield name, (Part(attrgetter(name), Wire[word].value[-1], of_io=of_io), 0)
+    for name, one in VARIABLES.items():
+        # What is computed may be read by others as well: the snapshot keeps it.
+        read = attrgetter(name) if one.source == "computed" else one.read
+        yield name, (Part(read, Wire[one.type].value[-1], of_io=one.source == "io"), 0)
     joints = Part(attrgetter("joint_lists"), "d", len(JOINT_LISTS))
     yield from ((name, (joints, row)) for row, name in enumerate(JOINT_LISTS))
     tool = Part(attrgetter("target_tool"), "d", 3)

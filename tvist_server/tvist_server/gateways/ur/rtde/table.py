@@ -1,14 +1,10 @@
 """`python -m tvist_server.gateways.ur.rtde.table`: prints docs/reference/rtde-variables.md."""
 
 from collections.abc import Iterable
-from inspect import getdoc
 
-from tvist_controller.instruments.snapshot import VARIABLES, Snapshot
+from tvist_controller.instruments.variables import VARIABLES
 from tvist_server.gateways.ur.rtde.inputs import NAMED as NAMED_INPUTS
 from tvist_server.rtde.wire import Wire
-
-SOURCES = ("State", "Io", "Computed", "Constant")
-"""Words with which the description of an output variable begins."""
 
 HEAD = """\
 # RTDE's variables
@@ -58,18 +54,14 @@ if it has changed.
 """
 
 
-def describe(name: str) -> tuple[str, str]:
-    """Source of an output variable that is no register, and what it is."""
-    text = " ".join((getdoc(getattr(Snapshot, name)) or "").split())
-    source, _, what = text.partition(": ")
-    if source not in SOURCES or not what.endswith("."):
-        raise ValueError(f"{name} must be described as one of {SOURCES}: {text!r}")
-    return source.lower(), what
+def describe(name: str) -> str:
+    """Return what an output variable is; an empty text if there is none of this name."""
+    return VARIABLES[name].what if name in VARIABLES else ""
 
 
 def _outputs() -> Iterable[tuple[str, ...]]:
-    for name, word in VARIABLES.items():
-        yield f"`{name}`", word, *describe(name)
+    for one in VARIABLES.values():
+        yield f"`{one.name}`", one.type, one.source, one.what
     for bank in ("output", "input"):
         for name, wire, what in REGISTER_ROWS:
             yield f"`{name.format(bank=bank)}`", wire.name, "io", f"Registers: {what}."

@@ -22,36 +22,22 @@ SETTLING = 4.0
 
 
 def approach(away: Floats, far: float, velocity: float, acceleration: float) -> Floats:
-    """Velocity towards a target that lets the motion come to rest there, shape as `away`.
+    """Velocity that lets a motion come to rest at a target; the way to it is `away`, its length `far`.
 
-    Args:
-        away: Way to it.
-        far: Its length.
-        velocity: Largest speed.
-        acceleration: Deceleration at the end.
+    It is at most the velocity that is given, and decelerates with the acceleration that is.
     """
     speed = min(velocity, math.sqrt(2.0 * acceleration * far), far / (SETTLING * PERIOD))
     return away * (speed / far) if far > 0.0 else away
 
 
-class LedMoves:
-    """Leads one robot.
-
-    Args:
-        access: The robot.
-        arm: Its arm.
-        kinematics: Its kinematics.
-    """
+class ForceModeMoves:
+    """Leads one robot."""
 
     def __init__(self, access: Access, arm: ProgramArm, kinematics: ProgramKinematics) -> None:
         self._access, self._arm, self._kinematics = access, arm, kinematics
 
     def follow(self, segment: Segment) -> Turns:
-        """Move along a part of a path in the axes that do not give way; with a blend, go on from its radius.
-
-        Raises:
-            Fault: It is an arc, another thread moves the arm, or the arm is moved by hand.
-        """
+        """Move along a part of a path in the axes that are stiff; with a blend, go on from its radius."""
         if self._access.force.by_hand:
             raise Fault("in freedrive the arm follows no moves: call end_freedrive_mode before")
         if isinstance(segment, ArcSegment):

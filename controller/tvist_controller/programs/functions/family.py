@@ -1,0 +1,41 @@
+"""What the functions of every subject have in common."""
+
+from typing import ClassVar, NamedTuple
+
+from tvist_controller.programs.access import Access
+from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.indicators import Popups, RunstateOutputs
+from tvist_controller.programs.interpreter import StatementQueue
+from tvist_controller.programs.kinematics import ProgramKinematics
+from tvist_controller.programs.sockets import Sockets
+from tvist_controller.programs.watchdogs import Watchdogs
+
+
+class Parts(NamedTuple):
+    """What the functions work on: one robot, and what its programs share."""
+
+    access: Access
+    arm: ProgramArm
+    kinematics: ProgramKinematics
+    popups: Popups
+    watchdogs: Watchdogs
+    sockets: Sockets
+    statements: StatementQueue
+    runstate: RunstateOutputs
+
+
+class Family:
+    """Functions of one subject for the programs of one robot.
+
+    Scripts call the public methods, whose arguments are checked as they are annotated, see `checked`.
+    What a function sets after a move that is blended is set where the blend begins, see `ProgramArm.then`.
+    """
+
+    title: ClassVar[str]
+    """The subject, for the page of reference."""
+
+    def __init__(self, on: Parts) -> None:
+        self._access, self._arm, self._kinematics, self._parts = on.access, on.arm, on.kinematics, on
+
+    def _warn(self, why: str) -> None:
+        self._access.emit("warning", why=why)
