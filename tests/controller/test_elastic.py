@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, calibration, cut, spring_loads
 
 from tvist_controller.calibrations import load
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.differentiator import Target
 from tvist_controller.line.elastic_feed_forward import MOST, ROTOR, ElasticFeedForward
 from tvist_controller.line.elastic_model import ElasticModel
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.kinematics import ForwardKinematics
 from tvist_controller.line.motor_command import follow
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.setup import Setup, body, paper_payload
@@ -215,11 +215,11 @@ def test_the_acceleration_of_bending_links_counts_where_the_smoothing_is_short(m
 
 def test_the_flange_accelerates_as_a_rigid_arms_would():
     """Independent of the lead's formula: the flexible arm's flange beside the rigid kinematics of its target."""
-    wrong, kinematics = {}, ForwardKinematics(UR5E)
+    wrong, arm = {}, Arm(UR5E)
     for name, late in (("none", 0), ("elastic", 1)):
         samples, truths = move(line(name, Q1, description=UR5E.clean()), Q3)
         flange = np.array([truth.flange_position for truth in truths])[late:]
-        rigid = np.array([kinematics.tool(sample.target.q, np.zeros(6))[0][:3] for sample in samples])
+        rigid = np.array([arm.pose(sample.target.q)[1] for sample in samples])
         away = flange - rigid[: len(flange)]
         wrong[name] = np.sqrt((np.diff(away, 2, axis=0) ** 2).sum(axis=1).mean()) / H**2
     assert wrong["elastic"] < 0.25 * wrong["none"]

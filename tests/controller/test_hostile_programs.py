@@ -10,8 +10,8 @@ from tests.examples import examples
 
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.straight_step import LOST, pseudo_inverse, straight_step
-from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.programs.allowance import PAUSE
 from tvist_controller.programs.functions.poses import PoseFunctions
 from tvist_controller.programs.journey import DELAY
@@ -144,8 +144,8 @@ def test_a_program_that_fails_has_used_what_it_used(monkeypatch):
 def test_a_tick_of_speedl_factors_few_jacobians_in_any_posture(q, program, monkeypatch):
     """For a program and for a client of the network alike."""
     robot = a_robot(q=tuple(q))
-    factored = Counts(monkeypatch, ToolKinematics, "inverse")
-    tried = Counts(monkeypatch, ToolKinematics, "straight")
+    factored = Counts(monkeypatch, Arm, "inverse")
+    tried = Counts(monkeypatch, Arm, "straight")
     random = Random(1)
     for _ in range(60):
         twist = [random.choice((-0.3, 0.0, 0.3)) for _ in range(6)]
@@ -164,7 +164,7 @@ def test_a_tick_of_speedl_factors_few_jacobians_in_any_posture(q, program, monke
 def test_a_tool_that_a_stretched_arm_cannot_move_is_told_at_once(q):
     """Outwards along the stretched arm there is no motion: before, the command was held without a word."""
     robot = Robot(q=tuple(q), shaper="none")
-    kinematics = ToolKinematics(UR5E)
+    kinematics = Arm(UR5E)
     left, values, _ = np.linalg.svd(kinematics.jacobian(np.array(q)))
     assert values[-1] < LOST
     lost = 0.1 * left[:, -1]

@@ -10,7 +10,7 @@ from tvist_controller.cell.gripper import Gripper
 from tvist_controller.cell.urcap import PORT, answer
 from tvist_controller.cell.wires import Wires
 from tvist_controller.commands.events import Emit
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.paths.poses import Placement, placement
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import Floats
@@ -70,7 +70,7 @@ class LiveCell:
             terminals.set_tcp(cell.tools[0].tcp)
         self._cell, self._plant, self._terminals, self._emit = cell, plant, terminals, emit
         self._hand = plant if isinstance(plant, Gripping) else None
-        self._kinematics = ToolKinematics(description)
+        self._kinematics = Arm(description)
         self._kinematics.pose(np.zeros(description.joints))  # its kernel is loaded before the first tick
         self.gripper = (
             None if cell.gripper is None else Gripper(cell.gripper.stroke, activated=cell.gripper.activated)

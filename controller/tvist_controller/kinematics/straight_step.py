@@ -5,8 +5,9 @@ import math
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.kinematics.denavit_hartenberg import Floats, kinematics_into
-from tvist_controller.kinematics.least_squares import pose_error
+from tvist_controller.kinematics.pose import locate, newton, pseudo_inverse
+from tvist_controller.kinematics.rotation import turn_into
+from tvist_plant.model import Floats
 
 FOUND, IMPOSSIBLE, SINGULAR = 0, 1, 2
 
@@ -20,77 +21,12 @@ FARTHEST_LOOK = 0.05
 """Largest angle of a joint over which it is measured [rad]."""
 SLOWEST = 0.01
 """Share of the commanded speed below which the tool counts as stuck [-]."""
-LOST = 1e-4
-"""Singular value of the Jacobian below which the joints cannot move the tool in its direction [m or rad per rad]."""
-SWEEPS = 15
-"""Largest number of sweeps over all pairs of the Jacobian's rows; seven are enough for any that was tried."""
 CORRECTIONS = 4
-"""Largest number of Newton steps with a kept Jacobian."""
-ACCURATE = 1e-11
-"""Error of the tool's pose at which they end [m or rad]."""
+"""Largest number of Newton's steps."""
 OFF = 1e-7
 """Error of the tool's pose that is not permitted [m or rad]."""
 FLAT = 1e-12
 """Factor of a rate that counts as zero."""
-
-
-@compiled_for_ticks
-def pseudo_inverse(jacobian: Floats, inverse: Floats) -> None:  # noqa: C901, PLR0912  a kernel: its branches are loops
-    """Compute the pseudo-inverse of a Jacobian without its lost directions, by one-sided Jacobi rotations.
-
-    numba's own decomposition needs scipy, which a served robot does without (Hestenes, 1958).
-
-    Args:
-        jacobian: Jacobian, shape (6, n).
-        inverse: Result, shape (n, 6).
-    """
-    n = jacobian.shape[1]
-    W, V = jacobian.copy(), np.eye(6)
-    for _ in range(SWEEPS):
-        turned = False
-        for i in range(5):
-            for j in range(i + 1, 6):
-                a, b, c = 0.0, 0.0, 0.0
-                for k in range(n):
-                    a, b, c = a + W[i, k] * W[i, k], b + W[j, k] * W[j, k], c + W[i, k] * W[j, k]
-                if c * c <= 1e-28 * a * b or min(a, b) < 1e-20:
-                    continue
-                turned = True
-                zeta = (b - a) / (2.0 * c)
-                t = math.copysign(1.0, zeta) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
-                cosine = 1.0 / math.sqrt(1.0 + t * t)
-                sine = cosine * t
-                for k in range(n):
-                    W[i, k], W[j, k] = cosine * W[i, k] - sine * W[j, k], sine * W[i, k] + cosine * W[j, k]
-                for k in range(6):
-                    V[i, k], V[j, k] = cosine * V[i, k] - sine * V[j, k], sine * V[i, k] + cosine * V[j, k]
-        if not turned:
-            break
-    inverse[:] = 0.0
-    for i in range(6):
-        square = 0.0
-        for k in range(n):
-            square += W[i, k] * W[i, k]
-        if square > LOST * LOST:
-            for k in range(n):
-                for m in range(6):
-                    inverse[k, m] += W[i, k] * V[i, m] / square
-
-
-@compiled_for_ticks
-def turn_into(angle: Floats, rotation: Floats, result: Floats) -> None:
-    """Turn a rotation matrix about the base frame's axes by a rotation vector, shape (3,) [rad] (Rodrigues)."""
-    x, y, z = angle[0], angle[1], angle[2]
-    size = math.sqrt(x * x + y * y + z * z)
-    s = math.sin(size) / size if size > 1e-8 else 1.0
-    half = math.sin(0.5 * size) / size if size > 1e-8 else 0.5
-    c = 2.0 * half * half
-    for k in range(3):
-        a, b, d = rotation[0, k], rotation[1, k], rotation[2, k]
-        u, v, w = y * d - z * b, z * a - x * d, x * b - y * a
-        result[0, k] = a + s * u + c * (y * w - z * v)
-        result[1, k] = b + s * v + c * (z * u - x * w)
-        result[2, k] = d + s * w + c * (x * v - y * u)
 
 
 @compiled_for_ticks
@@ -108,8 +44,8 @@ def rates_within(x: Floats, y: Floats, low: Floats, high: Floats) -> tuple[float
 
 
 @compiled_for_ticks
-def straight_step(  # noqa: C901, PLR0912  a kernel: its branches are loops
-    dh: Floats, tool_rotation: Floats, tool_position: Floats, inverse: Floats,
+def straight_step(  # noqa: C901  a kernel: its branches are loops
+    chain: Floats, inverse: Floats,
     joints: Floats, twists: Floats, ranges: Floats, change: Floats,
     rate: float, speed: float, slowest: float, acceleration: float, h: float,
     rotation: Floats, position: Floats, goal_rotation: Floats, goal_position: Floats, q: Floats,
@@ -117,9 +53,7 @@ def straight_step(  # noqa: C901, PLR0912  a kernel: its branches are loops
     """Follow the mean of two twists for a tick, at the rate that the joints' limits and the way's curvature permit.
 
     Args:
-        dh: Table of `dh_table`.
-        tool_rotation: Rotation of the tool in the flange frame, shape (3, 3).
-        tool_position: Tool centre point in the flange frame, shape (3,) [m].
+        chain: The links, the tool centre point being their end.
         inverse: Pseudo-inverse of the Jacobian in the middle of the tick, shape (n, 6).
         joints: Present positions [rad] and the step to them [rad], shape (2, n).
         twists: Twist at the beginning and at the end, in the trajectory's own time, shape (2, 6).
@@ -158,7 +92,7 @@ def straight_step(  # noqa: C901, PLR0912  a kernel: its branches are loops
     if fastest > 0.0:
         # Near a singular posture the joints' way bends: its second derivative times the speed squared accelerates them.
         ahead = min(LOOK * h * max(wanted, SLOWEST), FARTHEST_LOOK / fastest)
-        kinematics_into(dh, tool_rotation, tool_position, joints[0] + ahead * slope, turned, place, jacobian)
+        locate(chain, joints[0] + ahead * slope, turned, place, jacobian)
         there = np.empty((n, 6))
         pseudo_inverse(jacobian, there)
         bend = 1e-9
@@ -177,18 +111,7 @@ def straight_step(  # noqa: C901, PLR0912  a kernel: its branches are loops
     goal_position[:] = position + mean[:3]
     turn_into(mean[3:], rotation, goal_rotation)
     q[:] = joints[0] + before + new * after
-    error = np.empty(6)
-    off = math.inf
-    for correction in range(CORRECTIONS + 1):
-        kinematics_into(dh, tool_rotation, tool_position, q, turned, place, jacobian)
-        pose_error(goal_rotation, goal_position, turned, place, error)
-        off = np.max(np.abs(error))
-        if off <= ACCURATE or correction == CORRECTIONS:
-            break
-        for i in range(n):
-            for m in range(6):
-                q[i] += inverse[i, m] * error[m]
-    if not off <= OFF:
+    if not newton(chain, goal_rotation, goal_position, inverse, CORRECTIONS, q, np.empty(6)) <= OFF:
         return IMPOSSIBLE, rate
     for i in range(n):
         step = q[i] - joints[0, i]

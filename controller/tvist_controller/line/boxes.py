@@ -30,8 +30,8 @@ class Boxes(Struct, frozen=True, eq=False):
     """Joint controllers: what the drives are sent for a target."""
     plant: Plant
     """The arm."""
-    kernel_parts: tuple[Floats, float, Floats, Floats]
-    """Links, gravity, scratch and joint controllers, as `line_tick` takes them."""
+    kernel_parts: tuple[Floats, Floats, Floats]
+    """Links, scratch and joint controllers, as `line_tick` takes them."""
 
     @classmethod
     def of(
@@ -55,7 +55,7 @@ class Boxes(Struct, frozen=True, eq=False):
             dynamics,
             drives,
             plant,
-            (dynamics.chain, dynamics.gravitation, dynamics.scratch, drives.rows),
+            (dynamics.chain, dynamics.scratch, drives.rows),
         )
 
     def rest_at(self, q: Floats) -> Floats:

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.kinematics.elimination import eliminate
+from tvist_controller.kinematics.least_squares import solve_in_place
 from tvist_controller.line.differentiator import Floats
 from tvist_plant.chain import torques
 
@@ -44,7 +44,7 @@ def move_back(jacobian: Floats, joints: Integers, moved: Floats, back: Floats) -
         for column in range(3):
             for j in range(n):
                 square[row, column] += jacobian[row, joints[j]] * jacobian[column, joints[j]]
-    eliminate(square, moved)
+    solve_in_place(square, moved)
     for j in range(n):
         back[j] = 0.0
         for row in range(3):

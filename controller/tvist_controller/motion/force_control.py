@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from tvist_controller.commands.events import Emit
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.kinematics.tool import turn
+from tvist_controller.kinematics.rotation import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.contact import ContactWatch

@@ -5,7 +5,7 @@ from typing import TypeVar
 import numpy as np
 
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import GENTLEST_STOP, GuidedTorqueRoom, arm_limits
 from tvist_controller.line.line_mode import LineMode
@@ -37,7 +37,7 @@ class Guidance:
         """Largest position of each joint in either direction, shape (n,) [rad]."""
         self.torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.line.dynamics)
         """Motion that the torque permits."""
-        self._tcp, self._kinematics = motion.tcp, ToolKinematics(motion.cycle.description)
+        self._tcp, self._kinematics = motion.tcp, Arm(motion.cycle.description)
         self._kinematics.rehearse(PERIOD)
 
     def servo(self, q: Floats, lookahead: float, gain: float, *, shaped: bool) -> int:
@@ -130,7 +130,7 @@ class Guidance:
         self._halt("stop_l", stop, stop.duration)
 
     @property
-    def tool(self) -> ToolKinematics:
+    def tool(self) -> Arm:
         """Kinematics of the present tool centre point."""
         if self.motion.tcp != self._tcp:
             self._tcp = self.motion.tcp

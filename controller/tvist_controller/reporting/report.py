@@ -3,8 +3,8 @@
 import numpy as np
 from msgspec import Struct
 
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.differentiator import Floats, middle_of
-from tvist_controller.line.kinematics import ForwardKinematics
 from tvist_controller.line.sample import Sample
 from tvist_controller.reporting.state_layout import Layout, width, write_state
 from tvist_plant.plant import PERIOD
@@ -53,8 +53,8 @@ class Report(Struct, gc=False):
     """Sequence number of the newest accepted set-point."""
     missed: int
     """Number of ticks that began too late."""
-    kinematics: ForwardKinematics
-    """Kinematics of the tool, which must not change."""
+    arm: Arm
+    """The arm with its tool, which must not change."""
     layouts: Layouts
     """Layouts of such states."""
     made: State | None = None
@@ -88,7 +88,7 @@ class Report(Struct, gc=False):
         write_state(
             out, places, integers, tick, sequence or 0, PERIOD, self.speed, self.delay, sample.signals,
             before, middle, last, measured.q, measured.qd, measured.moment, measured.accelerometer,
-            self.kinematics.chain, self.kinematics.offset, f_d, self.zeta,
+            self.arm.chain, f_d, self.zeta,
             NOTHING if motors is None else motors.rows, NOWHERE if measured.wrench is None else measured.wrench,
         )  # fmt: skip
         return out.tobytes()
@@ -97,7 +97,7 @@ class Report(Struct, gc=False):
         sample, motors = self.sample, self.sample.motors
         unshaped = None if sample.unshaped is None else middle_of(sample.unshaped, PERIOD)
         target, measured = sample.target, sample.measured
-        motion = self.kinematics.motion(measured.q, measured.qd).tolist()
+        motion = self.arm.motion(measured.q, measured.qd).tolist()
         robot_mode, safety_mode, runtime = self.modes
         return State(
             tick=self.tick,

@@ -1,6 +1,7 @@
 """Conversion of a tick's signals into messages for clients."""
 
-from tvist_controller.line.kinematics import ForwardKinematics, rotation_vector
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.rotation import rotation_vector
 from tvist_controller.line.sample import Sample
 from tvist_controller.reporting.report import Layouts, Report
 from tvist_plant.description import RobotDescription
@@ -24,7 +25,7 @@ class Reporter:
 
     def __init__(self, description: RobotDescription, plant: Plant) -> None:
         self._joints = description.joints
-        self._kinematics = ForwardKinematics(description)
+        self._arm = Arm(description)
         self._layouts = Layouts()
         self._true_modes: dict[str, list[float]] = {}
         self._plant = plant
@@ -56,12 +57,12 @@ class Reporter:
         """
         return Report(
             tick, sample, modes, speed, tvist.f_d, tvist.zeta, tvist.delay + drive_delay,
-            tvist.clipped, setpoint_sequence, missed_ticks, self._kinematics, self._layouts,
+            tvist.clipped, setpoint_sequence, missed_ticks, self._arm, self._layouts,
         )  # fmt: skip
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
-        self._kinematics = self._kinematics.with_tool(offset)
+        self._arm = self._arm.with_tool(offset)
 
     def truth(self, tick: int, *, with_modes: bool) -> Truth:
         """Return what a real robot cannot measure, after a tick.

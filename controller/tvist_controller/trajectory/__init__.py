@@ -17,7 +17,7 @@ from tvist_controller.trajectory.slowed_stop import SlowedStop
 from tvist_controller.trajectory.speed import Speed
 from tvist_controller.trajectory.stop import JointStop
 from tvist_controller.trajectory.stream import SetpointStream
-from tvist_controller.trajectory.tool_speed import ToolKinematics, ToolSpeed
+from tvist_controller.trajectory.tool_speed import ToolSpeed
 
 AnyStop = JointStop | PathStop | SlowedStop
 """Any stop."""
@@ -45,7 +45,6 @@ __all__ = [
     "SlowedStop",
     "Speed",
     "StuckError",
-    "ToolKinematics",
     "ToolSpeed",
     "Trajectory",
     "Way",

@@ -4,13 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.rotation import turn, turned
 from tvist_controller.trajectory.base import Rest
 from tvist_controller.trajectory.following import Following
 from tvist_controller.trajectory.force_law import ForceTask, compliant_velocity
 from tvist_controller.trajectory.guided import Guided, StuckError
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
-from tvist_controller.trajectory.tool_speed import ToolKinematics
 
 NEWTON = 3
 """Newton steps from the tool's pose to the joints' angles; two suffice for what the tool moves in a tick."""
@@ -52,7 +53,7 @@ class Compliant(Following):
         torque: TorqueRoom,
         period: float,
         *,
-        tool: Callable[[], ToolKinematics],
+        tool: Callable[[], Arm],
         inner: Guided | Rest,
         felt: Callable[[], Floats],
     ) -> None:
@@ -69,7 +70,7 @@ class Compliant(Following):
         """Share of the law's velocity that a singular posture permits, of the last tick [-]."""
         self._begin(tool())
 
-    def _begin(self, kinematics: ToolKinematics) -> None:
+    def _begin(self, kinematics: Arm) -> None:
         """Let a tool centre point give way from the joints' present motion on."""
         q, qd, _ = self.state
         self.kinematics = kinematics
@@ -167,17 +168,17 @@ class Compliant(Following):
             return self._moved
         rotation, position = self._nominal
         self._nominal = there = self.kinematics.pose(self.inner.next())
-        way = np.concatenate((there[1] - position, self.kinematics.turn(rotation, there[0])))
+        way = np.concatenate((there[1] - position, turn(rotation, there[0])))
         self._moved = way / self._period
         return self._moved
 
     def _shifted(self, pose: tuple[Floats, Floats], way: Floats) -> tuple[Floats, Floats]:
-        return self.kinematics.turned(pose[0], way[3:]), pose[1] + way[:3]
+        return turned(pose[0], way[3:]), pose[1] + way[:3]
 
     def _off(self, q: Floats) -> Floats:
         """What the pose lacks to the one that is followed, shape (6,) [m, rad]."""
         rotation, position = self.kinematics.pose(q)
-        return np.concatenate((self._pose[1] - position, self.kinematics.turn(rotation, self._pose[0])))
+        return np.concatenate((self._pose[1] - position, turn(rotation, self._pose[0])))
 
     def _joints(self, q: Floats, inverse: Floats) -> tuple[Floats, Floats]:
         """Joints that reach the pose, from those nearby, and what is lacking then."""

@@ -1,9 +1,8 @@
 """Velocities of the tool, approached with constant acceleration while the tool goes straight."""
 
-from typing import Protocol
-
 import numpy as np
 
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.trajectory.guided import StuckError
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
@@ -19,32 +18,6 @@ USED = 0.95
 LOST_SHARE = 1e-3
 """Share of a twist in lost directions above which joints that stand cannot begin it [-]."""
 FOUND, _, SINGULAR = range(3)
-
-
-class ToolKinematics(Protocol):
-    """Kinematics of the tool centre point, in the base frame."""
-
-    def pose(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return its rotation matrix, shape (3, 3), and its position, shape (3,) [m]."""
-
-    def jacobian(self, q: Floats) -> Floats:
-        """Return the Jacobian of its velocity [m/s] and angular velocity [rad/s], shape (6, n)."""
-
-    def inverse(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return the Jacobian, and its pseudo-inverse without the directions that are lost, shape (n, 6)."""
-
-    def turn(self, start: Floats, end: Floats) -> Floats:
-        """Return the rotation vector from one rotation matrix to another, shape (3,) [rad]."""
-
-    def turned(self, rotation: Floats, angle: Floats) -> Floats:
-        """Return a rotation matrix turned by a rotation vector, shape (3,) [rad]."""
-
-    def straight(
-        self, inverse: Floats, joints: Floats, twists: Floats, ranges: Floats, change: Floats,
-        rate: float, speed: float, slowest: float, acceleration: float, period: float,
-        place: tuple[Floats, Floats],
-    ) -> tuple[int, float, Floats, tuple[Floats, Floats]]:  # fmt: skip
-        """Follow a straight way for a tick: whether that is possible, and rate, joints, and place of the tool then."""
 
 
 class ToolSpeed(Speed):
@@ -72,7 +45,7 @@ class ToolSpeed(Speed):
         self,
         state: tuple[Floats, Floats, Floats],
         limits: MotionLimits,
-        kinematics: ToolKinematics,
+        kinematics: Arm,
         torque: TorqueRoom,
         period: float,
         *,
