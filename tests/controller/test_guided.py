@@ -5,7 +5,7 @@ import pytest
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.rotation import turn
-from tvist_controller.trajectory import JointSpeed, MotionLimits
+from tvist_controller.trajectory import MotionLimits, Speed
 from tvist_controller.trajectory.servo import _step
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
@@ -212,7 +212,7 @@ def test_a_step_does_not_overload_the_drives_of_the_flexible_arm():
 
 
 def test_a_step_that_the_acceleration_allows_takes_one_tick_and_lands_exactly():
-    arm = JointSpeed((HOME, np.zeros(6), np.zeros(6)), MotionLimits(3.14, 40.0, 2000.0), Anything(), H)
+    arm = Speed((HOME, np.zeros(6), np.zeros(6)), MotionLimits(3.14, 40.0, 2000.0), Anything(), H)
     random, before = np.random.default_rng(1), np.zeros(6)
     for _ in range(200):
         qd = before + random.uniform(-0.02, 0.02, 6)

@@ -15,7 +15,6 @@ import pinocchio as pin
 from tvist_controller._compiled import compiled, compiled_for_ticks
 from tvist_controller.kinematics.pose import locate, newton, pseudo_inverse
 from tvist_controller.kinematics.rotation import turned_by
-from tvist_controller.kinematics.straight_step import straight_step
 from tvist_plant.chain import BODY, SCRATCH, SHIFT, TURN, chain_of, collect_inertia, sweep, torques
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, Floats, payload_inertia, rigid_model
@@ -159,28 +158,6 @@ class Arm:
         found, error = q.copy(), np.empty(6)
         newton(self.chain, *goal, self.inverse(q)[1] if inverse is None else inverse, steps, found, error)
         return found, error
-
-    def rehearse(self, period: float) -> None:
-        """Compile what `straight` uses, or load it from disk, before a tick needs it."""
-        n = len(self.chain) - 1
-        still, at = np.zeros((3, n)), self.pose(np.zeros(n))
-        inverse = self.inverse(still[0])[1]
-        self.straight(
-            inverse, still[:2], np.zeros((2, 6)), still, np.zeros(6), 1.0, 1.0, 1.0, 1.0, period, at
-        )
-
-    def straight(
-        self, inverse: Floats, joints: Floats, twists: Floats, ranges: Floats, change: Floats,
-        rate: float, speed: float, slowest: float, acceleration: float, period: float,
-        place: tuple[Floats, Floats],
-    ) -> tuple[int, float, Floats, tuple[Floats, Floats]]:  # fmt: skip
-        """Follow a straight way for a tick, see `straight_step`; return also the tool's rotation and position then."""
-        q, rotation, position = np.empty(len(inverse)), np.empty((3, 3)), np.empty(3)
-        status, new = straight_step(
-            self.chain, inverse, joints, twists, ranges, change, rate, speed, slowest, acceleration, period,
-            *place, rotation, position, q,
-        )  # fmt: skip
-        return status, new, q, (rotation, position)
 
     def torque(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
         """τ = M(q) q̈ + C(q, q̇) q̇ + g(q), shape (n,) [N m]."""

@@ -16,7 +16,7 @@ from tvist_controller.motion.contact import ContactWatch
 from tvist_controller.motion.external_sensor import SILENT, ExternalSensor
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.task_frame import Feature, frame_of
-from tvist_controller.trajectory import Compliant, ForceTask, Guided, JointSpeed, Rest
+from tvist_controller.trajectory import Compliant, ForceTask, Guided, Rest, Speed
 from tvist_controller.trajectory.compliant import CRAWL
 from tvist_controller.trajectory.force_law import FREE_DAMPING
 from tvist_plant.plant import PERIOD, Supervised
@@ -170,7 +170,7 @@ class ForceControl:
         elif self._cycle.mode.at_rest:
             inner = Rest(state[0])
         else:
-            inner = stop = JointSpeed(state, guidance.limits, guidance.torque, PERIOD)
+            inner = stop = Speed(state, guidance.limits, guidance.torque, PERIOD)
             stop.aim(np.zeros_like(state[0]), guidance.limits.acceleration)
         return Compliant(
             state, guidance.limits, guidance.reach, guidance.torque, PERIOD, tool=lambda: guidance.tool, inner=inner,

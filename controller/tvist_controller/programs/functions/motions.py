@@ -13,7 +13,7 @@ from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.journey import Turns
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.programs.led_moves import TURN, LedMoves, approach
-from tvist_controller.trajectory import Guided, JointSpeed, ToolSpeed
+from tvist_controller.trajectory import Guided, Speed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, Segment
 from tvist_protocol.transitions import Activity
@@ -230,7 +230,7 @@ class MotionFunctions:
 
         def until_reached() -> Iterator[None]:
             yield
-            while isinstance(speed := self._guided, JointSpeed | ToolSpeed) and speed.duration > 0.0:
+            while isinstance(speed := self._guided, Speed) and speed.duration > 0.0:
                 yield
 
         return until_reached
