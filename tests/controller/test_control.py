@@ -8,8 +8,9 @@ from tests.plant.arms import frames
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.rotation import rotation_vector
 from tvist_controller.line.differentiator import Differentiator, Target
+from tvist_controller.line.drive_feed_forward import DriveFeedForward
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.joint_controllers import JointControllers, command_drives
+from tvist_controller.line.joint_controllers import command_drives
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
@@ -142,7 +143,7 @@ def command_of(controllers, target, torque, gravity):
 def commanded(description, *targets):
     """Last of several drive commands, with torque and gravity as inverse dynamics gives them."""
     dynamics = InverseDynamics(description, body(paper_payload(description)))
-    controllers = JointControllers(description, H)
+    controllers = DriveFeedForward(description, H)
     for target in targets:
         torque, gravity = dynamics.torque(target.q, target.qd, target.qdd), dynamics.gravity(target.q)
         command = command_of(controllers, target, torque, gravity)
@@ -188,7 +189,7 @@ def test_at_rest_the_command_is_the_position_and_gravity():
 
 
 def test_a_reset_forgets_the_wind_up():
-    controllers, still = JointControllers(UR5E, H), np.zeros(6)
+    controllers, still = DriveFeedForward(UR5E, H), np.zeros(6)
     command_of(controllers, Target(Q1, still, still), np.full(6, 50.0), still)
     controllers.reset(still)
     assert not command_of(controllers, Target(Q1, still, still), still, still).qd.any()
