@@ -59,9 +59,6 @@ class InverseKinematics:
 
     `prepare` compiles what `solve` uses, or loads it from numba's cache; else
     the first call does so.
-
-    Args:
-        description: The robot.
     """
 
     def __init__(self, description: RobotDescription) -> None:

@@ -86,12 +86,7 @@ def torque_room(chain: Floats, q: Floats, qd: Floats, scratch: Floats, most: Flo
 
 
 class StreamTorqueRoom:
-    """The acceleration of a stream that the joints' torques permit, after gravity and velocities.
-
-    Args:
-        description: The robot.
-        dynamics: Its inverse dynamics with the declared payload.
-    """
+    """The acceleration of a stream that the joints' torques permit, after gravity and velocities."""
 
     def __init__(self, description: RobotDescription, dynamics: InverseDynamics) -> None:
         self._most = TORQUE_SHARE * np.array(description.limits.torque)
@@ -220,12 +215,6 @@ def largest_torque(dynamics: InverseDynamics, path: Path, velocity: float, accel
 
     Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), so it is largest at a corner of the range of ẋ² and ẍ. Seventeen
     points of the path are checked.
-
-    Args:
-        dynamics: Inverse dynamics with the declared payload.
-        path: Path of the motion.
-        velocity: Velocity limit of the path's parameter [rad/s].
-        acceleration: Acceleration of the path's parameter [rad/s^2].
     """
     way = path.end - path.start
     resting, pushed = _on_way(dynamics, path, path.start, way, velocity, acceleration)

@@ -13,11 +13,7 @@ from tvist_plant.plant import PERIOD, Measurement, PlantTruth
 
 
 class Still:
-    """A plant that does nothing but keep its last command.
-
-    Args:
-        joints: Number of joints.
-    """
+    """A plant that does nothing but keep its last command."""
 
     payload = Payload()
 

@@ -81,10 +81,6 @@ class Tracker:
     def follow(self, curve: ToolCurve, q: Floats) -> Knots:
         """Return the joints' way along a path of the tool.
 
-        Args:
-            curve: The path.
-            q: Joint positions at its start, shape (n,) [rad].
-
         Raises:
             WayError: A singular posture is on the way, or its poses cannot be reached.
         """
