@@ -68,7 +68,7 @@ SEED ?= 0
 search: setup
 	$(BESIDE) -m search --cases $(CASES) --seed $(SEED)
 
-# Those, and a search for an hour of what `.ci/run` searches for a minute.
+# Those, and a search for hours of what `.ci/run` searches for two minutes.
 soak: CASES = 2000
 soak: nightly search
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Coroutine, Mapping, Sequence
 from typing import Any
 
 import msgspec
+from tools.tables.markdown import markdown_table
 
 from benchmarks.figure import Figure, Tell
 from benchmarks.lateness import lateness
@@ -17,7 +18,6 @@ from benchmarks.served import bridge, reader, robots, rtde
 from benchmarks.start import start
 from tvist_lab.bench.machine import this_machine
 from tvist_lab.bench.one_robot import one_robot
-from tvist_lab.markdown_table import markdown_table
 from tvist_server.ending import end_like_interrupted
 
 COMPUTED: Mapping[str, Callable[[Tell], dict[str, Figure]]] = {

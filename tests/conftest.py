@@ -1,5 +1,6 @@
 """What all tests share: options, the order in which they run side by side, and figures that they measure."""
 
+import argparse
 import asyncio
 import signal
 
@@ -11,6 +12,12 @@ from tests.durations import Durations, arrange, in_turn, quick, turn_of
 settings.load_profile("full")
 
 
+def _count(text):
+    if not text.isdecimal() or text == "0":
+        raise argparse.ArgumentTypeError(f"is {text}: must be a whole number of at least 1")
+    return int(text)
+
+
 def pytest_addoption(parser):
     parser.addoption(
         "--keep-durations", action="store_true", help="write how long tests took: durations.json"
@@ -18,7 +25,7 @@ def pytest_addoption(parser):
     parser.addoption("--quick", action="store_true", help="run what is quick by durations.json")
     parser.addoption("--turn", help="run what is quick, and every n-th of the other cases: 1/2 or 2/2")
     parser.addoption(
-        "--cases", type=int, default=5, help="number of cases of each test with the mark `search`"
+        "--cases", type=_count, default=5, help="number of cases of each test with the mark `search`"
     )
     parser.addoption("--seed", type=int, default=0, help="seed of these cases")
 

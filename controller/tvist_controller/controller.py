@@ -34,11 +34,10 @@ from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.filter_control import Filters
 from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
-from tvist_controller.planning.basis import PlanBasis, ToolBasis
 from tvist_controller.planning.command_row import Call
 from tvist_controller.planning.filter_planner import PlannedFilter
-from tvist_controller.planning.plan import Plan
-from tvist_controller.planning.plans import Order, Plans
+from tvist_controller.planning.plan import Order, Plan, Plans
+from tvist_controller.planning.snapshot import Snapshot
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.reporting.report import Report
@@ -86,7 +85,7 @@ class Controller(WholeRobot):
         """Failure of the plant between two ticks, with which the next one deals."""
         self._next_timeout = -math.inf
         """Time at which something may time out next [s]."""
-        self.plans = Plans(planner, self._basis, order)
+        self.plans = Plans(planner, self.snapshot, order)
         """The way to plans."""
         first = planner.filters.first()
         self.cycle = _cycle(setup, first, plant)
@@ -162,17 +161,9 @@ class Controller(WholeRobot):
 
     # ------------------------------------------------------------------ inputs
 
-    @property
-    def basis(self) -> PlanBasis:
-        """The present state that plans for commands depend on."""
-        return self._basis()
-
-    def _basis(self, time: float | None = None) -> PlanBasis:
-        """The same; for a time, that of a path that goes on from the running motion, see `Plans`."""
-        on, motion = self.filters.basis, self.motion
-        tool = ToolBasis(motion.tcp, self.cycle.sample.reference)
-        moves = motion.basis(on) if time is None else motion.further_basis(on, time)
-        return PlanBasis(on, moves, tool, self.programs.statements.basis)
+    def snapshot(self, time: float | None = None) -> Snapshot:
+        """The present state that plans depend on; for a time, that of a path that goes on from the running motion."""
+        return self.motion.snapshot(self.filters.present, self.programs.statements.last, time)
 
     def receive(
         self,

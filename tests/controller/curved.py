@@ -50,8 +50,8 @@ def moving(curve, shaper: str, limits: MotionLimits, speed: float = 1.0) -> Subj
 def start(robot: Subject, curve, limits: MotionLimits = PAPER) -> None:
     """Begin a motion along a curve, as a command for it would."""
     own = setup(payload=DISC)
-    basis = robot.controller.basis.motion
-    planned = MovePlanner(own, FilterPlanner(own)).along(curve, limits, basis)
+    now = robot.controller.snapshot()
+    planned = MovePlanner(own, FilterPlanner(own)).along(curve, limits, now)
     robot.controller.motion.move(planned)
 
 

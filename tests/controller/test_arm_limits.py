@@ -142,7 +142,7 @@ def test_a_move_that_is_planned_in_the_tick_keeps_the_limits_too(arm):
         robot = Extreme(arm, "zv", np.random.default_rng([seed, 33]))
         controller = robot.controller
         command = c.MoveJ(token=robot.token, q=tuple(robot.goal.tolist()), **robot.full())
-        found = Planner(robot.setup).plan(command, controller.basis, within_tick=True).found
+        found = Planner(robot.setup).plan(command, controller.snapshot(), within_tick=True).found
         if isinstance(found, PlannedMove):
             controller.motion.move(found)
             robot.until_rest()
@@ -156,5 +156,5 @@ def test_a_move_names_the_limit_that_made_it_slowest():
     command = c.MoveJ(
         token=robot.token, q=robot.description.poses["Q3"], velocity=3.1, acceleration=8.0, jerk=500.0
     )
-    found = Planner(robot.setup).plan(command, robot.controller.basis, within_tick=True).found
+    found = Planner(robot.setup).plan(command, robot.controller.snapshot(), within_tick=True).found
     assert found.limited[0] == "limit_torque", found.limited

@@ -3,6 +3,7 @@
 from typing import get_args
 
 from tvist_controller.dispatch.table import COMMANDS
+from tvist_controller.planning.snapshot import MOTION
 from tvist_protocol import commands as c
 from tvist_protocol.channels import tag
 from tvist_protocol.transitions import TRANSITIONS, Activity
@@ -17,5 +18,5 @@ def test_every_command_has_a_row_and_a_part_of_the_robot_that_carries_it_out():
 
 def test_what_is_planned_on_the_arm_at_rest_is_what_moves_it_along_a_path():
     """The row says on which state a command is planned, the table of transitions where it leads."""
-    planned = {tag(row.message) for row in COMMANDS.values() if row.plan and row.plan.on == "motion"}
+    planned = {tag(row.message) for row in COMMANDS.values() if row.plan and row.plan.needs is MOTION}
     assert planned == {row.trigger for row in TRANSITIONS if row.target is Activity.MOVING} - {"resume"}

@@ -387,7 +387,7 @@ class TestOneThatFails:
         one, turning, words = failing
         turning.failing = True
         plan = Planner(one.controller.setup).plan(
-            c.SetShaper(token=one.token, name="mine"), one.controller.basis
+            c.SetShaper(token=one.token, name="mine"), one.controller.snapshot()
         )
         assert words in plan.found.reply.why
 

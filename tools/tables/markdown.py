@@ -1,9 +1,15 @@
-"""Tables of nested results in Markdown."""
+"""Tables in Markdown."""
 
 from collections.abc import Iterable, Sequence
 
-from tvist_lab.markdown_table import markdown_table
 from tvist_lab.study.tables import Entry, Shown, cells, titles
+
+
+def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, left: int | None = None) -> str:
+    """Return a table, without a line's end behind it, whose first `left` columns are aligned to the left; None: all."""
+    left = len(columns) if left is None else left
+    rule = ["---"] * left + ["---:"] * (len(columns) - left)
+    return "\n".join(f"| {' | '.join(line)} |" for line in (columns, rule, *rows))
 
 
 def in_markdown(entries: Iterable[Entry], columns: Sequence[Shown], *, left: int = 1) -> str:

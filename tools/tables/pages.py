@@ -6,9 +6,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from tools.tables.markdown import best_in_bold, in_markdown
+from tools.tables.markdown import best_in_bold, in_markdown, markdown_table
 from tools.tables.origins import MEANINGS, origins
-from tvist_lab.markdown_table import markdown_table
 from tvist_lab.studies import leaderboard, robustness
 from tvist_lab.studies.arms.about import REDUCED, SIZE, frequencies
 from tvist_lab.studies.paper.tables import FIGURES, METHODS, methods, table_2

@@ -11,8 +11,8 @@ from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.dispatch.table import COMMANDS
 from tvist_controller.host import Host
-from tvist_controller.planning.basis import PlanBasis
 from tvist_controller.planning.plan import Plan
+from tvist_controller.planning.snapshot import Snapshot
 from tvist_protocol.commands import Command, KeepAlive
 from tvist_protocol.replies import Posture, Refused, Reply, ToolPose
 from tvist_server.gateways.base import Answer
@@ -168,13 +168,13 @@ class PlanAhead:
         reply = found.reply if isinstance(found, RefusalError) else found
         self._post(lambda: answer(reply))
 
-    def _present(self) -> PlanBasis:
+    def _present(self) -> Snapshot:
         """The present state, which only the controller's thread may read.
 
         It does so just before a tick, so that most plans are ready long before the next.
         """
-        present = SimpleQueue[PlanBasis]()
-        self._post(lambda: present.put(self._host.controller.basis))
+        present = SimpleQueue[Snapshot]()
+        self._post(lambda: present.put(self._host.controller.snapshot()))
         return present.get()
 
     def _take(self, waiting: _Waiting, plan: Plan) -> bool:

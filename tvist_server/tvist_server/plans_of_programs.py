@@ -4,8 +4,8 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 from tvist_controller.dispatch.planner import Planner
-from tvist_controller.planning.basis import PlanBasis
 from tvist_controller.planning.plan import Plan
+from tvist_controller.planning.snapshot import Snapshot
 from tvist_protocol.commands import Command
 
 
@@ -25,9 +25,9 @@ class PlansOfPrograms:
         # Begun by the tick thread, it would inherit its priority.
         self._thread.submit(int)
 
-    def order(self, command: Command, basis: PlanBasis) -> Callable[[], Plan]:
+    def order(self, command: Command, now: Snapshot) -> Callable[[], Plan]:
         """Have a command planned on a state; returns what waits for the plan."""
-        return self._thread.submit(self._planner.plan, command, basis).result
+        return self._thread.submit(self._planner.plan, command, now).result
 
     def close(self) -> None:
         """Finish the current plan; to be called after the controller's thread has ended."""

@@ -110,7 +110,7 @@ class ServedRobot:
         else:
             planner = Planner(setup)  # used by the studies' thread alone
             experience = experience_of(
-                setup, students, self._studies.later, lambda lesson, on: planner.for_lesson(lesson, on.basis)
+                setup, students, self._studies.later, lambda lesson, on: planner.for_lesson(lesson, on.state)
             )
         self._host = Host(
             self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience,

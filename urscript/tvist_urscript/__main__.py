@@ -21,11 +21,15 @@ def main(arguments: list[str]) -> int:
 
     A function that neither the script nor the language has is taken to be the robot's.
     """
-    if len(arguments) != 1:
+    if len(arguments) != 1 or arguments[0].startswith("-"):
         print("usage: python -m tvist_urscript FILE", file=sys.stderr)
-        return 2
+        return 0 if arguments == ["--help"] else 2
     path = Path(arguments[0])
-    text = path.read_text(encoding="utf-8", errors="replace")
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as unreadable:
+        print(f"{path} cannot be read: {unreadable.strerror}", file=sys.stderr)
+        return 2
     lines = text.split("\n")
     errors = [error for error in check(text, ARRAYS) if not _is_of_robot(error, lines)]
     for error in errors:

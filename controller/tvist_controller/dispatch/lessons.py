@@ -9,10 +9,10 @@ from tvist_controller.experience.motion_record import Beliefs
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.filter_control import Filters
-from tvist_controller.planning.basis import FilterBasis
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import Plan, Planning
+from tvist_controller.planning.snapshot import FILTER, FilterState
 from tvist_controller.safety.declared_payload import DeclaredPayload
 from tvist_protocol.commands import Forget
 from tvist_protocol.lessons import PayloadLesson
@@ -37,7 +37,7 @@ class Lessons:
         filters: Filters,
         payload: DeclaredPayload,
         peripherals: Peripherals,
-        plan: Callable[[PayloadLesson, FilterBasis], Plan],
+        plan: Callable[[PayloadLesson, FilterState], Plan],
         emit: Emit,
     ) -> None:
         self._motion, self._filters, self._payload = motion, filters, payload
@@ -50,7 +50,7 @@ class Lessons:
 
     def beliefs(self) -> Beliefs:
         """Return what the robot takes its arm for."""
-        return Beliefs(self._payload.assumed, self._filters.basis)
+        return Beliefs(self._payload.assumed, self._filters.present)
 
     def learn(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
         """Take a lesson at rest, which changes how the robot moves from now on.
@@ -59,9 +59,9 @@ class Lessons:
             lesson: The lesson.
             plan: Plan for it, if it was made beforehand; it is used if it still holds.
         """
-        on = self._filters.basis
-        if plan is None or plan.basis != on:
-            plan = self._plan(lesson, on)
+        present = self._filters.present
+        if plan is None or plan.state != {"filter": present}:
+            plan = self._plan(lesson, present)
         found: Any = plan.found
         if isinstance(found, RefusalError):
             self._emit("warning", why=f"{lesson.why}; it is not assumed: {found.reply.why}")
@@ -79,6 +79,10 @@ class Lessons:
             Forget,
             _forget,
             changes_io=True,
-            plan=Planning("filter", FilterPlanner, lambda planner, _, on: planner.with_payload(on.given, on)),
+            plan=Planning(
+                FILTER,
+                FilterPlanner,
+                lambda planner, _, now: planner.with_payload(now.filter.given, now.filter),
+            ),
         ),
     )

@@ -8,6 +8,7 @@ from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.planning.path_planner import PathPlanner
 from tvist_controller.planning.plan import Planning
+from tvist_controller.planning.snapshot import MOTION
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_controller.trajectory import MotionLimits
@@ -17,8 +18,8 @@ from tvist_protocol.channels import tag
 from tvist_protocol.motions import JointSegment, MoveC, MoveL, MovePath
 from tvist_protocol.replies import Accepted, Reply
 
-_STRAIGHT = Planning("motion", MovePlanner, MovePlanner.move, MovePlanner.move_within_tick)
-_ALONG_PATH = Planning("motion", PathPlanner, PathPlanner.plan)
+_STRAIGHT = Planning(MOTION, MovePlanner, MovePlanner.move, MovePlanner.move_within_tick)
+_ALONG_PATH = Planning(MOTION, PathPlanner, PathPlanner.plan)
 
 
 def _check_limits(command: c.MoveJ | c.ServoStart, description: RobotDescription) -> None:

@@ -4,12 +4,12 @@ from typing import Any
 
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.dispatch.table import COMMANDS
-from tvist_controller.planning.basis import FilterBasis, PlanBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.planning.path_planner import PathPlanner
-from tvist_controller.planning.plan import Basis, Plan
+from tvist_controller.planning.plan import Found, Plan
 from tvist_controller.planning.reachable import Reachable
+from tvist_controller.planning.snapshot import FilterState, Snapshot
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.setup import Setup
 from tvist_protocol.commands import Command
@@ -17,11 +17,7 @@ from tvist_protocol.lessons import PayloadLesson
 
 
 class Planner:
-    """Plans for one robot. It keeps no state: equal commands on equal bases get equal plans.
-
-    Args:
-        setup: Initial setup.
-    """
+    """Plans for one robot. It keeps no state: equal commands on equal states get equal plans."""
 
     def __init__(self, setup: Setup) -> None:
         self._description = setup.description
@@ -50,30 +46,31 @@ class Planner:
         """Make what compiling a program needs; that is Python alone, and may be done while a robot ticks."""
         self._scripts.rehearse()
 
-    def for_lesson(self, lesson: PayloadLesson, basis: FilterBasis) -> Plan:
+    def for_lesson(self, lesson: PayloadLesson, present: FilterState) -> Plan:
         """Plan what the robot has learnt: the present filter for what it carries."""
+        found: Found | RefusalError
         try:
-            return Plan(basis, self.filters.with_payload(lesson.payload, basis))
+            found = self.filters.with_payload(lesson.payload, present)
         except RefusalError as refusal:
-            return Plan(basis, refusal)
+            found = refusal
+        return Plan({"filter": present}, found)
 
-    def plan(self, command: Command, basis: PlanBasis, *, within_tick: bool = False) -> Plan:
-        """Plan a command; a refusal is a plan, too.
+    def plan(self, command: Command, now: Snapshot, *, within_tick: bool = False) -> Plan:
+        """Plan a command, as its row says, on the present state; a refusal is a plan, too.
 
-        Args:
-            command: The command; its row says how it is planned.
-            basis: The present state.
-            within_tick: Whether the plan must be made within a tick; see `Planning.within_tick`.
+        `within_tick`: see `Planning.within_tick`.
         """
         row = COMMANDS[type(command)]
-        assert row.plan is not None, "the command is carried out without a plan"
-        on: Basis | None = getattr(basis, row.plan.on)
-        make = row.plan.make
-        if within_tick and row.plan.within_tick is not None:
-            make = row.plan.within_tick
+        planning = row.plan
+        assert planning is not None, "the command is carried out without a plan"
+        possible = now.movable or "movable" not in planning.needs
+        make = (within_tick and planning.within_tick) or planning.make
+        found: Found | RefusalError
         try:
             if row.check is not None:
                 row.check(command, self._description)
-            return Plan(on, None if on is None else make(self._planners[row.plan.by], command, on))
+            found = make(self._planners[planning.by], command, now) if possible else None
         except RefusalError as refusal:
-            return Plan(on, refusal)
+            found = refusal
+        state = {name: getattr(now, name) for name in (planning.needs if possible else ("movable",))}
+        return Plan(state, found, now.until)

@@ -6,6 +6,7 @@ from tvist_controller.commands.refusal import RefusalError, out_of_turn
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.plan import Planning
+from tvist_controller.planning.snapshot import SCRIPT
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.programs.kept import Kept
 from tvist_controller.programs.player import ProgramPlayer
@@ -14,11 +15,11 @@ from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Accepted
 from tvist_protocol.transitions import Activity
 
-_COMPILED = Planning("script", ScriptCompiler, lambda compiler, command, _: compiler.compile(command))
+_COMPILED = Planning((), ScriptCompiler, lambda compiler, command, _: compiler.compile(command))
 _COMPILED_AFTER = Planning(
-    "statement",
+    SCRIPT,
     ScriptCompiler,
-    lambda compiler, command, on: compiler.compile_statement(command.text, on.after),
+    lambda compiler, command, now: compiler.compile_statement(command.text, now.script),
 )
 
 

@@ -20,6 +20,7 @@ from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import Planning
 from tvist_controller.planning.reachable import Reachable
+from tvist_controller.planning.snapshot import FILTER, TOOL
 from tvist_controller.safety.declared_payload import DeclaredPayload
 from tvist_controller.safety.faults import Faults
 from tvist_plant.description import RobotDescription
@@ -59,14 +60,14 @@ class WholeRobot(ABC):
             SimulationReset,
             lambda self, call: self.place(call),
             check=_check_reset,
-            plan=Planning("filter", FilterPlanner, lambda planner, command, on: None if command.shaper is None
-                          else planner.choose(command.shaper, 1, on.source, on.declared)),
+            plan=Planning(FILTER, FilterPlanner, lambda planner, command, now: None if command.shaper is None
+                          else planner.choose(command.shaper, 1, now.filter.source, now.filter.declared)),
         ),
         Row(SimulationStep, lambda self, call: self.check_step(call), lease="none", long=True),
         Row(InverseKinematics, lambda _, call: call.planned(), lease="none",
-            plan=Planning("tool", Reachable, Reachable.posture)),
+            plan=Planning(TOOL, Reachable, Reachable.posture)),
         Row(ForwardKinematics, lambda _, call: call.planned(), lease="none",
-            plan=Planning("tool", Reachable, Reachable.pose)),
+            plan=Planning(TOOL, Reachable, Reachable.pose)),
     )  # fmt: skip
 
 

@@ -24,7 +24,7 @@ class Beliefs:
 
     payload: Payload
     """Payload that dynamics and modes were computed with."""
-    basis: Any = None
+    state: Any = None
     """State that plans for lessons depend on; what it is matters to those who make them alone."""
 
 

@@ -15,7 +15,6 @@ from tvist_controller.foresight.rest_of_motion import WayAhead
 from tvist_controller.foresight.stopper import Outlook
 from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.line.cycle import ControlCycle
-from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import StreamTorqueRoom
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
@@ -24,8 +23,8 @@ from tvist_controller.motion.arm_power import ArmPower
 from tvist_controller.motion.motion_numbers import Motions
 from tvist_controller.motion.safety_system import SafetySystem
 from tvist_controller.motion.streaming import Streaming
-from tvist_controller.planning.basis import FilterBasis, MotionBasis
 from tvist_controller.planning.move_planner import PlannedMove
+from tvist_controller.planning.snapshot import FilterState, Snapshot
 from tvist_controller.trajectory import MotionLimits, SetpointStream
 from tvist_plant.plant import PERIOD
 from tvist_protocol.modes import RuntimeState, SafetyMode
@@ -33,6 +32,7 @@ from tvist_protocol.replies import Code
 from tvist_protocol.stream import EventKind
 from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
+from tvist_urscript import Script
 
 
 class MotionControl:
@@ -90,40 +90,34 @@ class MotionControl:
         """Whether the robot follows a stream of set-points."""
         return self.streams.stream is not None
 
-    def basis(self, on: FilterBasis) -> MotionBasis | None:
-        """What a point-to-point motion from here depends on; None if the arm is busy or without power.
+    def snapshot(self, filter_now: FilterState, script: Script | None, time: float | None) -> Snapshot:
+        """The state that plans depend on: of a motion from rest, or of one that goes on from the running one.
 
-        Args:
-            on: Basis of the present filter.
+        That stays as it is for a `time` [s]; None: the motion begins at rest.
         """
-        if after(self.activity, "move_j") is None:
-            return None
-        return self._basis(on, self.cycle.sample.reference)
-
-    def further_basis(self, on: FilterBasis, time: float) -> MotionBasis | None:
-        """What a path depends on that goes on from the running motion; None if that cannot go on.
-
-        Args:
-            on: Basis of the present filter.
-            time: Time in which the running motion stays as it is [s].
-        """
-        course, now = self.motions.course
-        if course is None or self.activity not in {Activity.MOVING, Activity.PAUSED}:
-            return None
-        return replace(self._basis(on, course.end), speed=1.0, slowest=None, after=course, until=now + time)
-
-    def _basis(self, on: FilterBasis, q: Floats) -> MotionBasis:
         cycle = self.cycle
-        return MotionBasis(
-            q=q,
+        tvist = cycle.line.filter.tvist
+        now = Snapshot(
+            filter=filter_now,
+            movable=after(self.activity, "move_j") is not None,
+            q=cycle.sample.reference,
             speed=self.motions.wanted_speed,
             slowest=self.motions.slowest,
-            excess=cycle.line.filter.tvist.excess,
-            surplus=cycle.line.filter.tvist.surplus,
+            excess=tvist.excess,
+            surplus=tvist.surplus,
             tcp=self.tcp,
-            declared_body=self.collisions.declared,
+            body=self.collisions.declared,
             bodies=cycle.line.dynamics.bodies,
-            filter=on,
+            script=script,
+        )
+        if time is None:
+            return now
+        course, passed = self.motions.course
+        if course is None or self.activity not in {Activity.MOVING, Activity.PAUSED}:
+            return replace(now, movable=False)
+        # Its time runs at full rate, whatever the rate of the running motion is.
+        return replace(
+            now, movable=True, q=course.end, speed=1.0, slowest=None, after=course, until=passed + time
         )
 
     def move(self, planned: PlannedMove, trigger: str = "move_j") -> int:

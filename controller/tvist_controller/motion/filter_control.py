@@ -7,10 +7,10 @@ from tvist_controller.commands.events import Emit
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.planning.basis import FilterBasis
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_controller.planning.plan import Planning
+from tvist_controller.planning.snapshot import FILTER, FilterState
 from tvist_controller.sources.mode_source import ModeSource
 from tvist_protocol.commands import SetEstimator, SetShaper
 from tvist_protocol.values import Payload
@@ -37,10 +37,10 @@ class Filters:
         self._warn_of_arm()
 
     @property
-    def basis(self) -> FilterBasis:
+    def present(self) -> FilterState:
         """The present state that a new filter depends on."""
         tvist = self._cycle.line.filter.tvist
-        return FilterBasis(tvist.name, tvist.estimator.modes, self.source, self._declared, self._given)
+        return FilterState(tvist.name, tvist.estimator.modes, self.source, self._declared, self._given)
 
     def use(self, chosen: PlannedFilter) -> None:
         """Shape with a filter from now on."""
@@ -138,14 +138,12 @@ class Filters:
             SetShaper,
             _choose,
             plan=Planning(
-                "filter",
+                FILTER,
                 FilterPlanner,
-                lambda planner, command, on: planner.choose(
-                    command.name, command.modes, on.source, on.declared, "name"
+                lambda planner, command, now: planner.choose(
+                    command.name, command.modes, now.filter.source, now.filter.declared, "name"
                 ),
             ),
         ),
-        Row(
-            SetEstimator, _estimate, plan=Planning("filter", FilterPlanner, FilterPlanner.estimate), long=True
-        ),
+        Row(SetEstimator, _estimate, plan=Planning(FILTER, FilterPlanner, FilterPlanner.estimate), long=True),
     )

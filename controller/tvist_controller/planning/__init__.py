@@ -1,1 +1,1 @@
-"""Plans of moves and filters. They depend only on an explicit basis, so they can be made outside the tick."""
+"""Plans of moves and filters. They depend on an explicit state alone, so they can be made outside the tick."""

@@ -18,13 +18,7 @@ ESTIMATORS = ("fixed", "polynomial", "modal")
 
 
 def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) -> int:
-    """Return the number of modes that a filter needs.
-
-    Args:
-        name: Name of the filter.
-        modes: Number of modes to suppress.
-        where: Field that the name comes from.
-        known: Available filters.
+    """Return the number of modes that a filter needs, of `modes` to suppress; its name comes from the field `where`.
 
     Raises:
         RefusalError: There is no such filter, or it has a fixed number of modes.
@@ -56,14 +50,7 @@ def make_estimator(source: ModeSource, modes: int, payload: Payload, where: str)
 def choose_filter(
     name: str, estimator: Estimator, joints: int, *, where: str = "shaper", known: Registry = BUILT_IN
 ) -> Filter:
-    """Make a filter by name.
-
-    Args:
-        name: Name of the filter.
-        estimator: Modes as functions of q.
-        joints: Number of joints of the arm.
-        where: Field that the name comes from.
-        known: Available filters.
+    """Make a filter by its name, which comes from the field `where`.
 
     Raises:
         RefusalError: There is no such shaper, or it does not work with the estimator.

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any, Generic, Literal, NamedTuple, TypeVar
 
 from tvist_controller.planning.plan import Planning
+from tvist_controller.planning.snapshot import TOOL
 from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Reply
@@ -57,4 +58,4 @@ class Row(NamedTuple):
     @property
     def asks(self) -> bool:
         """Whether it is a question about the tool's kinematics, which changes nothing."""
-        return self.plan is not None and self.plan.on == "tool"
+        return self.plan is not None and self.plan.needs is TOOL

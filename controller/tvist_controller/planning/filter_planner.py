@@ -8,8 +8,8 @@ import numpy as np
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.planning.basis import FilterBasis
 from tvist_controller.planning.choices import choose_filter, choose_source, make_estimator, wanted_modes
+from tvist_controller.planning.snapshot import FilterState, Snapshot
 from tvist_controller.planning.surplus import surplus_of
 from tvist_controller.setup import Setup, paper_payload
 from tvist_controller.sources.elastic_source import elastic_feed_forward
@@ -41,11 +41,7 @@ class PlannedFilter:
 
 
 class FilterPlanner:
-    """Creates the filters of one robot.
-
-    Args:
-        setup: Initial setup.
-    """
+    """Creates the filters of one robot."""
 
     def __init__(self, setup: Setup) -> None:
         self._setup, self._known = setup, setup.registry
@@ -75,16 +71,9 @@ class FilterPlanner:
     def choose(
         self, name: str, modes: int, source: ModeSource, declared: Payload, where: str = "shaper"
     ) -> PlannedFilter:
-        """Return a filter by name.
+        """Return a filter by name, which comes from the field `where`, for a number of modes to suppress.
 
-        It uses the chosen estimator, or the arm's own modal estimator if the filter supports that.
-
-        Args:
-            name: Name of the filter.
-            modes: Number of modes to suppress.
-            source: The chosen source of modes.
-            declared: Declared payload.
-            where: Field that the name comes from.
+        It uses the source that was chosen, or the arm's own modal estimator if the filter needs more modes.
 
         Raises:
             RefusalError: There is no such filter for this robot.
@@ -96,28 +85,28 @@ class FilterPlanner:
         _rehearse(tvist)
         return self._with_feed_forward(source, tvist, where)
 
-    def estimate(self, command: SetEstimator, basis: FilterBasis) -> PlannedFilter:
+    def estimate(self, command: SetEstimator, now: Snapshot) -> PlannedFilter:
         """Return the present filter with modes from another source.
 
         Raises:
             RefusalError: The source does not work with this filter.
         """
-        source = choose_source(command, self._setup)
+        source, present = choose_source(command, self._setup), now.filter
         where = "f_d" if source.calibration is None else "calibration"
-        tvist = self._again(basis, source, basis.declared, where)
+        tvist = self._again(present, source, present.declared, where)
         _rehearse(tvist)
         return self._with_feed_forward(source, tvist, where)
 
-    def with_payload(self, payload: Payload, basis: FilterBasis) -> Filter | None:
+    def with_payload(self, payload: Payload, present: FilterState) -> Filter | None:
         """Return the present filter with the modes for another payload; None if these are not known."""
-        return self._again(basis, basis.source, payload, "mass") if basis.source.knows_payload else None
+        return self._again(present, present.source, payload, "mass") if present.source.knows_payload else None
 
-    def present(self, basis: FilterBasis) -> Filter:
+    def like(self, present: FilterState) -> Filter:
         """Return a filter like the present one, at rest at q = 0."""
-        return self._again(basis, basis.source, basis.declared, "shaper")
+        return self._again(present, present.source, present.declared, "shaper")
 
-    def _again(self, basis: FilterBasis, source: ModeSource, declared: Payload, where: str) -> Filter:
-        return self._make(basis.name, basis.modes, source, declared, where, where)
+    def _again(self, present: FilterState, source: ModeSource, declared: Payload, where: str) -> Filter:
+        return self._make(present.name, present.modes, source, declared, where, where)
 
     def _make(
         self, name: str, modes: int, source: ModeSource, declared: Payload, where: str, where_modes: str

@@ -11,12 +11,12 @@ import numpy as np
 from tvist_controller.line.differentiator import Floats, central_differences
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import largest_torque
-from tvist_controller.planning.basis import MotionBasis
 from tvist_controller.planning.keeping import SHARE, shaped_ahead
+from tvist_controller.planning.slower import Binding, Limited, acceleration_of, lasts, torque_of, velocity_of
+from tvist_controller.planning.snapshot import Snapshot
 from tvist_controller.setup import Setup, body
-from tvist_controller.trajectory import JointLine, PlannedMotion
+from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion
 from tvist_plant.plant import PERIOD
-from tvist_protocol.replies import Code
 from tvist_shaping.base import Filter
 
 TRIES = 10
@@ -55,12 +55,10 @@ class Need:
     """How much slower a motion has to be, and for which limit."""
 
     slower: Slower
-    code: Code
-    """The limit, for programs."""
-    keeps: str
-    """What is achieved, for people."""
+    binding: Binding
+    """That limit."""
     q: Floats
-    """Posture in which the limit would be exceeded most, shape (n,) [rad]."""
+    """Posture in which it would be exceeded most, shape (n,) [rad]."""
 
 
 @dataclass(frozen=True)
@@ -77,40 +75,52 @@ class Fitted:
     exceeds: str | None = None
     """By how much it exceeds a torque limit nevertheless, in words; None if it does not."""
 
+    def limited(self, asked: MotionLimits | None = None) -> Limited | None:
+        """Say what makes it slower than asked, or what it exceeds; see `PlannedMove.limited`.
+
+        `asked` are the limits that were asked for; None if something else determines its speed.
+        """
+        if self.exceeds is not None:
+            return "limit_torque", self.exceeds
+        if self.need is None:
+            return None
+        velocity, acceleration = self.slower
+        if asked is None:
+            what = lasts(self.motion.duration, self.asked)
+        elif velocity <= acceleration:
+            what = f"velocity is {asked.velocity * velocity:.4g} of {asked.velocity:.4g} rad/s"
+        else:
+            what = (
+                f"acceleration is {asked.acceleration * acceleration:.4g} of {asked.acceleration:.4g} rad/s²"
+            )
+        return self.need.binding.makes(what)
+
 
 class Fitter:
-    """Plans motions within the limits of one robot's joints.
-
-    Args:
-        setup: Initial setup.
-    """
+    """Plans motions within the limits of one robot's joints."""
 
     def __init__(self, setup: Setup) -> None:
         self._dynamics = InverseDynamics(setup.description, body(setup.payload))
-        self._names, limits = setup.description.robot.joints, setup.description.limits
+        self._description, limits = setup.description, setup.description.limits
         self._velocity, self._acceleration = np.array(limits.velocity), np.array(limits.acceleration)
         self._torque = np.array(limits.torque)
 
     def fit(
         self,
         make: Callable[[Slower], PlannedMotion],
-        basis: MotionBasis,
+        now: Snapshot,
         tvist: Callable[[], Filter] | None,
     ) -> Fitted:
         """Plan a motion, and anew as much slower as it exceeds a limit.
 
-        Near a limit the motion is shaped ahead. If that would take too long, the filter's `surplus` is spared.
-
-        Args:
-            make: Plans the motion.
-            basis: State that the motion depends on.
-            tvist: Creates the filter; None if shaping ahead takes too long.
+        Near a limit the motion is shaped ahead by the filter that `tvist` creates. If that would take too long, it is
+        None, and the filter's `surplus` is spared.
         """
-        self._dynamics.believe(basis.bodies)
+        self._dynamics.believe(now.bodies)
         asked, need, slower = make(AS_ASKED), None, AS_ASKED
         motion = asked
         for number in itertools.count():
-            found = self._need(motion, basis, tvist)
+            found = self._need(motion, now, tvist)
             if isinstance(found, str):
                 return Fitted(asked, exceeds=found)
             if found is None:
@@ -127,29 +137,29 @@ class Fitter:
         return Fitted(motion, slower, need, asked.duration)
 
     def _need(
-        self, motion: PlannedMotion, basis: MotionBasis, tvist: Callable[[], Filter] | None
+        self, motion: PlannedMotion, now: Snapshot, tvist: Callable[[], Filter] | None
     ) -> Need | str | None:
         """How much slower a motion has to be; in words, by how much it exceeds a torque limit at any speed."""
-        fast, heavy = self._may_be_fast(motion, basis), self._may_be_heavy(motion, basis)
+        fast, heavy = self._may_be_fast(motion, now), self._may_be_heavy(motion, now)
         if not (fast or heavy):
             return None
         ahead = None if tvist is None else shaped_ahead(motion, tvist())
         if ahead is None:
             q, qd, qdd = _states(motion)
-            faster, harder = (1.0 + more for more in basis.surplus)
+            faster, harder = (1.0 + more for more in now.surplus)
             kinematic, blunted = self._kinematic(q, faster * qd, harder * qdd), max(BLUNTED, harder)
         else:
             q, qd, qdd = central_differences(ahead, PERIOD)
             kinematic, blunted = self._kinematic(q, np.diff(ahead, axis=0) / PERIOD, qdd), 1.0
-        torque = self._dynamic(q, qd, qdd, blunted, basis)
+        torque = self._dynamic(q, qd, qdd, blunted, now)
         if isinstance(torque, str):
             return torque
         found = [need for need in (kinematic, torque) if need is not None]
         return min(found, key=lambda need: need.slower.rate, default=None)
 
-    def _may_be_fast(self, motion: PlannedMotion, basis: MotionBasis) -> bool:
+    def _may_be_fast(self, motion: PlannedMotion, now: Snapshot) -> bool:
         """Return whether the shaped motion may exceed a joint's velocity or acceleration."""
-        more_velocity, more_acceleration = basis.surplus
+        more_velocity, more_acceleration = now.surplus
         if isinstance(motion.path, JointLine):
             share = np.abs(motion.path.direction)
             fastest, hardest = share * motion.limits.velocity, share * motion.limits.acceleration
@@ -160,9 +170,9 @@ class Fitter:
             or (hardest * (1.0 + more_acceleration) > self._acceleration * (1.0 + ROUNDING)).any()
         )
 
-    def _may_be_heavy(self, motion: PlannedMotion, basis: MotionBasis) -> bool:
+    def _may_be_heavy(self, motion: PlannedMotion, now: Snapshot) -> bool:
         """Return whether the shaped motion may exceed a torque limit."""
-        dynamics, limits, (velocity, acceleration) = self._dynamics, motion.limits, basis.surplus
+        dynamics, limits, (velocity, acceleration) = self._dynamics, motion.limits, now.surplus
         bound = largest_torque(
             dynamics,
             motion.path,
@@ -172,10 +182,10 @@ class Fitter:
         if (BLUNTED * bound <= self._torque).all():
             return False
         effort, states = np.zeros_like(self._torque), _states(motion)
-        for believed in basis.bodies:
+        for believed in now.bodies:
             dynamics.believe((believed,))
             effort = np.maximum(effort, np.abs(dynamics.torques(*states)).max(axis=0))
-        dynamics.believe(basis.bodies)
+        dynamics.believe(now.bodies)
         return bool((max(BLUNTED, 1.0 + acceleration) * effort > self._torque).any())
 
     def _kinematic(self, q: Floats, qd: Floats, qdd: Floats) -> Need | None:
@@ -188,16 +198,12 @@ class Fitter:
             return None
         if slower.velocity <= math.sqrt(slower.acceleration):
             joint = int(np.argmax(fast))
-            within = f"{self._velocity[joint]:.4g} rad/s"
-            keeps, at = f"joint {self._names[joint]} stays within {within}", _place(qd[:, joint], q)
-            return Need(slower, "limit_velocity", keeps, at)
+            return Need(slower, velocity_of(joint, self._description), _place(qd[:, joint], q))
         joint = int(np.argmax(hard))
-        within = f"{self._acceleration[joint]:.4g} rad/s²"
-        keeps, at = f"joint {self._names[joint]} stays within {within}", _place(qdd[:, joint], q)
-        return Need(slower, "limit_acceleration", keeps, at)
+        return Need(slower, acceleration_of(joint, self._description), _place(qdd[:, joint], q))
 
     def _dynamic(
-        self, q: Floats, qd: Floats, qdd: Floats, blunted: float, basis: MotionBasis
+        self, q: Floats, qd: Floats, qdd: Floats, blunted: float, now: Snapshot
     ) -> Need | str | None:
         """How much slower a motion has to be for the torques, at which gravity stays as it is.
 
@@ -205,7 +211,7 @@ class Fitter:
         """
         dynamics, limits, factors = self._dynamics, self._torque, [1.0, 1.0]
         worst, need, at = 1.0, None, q[0]
-        for believed in basis.bodies:
+        for believed in now.bodies:
             dynamics.believe((believed,))
             gravity, turning = dynamics.gravities(q), dynamics.torques(q, qd, np.zeros_like(qdd))
             turning -= gravity
@@ -218,10 +224,14 @@ class Fitter:
                 beyond, (limits - np.sign(moving) * gravity) / np.maximum(np.abs(moving), LEAST), 1.0
             )
             joint = int(np.argmin(share.min(axis=0)))
-            name, limit, least = self._names[joint], limits[joint], float(share.min())
+            least = float(share.min())
             if least < LEAST:
-                most = float(effort[:, joint].max())
-                dynamics.believe(basis.bodies)
+                name, limit, most = (
+                    self._description.robot.joints[joint],
+                    limits[joint],
+                    float(effort[:, joint].max()),
+                )
+                dynamics.believe(now.bodies)
                 return (
                     f"torque of joint {name} will reach {most:.0f} N m, {most - limit:.1f} beyond its limit of "
                     f"{limit:g}, since gravity alone takes it: choose another way, or a lighter payload"
@@ -234,9 +244,9 @@ class Fitter:
                 )
             if least < worst:
                 at = q[int(np.argmin(share[:, joint]))]
-                worst, need = least, f"the torque of joint {name} stays within {limit:g} N m"
-        dynamics.believe(basis.bodies)
-        return None if need is None else Need(Slower(*factors), "limit_torque", need, at)
+                worst, need = least, torque_of(joint, self._description)
+        dynamics.believe(now.bodies)
+        return None if need is None else Need(Slower(*factors), need, at)
 
 
 def _place(values: Floats, q: Floats) -> Floats:

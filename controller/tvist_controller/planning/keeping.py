@@ -33,12 +33,8 @@ def keeping_motion(
     its `excess` at easy limits. Beyond these the motion is shaped ahead, and planned anew with as much less
     acceleration as it had too much.
 
-    Args:
-        path: Path of the motion.
-        limits: Limits of the shaped reference, for every joint.
-        tvist: The filter; it is not changed.
-        speed: Initial rate of the motion's time relative to the clock's [-].
-        agility: See `PlannedMotion`.
+    The limits are those of the shaped reference, for every joint; `speed` is the initial rate of the motion's time
+    relative to the clock's [-]. The filter is not changed.
 
     Raises:
         ValueError: There is no such motion.
@@ -62,9 +58,7 @@ def keeping_motion(
 def shaped_ahead(motion: PlannedMotion, tvist: Filter) -> Floats | None:
     """References of the shaped motion at full rate, shape (k, n) [rad]; None if it lasts too long to simulate.
 
-    Args:
-        motion: The motion, which has not begun; it is not changed.
-        tvist: The filter; it is not changed.
+    Neither the motion, which has not begun, nor the filter is changed.
     """
     path, mine = motion.path, tvist.fork()
     shaped = ShapedReference(path.posture(path.start), PERIOD)

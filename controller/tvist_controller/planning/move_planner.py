@@ -8,12 +8,12 @@ import numpy as np
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_controller.line.limits import arm_limits, rate_of
-from tvist_controller.planning.asked_speed import LATE, REACHED
-from tvist_controller.planning.basis import MotionBasis
 from tvist_controller.planning.course import Course
 from tvist_controller.planning.filter_planner import FilterPlanner
-from tvist_controller.planning.fitting import Fitted, Fitter, Slower
+from tvist_controller.planning.fitting import Fitter, Slower
 from tvist_controller.planning.keeping import keeping_motion
+from tvist_controller.planning.slower import Limited, longer_joint_motion, slower_joint_motion
+from tvist_controller.planning.snapshot import Snapshot
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import (
     JointLine,
@@ -26,7 +26,6 @@ from tvist_controller.trajectory import (
 )
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
-from tvist_protocol.replies import Code
 
 AGILE = MotionLimits(1.5, 2.0, 100.0)
 """Limits of pauses and changes of the speed for motions that are slower by themselves: those of `move_j` by default."""
@@ -40,7 +39,7 @@ class PlannedMove:
     """Trajectories of its reference, each from rest to rest, in their order."""
     velocity: float
     """Largest velocity of any joint [rad/s]."""
-    limited: tuple[Code, str] | None
+    limited: Limited | None
     """The limit that made it slower than asked, or that it will exceed, with a sentence; None if there is none."""
     skipped: tuple[str, ...] = ()
     """A sentence for each blend that is left out."""
@@ -60,12 +59,7 @@ class PlannedMove:
 
 
 class MovePlanner:
-    """Plans the motions of one robot.
-
-    Args:
-        setup: Initial setup.
-        filters: Creates its filters.
-    """
+    """Plans the motions of one robot."""
 
     def __init__(self, setup: Setup, filters: FilterPlanner) -> None:
         self._description, self._filters = setup.description, filters
@@ -74,37 +68,37 @@ class MovePlanner:
         self.fitter = Fitter(setup)
         """Keeps motions within the limits of the joints."""
 
-    def move(self, command: MoveJ, basis: MotionBasis) -> PlannedMove:
+    def move(self, command: MoveJ, now: Snapshot) -> PlannedMove:
         """Plan a motion from rest; the command's content has been checked.
 
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
         """
-        return self._move(command, basis, at_once=False)
+        return self._move(command, now, at_once=False)
 
-    def move_within_tick(self, command: MoveJ, basis: MotionBasis) -> PlannedMove:
+    def move_within_tick(self, command: MoveJ, now: Snapshot) -> PlannedMove:
         """Plan a motion as `move` does, but within a tick, which is too short to shape the motion ahead."""
-        return self._move(command, basis, at_once=True)
+        return self._move(command, now, at_once=True)
 
-    def _move(self, command: MoveJ, basis: MotionBasis, *, at_once: bool) -> PlannedMove:
-        path = JointLine(basis.q, np.array(command.q, dtype=float))
+    def _move(self, command: MoveJ, now: Snapshot, *, at_once: bool) -> PlannedMove:
+        path = JointLine(now.q, np.array(command.q, dtype=float))
         limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
         if command.duration is None:
-            planned = self.along(path, limits, basis, at_once=at_once)
-            slower = None if basis.excess > 0.0 else _jerked(planned.parts[0], limits)
+            planned = self.along(path, limits, now, at_once=at_once)
+            slower = None if now.excess > 0.0 else slower_joint_motion(planned.parts[0], limits)
         else:
-            limits = self._lasting(path, command.duration, basis)
+            limits = self._lasting(path, command.duration, now)
             agility = at_least(limits, AGILE.acceleration, AGILE.jerk)
-            planned = self.along(path, limits, basis, agility, at_once=at_once)
-            slower = _late(planned.parts[0], command.duration)
+            planned = self.along(path, limits, now, agility, at_once=at_once)
+            slower = longer_joint_motion(planned.parts[0], command.duration)
         if slower is None or (planned.limited is not None and planned.limited[0] == "limit_torque"):
             return planned
         return replace(planned, limited=slower)
 
-    def _lasting(self, path: JointLine, duration: float, basis: MotionBasis) -> MotionLimits:
+    def _lasting(self, path: JointLine, duration: float, now: Snapshot) -> MotionLimits:
         """Limits with which a motion takes a duration [s], or those of the arm if it takes longer with these."""
         limits = arm_limits(self._description)
-        spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
+        spared = replace(limits, acceleration=limits.acceleration * (1.0 - now.excess))
         slower = min(quickest_motion(path, spared, PERIOD).duration / duration, 1.0)
         if slower == 0.0:
             return limits
@@ -116,24 +110,17 @@ class MovePlanner:
         self,
         path: Path,
         limits: MotionLimits,
-        basis: MotionBasis,
-        agility: MotionLimits | None = None,
+        now: Snapshot,
+        agility: MotionLimits | None = None,  # of pauses and changes of the speed; None: the motion's own
         *,
         at_once: bool = False,
     ) -> PlannedMove:
-        """Plan a motion along a path, from rest to rest.
-
-        Args:
-            path: Path of the motion; it begins where the reference is at rest.
-            limits: Limits for every joint.
-            basis: State that the motion depends on.
-            agility: Limits of pauses and changes of the speed; None for those of the motion.
-            at_once: Whether the plan must be made within a tick, which is too short to shape the motion ahead.
+        """Plan a motion along a path, from where the reference is at rest to rest; see `move_within_tick`.
 
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
         """
-        rate = rate_of(basis.speed, limits.velocity, basis.slowest)
+        rate = rate_of(now.speed, limits.velocity, now.slowest)
 
         def make(slower: Slower) -> PlannedMotion:
             kept = replace(
@@ -141,19 +128,17 @@ class MovePlanner:
                 velocity=limits.velocity * slower.velocity,
                 acceleration=limits.acceleration * slower.acceleration,
             )
-            spared = replace(kept, acceleration=kept.acceleration * (1.0 - basis.excess))
-            if isinstance(path, JointLine) and basis.excess > 0.0 and not at_once:
-                return keeping_motion(path, kept, self._filters.present(basis.filter), rate, agility)
+            spared = replace(kept, acceleration=kept.acceleration * (1.0 - now.excess))
+            if isinstance(path, JointLine) and now.excess > 0.0 and not at_once:
+                return keeping_motion(path, kept, self._filters.like(now.filter), rate, agility)
             return quickest_motion(path, spared, PERIOD, rate, agility)
 
         try:
-            fitted = self.fitter.fit(
-                make, basis, None if at_once else lambda: self._filters.present(basis.filter)
-            )
+            fitted = self.fitter.fit(make, now, None if at_once else lambda: self._filters.like(now.filter))
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
         motion, slower = fitted.motion, fitted.slower
-        found = self.meeting(path.whole, basis)
+        found = self.meeting(path.whole, now)
         if found is not None:
             share, meeting = found
             time = motion.time_at(share)
@@ -162,53 +147,13 @@ class MovePlanner:
         return PlannedMove(
             (motion,),
             velocity,
-            limited(fitted, limits if agility is None else None),
+            fitted.limited(limits if agility is None else None),
             room=(arms.velocity / velocity, arms.acceleration / (limits.acceleration * slower.acceleration)),
-            surplus=basis.surplus,
+            surplus=now.surplus,
         )
 
-    def meeting(self, way: Way, basis: MotionBasis) -> tuple[float, Meeting] | None:
+    def meeting(self, way: Way, now: Snapshot) -> tuple[float, Meeting] | None:
         """Return the share of a way after which two bodies would meet, and which; None if it is clear."""
-        if self._collisions.declared is not basis.declared_body:
-            self._collisions.declare(basis.declared_body)
+        if self._collisions.declared is not now.body:
+            self._collisions.declare(now.body)
         return self._collisions.on_way(way)
-
-
-def limited(fitted: Fitted, asked: MotionLimits | None = None) -> tuple[Code, str] | None:
-    """Say what made a motion slower than asked, or what it exceeds; see `PlannedMove.limited`.
-
-    Args:
-        fitted: The motion.
-        asked: Limits that were asked for; None if something else determines its speed.
-    """
-    if fitted.exceeds is not None:
-        return "limit_torque", fitted.exceeds
-    if fitted.need is None:
-        return None
-    velocity, acceleration = fitted.slower
-    if asked is None:
-        what = f"duration is {fitted.motion.duration:.4g} s instead of {fitted.asked:.4g}"
-    elif velocity <= acceleration:
-        what = f"velocity is {asked.velocity * velocity:.4g} of {asked.velocity:.4g} rad/s"
-    else:
-        what = f"acceleration is {asked.acceleration * acceleration:.4g} of {asked.acceleration:.4g} rad/s²"
-    return fitted.need.code, f"{what}, so that {fitted.need.keeps}"
-
-
-def _jerked(motion: PlannedMotion, asked: MotionLimits) -> tuple[Code, str] | None:
-    """Say that the jerk keeps a joint motion from the speed that was asked for, unless its way is too short for it."""
-    way = float(np.abs(motion.path.end - motion.path.start).max())
-    _, qd, _ = motion.states(motion.evenly(3))  # it is symmetric in time, so fastest in the middle
-    fastest = float(np.abs(qd).max())
-    if fastest >= REACHED * asked.velocity or asked.velocity**2 > asked.acceleration * way:
-        return None
-    what = f"velocity is {fastest:.4g} of {asked.velocity:.4g} rad/s"
-    return "limit_acceleration", f"{what}, so that the joints' jerk stays within {asked.jerk:.4g} rad/s³"
-
-
-def _late(motion: PlannedMotion, asked: float) -> tuple[Code, str] | None:
-    """Say that a joint motion takes longer than the duration that was asked for [s], as the arm's limits require."""
-    if motion.duration <= LATE * asked:
-        return None
-    what = f"duration is {motion.duration:.4g} s instead of {asked:.4g}"
-    return "limit_acceleration", f"{what}, so that the joints stay within the arm's limits"

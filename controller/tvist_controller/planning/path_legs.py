@@ -11,8 +11,8 @@ from tvist_controller.paths.pacing import timed
 from tvist_controller.paths.poses import Placement, placement
 from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolLine, ToolWay
 from tvist_controller.paths.tracking import Tracker, WayError
-from tvist_controller.planning.basis import MotionBasis
 from tvist_controller.planning.reachable import Reachable
+from tvist_controller.planning.snapshot import Snapshot
 from tvist_controller.trajectory.spline import Knots
 from tvist_plant.description import RobotDescription
 from tvist_protocol.motions import (
@@ -28,24 +28,19 @@ from tvist_protocol.motions import (
 
 
 class PathLegs:
-    """Makes the parts of one robot's paths.
-
-    Args:
-        description: The robot.
-        reachable: Says why a path cannot be followed.
-    """
+    """Makes the parts of one robot's paths; `reachable` says why one cannot be followed."""
 
     def __init__(self, description: RobotDescription, reachable: Reachable) -> None:
         self._description, self._reachable = description, reachable
 
-    def of(self, command: MoveL | MoveC | MovePath, tracker: Tracker, basis: MotionBasis) -> Iterator[Leg]:
+    def of(self, command: MoveL | MoveC | MovePath, tracker: Tracker, now: Snapshot) -> Iterator[Leg]:
         """Return the parts of a command's path that move the arm, one after the other.
 
         Raises:
             RefusalError: The arm cannot follow one.
         """
-        frame, q = placement(command.frame), basis.q
-        before = 0 if basis.after is None else basis.after.segments
+        frame, q = placement(command.frame), now.q
+        before = 0 if now.after is None else now.after.segments
         for segment, where in _segments(command, before):
             start = tracker.pose(q)
             way: ToolWay | JointWay
@@ -60,7 +55,7 @@ class PathLegs:
                     way = ToolLine(start, frame @ placement(segment.pose))
             if way.length < SHORTEST:
                 continue
-            knots = self._along(way, q, tracker, where, basis)
+            knots = self._along(way, q, tracker, where, now)
             q = way.end if isinstance(way, JointWay) else knots.q[-1]
             pacing = timed(_pacing(segment), way.length)
             yield Leg(way, knots, tracker.pose(q), pacing, segment.blend, where)
@@ -75,7 +70,7 @@ class PathLegs:
             raise RefusalError("out_of_range", field, why) from error
 
     def _along(
-        self, way: ToolWay | JointWay, q: Floats, tracker: Tracker, where: str, basis: MotionBasis
+        self, way: ToolWay | JointWay, q: Floats, tracker: Tracker, where: str, now: Snapshot
     ) -> Knots:
         """The joints' way along a leg, which is within their range."""
         if isinstance(way, JointWay):
@@ -85,17 +80,14 @@ class PathLegs:
             knots = tracker.follow(way, q)
         except WayError as error:
             goal, share = way.at(way.length).pose, error.s / way.length
-            raise self._reachable.refusal(error, field, share, goal, basis.tcp) from error
+            raise self._reachable.refusal(error, field, share, goal, now.tcp) from error
         self.check_range(knots.s / way.length, knots.q, field)
         return knots
 
     def check_range(self, shares: Floats, q: Floats, field: str) -> None:
-        """Refuse joint positions beyond their range.
+        """Refuse joint positions beyond their range, shape (k, n) [rad], to which a field of the command leads.
 
-        Args:
-            shares: Shares of the way, shape (k,) [-].
-            q: Joint positions there, shape (k, n) [rad].
-            field: Field of the command that leads there.
+        They are at these shares of the way, shape (k,) [-].
 
         Raises:
             RefusalError: A joint is beyond its range.

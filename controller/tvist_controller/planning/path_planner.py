@@ -14,21 +14,20 @@ from tvist_controller.paths.pacing import Ground, JointLimits, fastest, going_on
 from tvist_controller.paths.route import Branch, Piece, Route, Run, length_of, route_of
 from tvist_controller.paths.tool_curves import PER_RADIAN, ToolLine
 from tvist_controller.paths.tracking import Tracker, WayError
-from tvist_controller.planning.asked_speed import slower_than_asked
-from tvist_controller.planning.basis import MotionBasis
 from tvist_controller.planning.course import Course
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitted, Slower
-from tvist_controller.planning.move_planner import MovePlanner, PlannedMove, limited
+from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.planning.path_legs import PathLegs
 from tvist_controller.planning.reachable import Reachable
+from tvist_controller.planning.slower import Limited, slower_path
+from tvist_controller.planning.snapshot import Snapshot
 from tvist_controller.setup import Setup
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Way, at_least, quickest_motion
 from tvist_controller.trajectory.retiming import RetimedLaw
 from tvist_controller.trajectory.spline import SplineCurve
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import MoveC, MoveL, MovePath
-from tvist_protocol.replies import Code
 from tvist_shaping.base import Filter
 
 POSTURES = 9
@@ -46,14 +45,7 @@ VARIATION = 1.1
 
 
 class PathPlanner:
-    """Plans the motions of one robot along paths.
-
-    Args:
-        setup: Initial setup.
-        filters: Creates its filters.
-        moves: Plans its point-to-point motions, and checks motions of any kind.
-        reachable: Says why a path cannot be followed.
-    """
+    """Plans the motions of one robot along paths."""
 
     def __init__(
         self, setup: Setup, filters: FilterPlanner, moves: MovePlanner, reachable: Reachable
@@ -74,7 +66,7 @@ class PathPlanner:
         for goes_on in (False, True):
             law_of(run, curve, ground_of(run, curve), joints, 60.0, LEAST_WINDOW, goes_on=goes_on)
 
-    def plan(self, command: MoveL | MoveC | MovePath, basis: MotionBasis) -> PlannedMove | None:
+    def plan(self, command: MoveL | MoveC | MovePath, now: Snapshot) -> PlannedMove | None:
         """Plan a motion from rest, or the rest of one that goes on; the command's content has been checked.
 
         Returns:
@@ -83,62 +75,49 @@ class PathPlanner:
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
         """
-        tracker = Tracker(self._description, basis.tcp)
-        legs = list(self._legs.of(command, tracker, basis))
+        tracker = Tracker(self._description, now.tcp)
+        legs = list(self._legs.of(command, tracker, now))
         count = len(command.segments) if isinstance(command, MovePath) else 1
-        if basis.after is not None:
-            return self._further(command.jerk, legs, count, tracker, basis)
-        route = self._route(legs, tracker, basis)
+        if now.after is not None:
+            return self._further(command.jerk, legs, count, tracker, now)
+        route = self._route(legs, tracker, now)
         runs = route.runs or [[]]
         length = sum(map(length_of, runs))
-        tvist, done, motions = self._filters.present(basis.filter), 0.0, list[PlannedMotion]()
-        window, velocity, told = 0.0, 0.0, None
+        tvist, done, motions = self._filters.like(now.filter), 0.0, list[_Motion]()
+        told: Limited | None = None
         for run in runs:
             goes_on = run is runs[-1] and bool(legs) and legs[-1].blend > 0.0
-            found = self._motion(run, command.jerk, tvist, basis, goes_on=goes_on)
+            found = self._motion(run, command.jerk, tvist, now, goes_on=goes_on)
             slower = found.slower
             if slower is not None and len(legs) > 1:
                 slower = slower[0], f"{run[0].where}: {slower[1]}"
             told = told or _told(found.fitted, run) or slower
-            velocity = max(velocity, found.velocity)
-            self._check_clear(found.fitted.motion.path.whole, run, (done, length), basis)
-            motions.append(found.fitted.motion)
-            window = max(window, found.delay)
+            self._check_clear(found.fitted.motion.path.whole, run, (done, length), now)
+            motions.append(found)
             done += length_of(run)
-        return PlannedMove(
-            tuple(motions),
-            velocity,
-            told,
-            tuple(route.skipped),
-            window,
-            marks_of(runs, range(count)),
-            tvist.peak,
-            course=_course(found, runs[-1], route, count),
-        )
+        return _planned_move(motions, route, told, range(count), tvist, count)
 
-    def _route(
-        self, legs: list[Leg], tracker: Tracker, basis: MotionBasis, start: Branch | None = None
-    ) -> Route:
+    def _route(self, legs: list[Leg], tracker: Tracker, now: Snapshot, start: Branch | None = None) -> Route:
         try:
             return route_of(legs, tracker, start)
         except WayError as error:
-            raise self._reachable.refusal(error, "segments", 1.0, legs[-1].corner, basis.tcp) from error
+            raise self._reachable.refusal(error, "segments", 1.0, legs[-1].corner, now.tcp) from error
 
     def _further(
-        self, jerk: float, legs: list[Leg], count: int, tracker: Tracker, basis: MotionBasis
+        self, jerk: float, legs: list[Leg], count: int, tracker: Tracker, now: Snapshot
     ) -> PlannedMove | None:
         """Plan the rest of a motion that goes on to further legs; None if its end is too near."""
-        before, tvist = basis.after, self._filters.present(basis.filter)
+        before, tvist = now.after, self._filters.like(now.filter)
         assert before is not None
-        found = before.branch(basis.until)
+        found = before.branch(now.until)
         if found is None:
             return None
         cuts, branch = found
-        route = self._route([*branch.legs, *legs], tracker, basis, branch)
+        route = self._route([*branch.legs, *legs], tracker, now, branch)
         run, *coming = route.runs
         if len(branch.legs) + len(legs) > 1 and cuts.branch == cuts.known and coming:
             return None  # the arm is so near the end that no blend fits
-        acceleration = np.array(self._description.limits.acceleration) * (1.0 - basis.excess)
+        acceleration = np.array(self._description.limits.acceleration) * (1.0 - now.excess)
         knots = joined(run, before.knots(cuts))
         self._legs.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
         curve = SplineCurve(knots, acceleration)
@@ -162,36 +141,26 @@ class PathPlanner:
             return self._planned(curve, law, 1.0)
 
         try:
-            fitted = self._moves.fitter.fit(make, basis, None)
+            fitted = self._moves.fitter.fit(make, now, None)
         except _TooLateError:
             return None
-        self._check_clear(curve.way(np.array([branch.s]), curve.end), run, (0.0, length_of(run)), basis)
+        self._check_clear(curve.way(np.array([branch.s]), curve.end), run, (0.0, length_of(run)), now)
         law = fitted.motion.law
         assert isinstance(law, RetimedLaw)
         motion = _Motion(fitted, delay, fastest(law, curve), ground)
-        motions, highest, window = [fitted.motion], motion.velocity, delay
+        motions = [motion]
         for further in coming:
-            motion = self._motion(further, jerk, tvist, basis)
-            self._check_clear(motion.fitted.motion.path.whole, further, (0.0, length_of(further)), basis)
-            motions.append(motion.fitted.motion)
-            highest, window = max(highest, motion.velocity), max(window, motion.delay)
-        last = before.segments - 1
-        return PlannedMove(
-            tuple(motions),
-            highest,
-            _told(fitted, run, branch.s),
-            tuple(route.skipped),
-            window,
-            marks_of(route.runs, range(last, last + 1 + count), branch.s),
-            tvist.peak,
-            course=_course(
-                motion, route.runs[-1], route, before.segments + count, 0.0 if coming else branch.s
-            ),
+            motion = self._motion(further, jerk, tvist, now)
+            self._check_clear(motion.fitted.motion.path.whole, further, (0.0, length_of(further)), now)
+            motions.append(motion)
+        segments = range(before.segments - 1, before.segments + count)
+        return _planned_move(
+            motions, route, _told(fitted, run, branch.s), segments, tvist, before.segments + count, branch.s
         )
 
-    def _check_clear(self, way: Way, run: Run, part: tuple[float, float], basis: MotionBasis) -> None:
+    def _check_clear(self, way: Way, run: Run, part: tuple[float, float], now: Snapshot) -> None:
         """Refuse a way that something is in the way of; `part` is its start on the whole path and that's length."""
-        found = self._moves.meeting(way, basis)
+        found = self._moves.meeting(way, now)
         if found is None:
             return
         share, meeting = found
@@ -207,29 +176,29 @@ class PathPlanner:
     # ------------------------------------------------------------------ time
 
     def _motion(
-        self, run: Run, jerk: float, tvist: Filter, basis: MotionBasis, *, goes_on: bool = False
+        self, run: Run, jerk: float, tvist: Filter, now: Snapshot, *, goes_on: bool = False
     ) -> "_Motion":
         """A motion from rest along a run."""
         if not run:  # the arm is there already
-            still = JointLine(basis.q, basis.q)
-            motion = quickest_motion(still, arm_limits(self._description), PERIOD, basis.speed)
+            still = JointLine(now.q, now.q)
+            motion = quickest_motion(still, arm_limits(self._description), PERIOD, now.speed)
             return _Motion(Fitted(motion), 0.0, 0.0, None)
         knots = joined(run)
         self._legs.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
-        acceleration = np.array(self._description.limits.acceleration) * (1.0 - basis.excess)
+        acceleration = np.array(self._description.limits.acceleration) * (1.0 - now.excess)
         curve = SplineCurve(knots, acceleration)
         delay, ground = self._delay(curve, tvist), ground_of(run, curve)
         joints = self._joints(acceleration, tvist)
         law = law_of(run, curve, ground, joints, jerk, delay, goes_on=goes_on)
         alone = not goes_on and all(piece.where == run[0].where for piece in run)
-        told = slower_than_asked(run, curve, law, joints, self._description) if alone else None
+        told = slower_path(run, curve, law, joints, self._description) if alone else None
         highest = fastest(law, curve)
-        rate = rate_of(basis.speed, highest, basis.slowest)
+        rate = rate_of(now.speed, highest, now.slowest)
 
         def make(slower: Slower) -> PlannedMotion:
             return self._planned(curve, law.slowed(law.duration / slower.rate), rate)
 
-        fitted = self._moves.fitter.fit(make, basis, lambda: self._filters.present(basis.filter))
+        fitted = self._moves.fitter.fit(make, now, lambda: self._filters.like(now.filter))
         return _Motion(fitted, delay, highest * fitted.slower.rate, ground, told)
 
     def _joints(self, acceleration: Floats, tvist: Filter) -> JointLimits:
@@ -253,9 +222,9 @@ class PathPlanner:
         return max(VARIATION * max(found), LEAST_WINDOW)
 
 
-def _told(fitted: Fitted, run: Run, start: float = 0.0) -> tuple[Code, str] | None:
+def _told(fitted: Fitted, run: Run, start: float = 0.0) -> Limited | None:
     """Say what made a motion slower, and on which part of a path; `start` is where its run begins on its curve [m]."""
-    told, need, path = limited(fitted), fitted.need, fitted.motion.path
+    told, need, path = fitted.limited(), fitted.need, fitted.motion.path
     if told is None or need is None or not isinstance(path, SplineCurve) or not run[0].where:
         return told
     s = np.linspace(start, float(path.end[0]), LOOKS)
@@ -279,8 +248,31 @@ class _Motion(NamedTuple):
     """Largest velocity of any joint [rad/s]."""
     ground: Ground | None
     """What limits it; None if nothing moves."""
-    slower: tuple[Code, str] | None = None
-    """What makes a motion along one segment slower than asked, see `slower_than_asked`."""
+    slower: Limited | None = None
+    """What makes a motion along one segment slower than asked, see `slower_path`."""
+
+
+def _planned_move(
+    motions: list[_Motion],
+    route: Route,
+    told: Limited | None,
+    segments: range,
+    tvist: Filter,
+    count: int,
+    start: float = 0.0,
+) -> PlannedMove:
+    """Put the motions of a path together; `start` is where its first run begins on its curve [m]."""
+    runs = route.runs or [[]]
+    return PlannedMove(
+        tuple(motion.fitted.motion for motion in motions),
+        max(motion.velocity for motion in motions),
+        told,
+        tuple(route.skipped),
+        max(motion.delay for motion in motions),
+        marks_of(runs, segments, start),
+        tvist.peak,
+        course=_course(motions[-1], runs[-1], route, count, start if len(runs) == 1 else 0.0),
+    )
 
 
 def _course(motion: _Motion, run: Run, route: Route, segments: int, start: float = 0.0) -> Course | None:
@@ -295,12 +287,9 @@ def _course(motion: _Motion, run: Run, route: Route, segments: int, start: float
 
 
 def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tuple[int, float], ...]:
-    """Where the blend at the end of each segment begins, see `PlannedMove.marks`.
+    """Where the blend at the end of each of these segments begins, see `PlannedMove.marks`.
 
-    Args:
-        runs: The path.
-        segments: Numbers of the segments.
-        start: Length of the first part at which its run begins [m].
+    The first run begins at this length of the first part [m].
     """
     marks = dict[int, tuple[int, float]]()
     for part, run in enumerate(runs):

@@ -1,20 +1,16 @@
-"""Plans for commands that take longer than a tick can wait, and how they are made."""
+"""Plans for commands that take longer than a tick can wait: how they are made, and how long they hold."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
 
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.planning.basis import (
-    FilterBasis,
-    MotionBasis,
-    PlanBasis,
-    ScriptBasis,
-    StatementBasis,
-    ToolBasis,
-)
 from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.move_planner import PlannedMove
+from tvist_controller.planning.snapshot import Snapshot
+from tvist_protocol.commands import Command
 from tvist_protocol.replies import Posture, ToolPose
 from tvist_shaping.base import Filter
 from tvist_urscript import Script
@@ -23,20 +19,16 @@ Found = PlannedMove | PlannedFilter | Filter | Posture | ToolPose | Script | Non
 """What a plan may contain; None if nothing has to change."""
 
 
-Basis = FilterBasis | MotionBasis | ToolBasis | ScriptBasis | StatementBasis
-"""State that a plan was made on."""
-
-
 class Planning(NamedTuple):
     """How one type of command is planned."""
 
-    on: Literal["filter", "motion", "tool", "script", "statement"]
-    """Field of `PlanBasis` with the state that the plan depends on. If it is None, nothing is planned."""
+    needs: tuple[str, ...]
+    """Fields of the snapshot that the plan depends on."""
     by: type
     """Class of the planner, of which a `Planner` has one object."""
-    make: Callable[[Any, Any, Any], Found]
+    make: Callable[[Any, Any, Snapshot], Found]
     """Returns the plan; takes the planner, the command and the state. It raises `RefusalError`."""
-    within_tick: Callable[[Any, Any, Any], Found] | None = None
+    within_tick: Callable[[Any, Any, Snapshot], Found] | None = None
     """Makes a plan that may be worse but takes no longer than a tick can wait; None if `make` is all there is."""
 
 
@@ -44,23 +36,85 @@ class Planning(NamedTuple):
 class Plan:
     """The outcome of a command, valid while the state that it was planned on holds."""
 
-    basis: Basis | None
-    """State that it was planned on; None if no point-to-point motion may begin."""
+    state: Mapping[str, Any]
+    """Fields of the snapshot that it depends on, with their values."""
     found: Found | RefusalError
-    """What was planned, or why the command is refused."""
+    """What was planned, or why the command is refused; None if no motion may begin."""
+    until: float = 0.0
+    """See `Snapshot.until`."""
 
-    def holds(self, now: PlanBasis) -> bool:
+    def holds(self, now: Snapshot) -> bool:
         """Return whether the plan is valid for the present state."""
-        match self.basis:
-            case None:
-                return now.motion is None
-            case ScriptBasis():
-                return True
-            case StatementBasis() as planned:
-                return planned.after is now.statement.after
-            case FilterBasis() as planned:
-                return planned == now.filter
-            case ToolBasis() as planned:
-                return planned.tcp == now.tool.tcp
-            case planned:
-                return now.motion is not None and planned.agrees(now.motion)
+        return self.until >= now.until and all(
+            _same(value, getattr(now, name)) for name, value in self.state.items()
+        )
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether it goes on from the running motion."""
+        return self.state.get("after") is not None
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, np.ndarray):
+        return np.array_equal(one, other)
+    if isinstance(one, tuple) and len(one) == len(other):
+        return all(map(_same, one, other))
+    return one is other or one == other
+
+
+Order = Callable[[Command, Snapshot], Callable[[], Plan]]
+"""Has a command planned on a state; returns what waits for the plan."""
+
+
+class MakesPlans(Protocol):
+    """A `Planner`, which lies above all that uses plans."""
+
+    def plan(self, command: Command, now: Snapshot, *, within_tick: bool = False) -> Plan:
+        """Plan a command on a state."""
+
+
+class Plans:
+    """Plans of one robot, for the commands of clients and of programs: made now, or later beside the ticks.
+
+    `snapshot` returns the present state; for a time, that of a motion that goes on from the running one, which stays as
+    it is for this time [s]. `order` has commands planned beside the ticks; without it, the tick that needs a plan makes
+    it.
+    """
+
+    def __init__(
+        self,
+        planner: MakesPlans,
+        snapshot: Callable[[float | None], Snapshot],
+        order: Order | None = None,
+    ) -> None:
+        self._planner, self._snapshot = planner, snapshot
+        self._order = order or (lambda command, now: lambda: planner.plan(command, now))
+
+    def now(self, command: Command, *, within_tick: bool = False) -> Plan:
+        """Plan a command on the present state; see `Planner.plan`."""
+        return self._planner.plan(command, self._snapshot(None), within_tick=within_tick)
+
+    def later(self, command: Command) -> Callable[[], Plan]:
+        """Have a command planned on the present state; returns what waits for the plan."""
+        return self._order(command, self._snapshot(None))
+
+    def further(self, command: Command, time: float) -> Callable[[], Plan] | None:
+        """Have a path planned that goes on from the running motion, as `later`; None if that cannot go on."""
+        now = self._snapshot(time)
+        return self._order(command, now) if now.movable else None
+
+    def hold(self, plan: Plan) -> bool:
+        """Return whether a plan that was made before is valid for the present state."""
+        return plan.holds(self._snapshot(0.0 if plan.goes_on else None))
+
+    def found(self, command: Command, plan: Plan | None = None) -> Any:
+        """Return what was planned for a command: the plan if it still holds, else one that is made now.
+
+        Raises:
+            RefusalError: The command cannot be carried out.
+        """
+        found = (plan if plan is not None and self.hold(plan) else self.now(command)).found
+        if isinstance(found, RefusalError):
+            raise found
+        return found

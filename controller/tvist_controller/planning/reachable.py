@@ -8,18 +8,14 @@ from tvist_controller.commands.refusal import RefusalError, check_joints
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
 from tvist_controller.paths.poses import Placement, placement
 from tvist_controller.paths.tracking import Tracker, WayError
-from tvist_controller.planning.basis import ToolBasis
+from tvist_controller.planning.snapshot import Snapshot
 from tvist_plant.description import RobotDescription
 from tvist_protocol import kinematics as k
 from tvist_protocol.replies import Posture, ToolPose
 
 
 class Reachable:
-    """Answers these questions for one robot.
-
-    Args:
-        description: The robot.
-    """
+    """Answers these questions for one robot."""
 
     def __init__(self, description: RobotDescription) -> None:
         self._description = description
@@ -29,18 +25,18 @@ class Reachable:
         """Compile what answers use, before any is needed."""
         self._inverse.prepare()
 
-    def posture(self, question: k.InverseKinematics, basis: ToolBasis) -> Posture:
+    def posture(self, question: k.InverseKinematics, now: Snapshot) -> Posture:
         """Return the joint positions at which the tool has a pose, nearest to others.
 
         Raises:
             RefusalError: There are none, or they are outside the joints' range.
         """
-        near = basis.q
+        near = now.q
         if question.near is not None:
             check_joints(question.near, self._description, "near")
             near = np.array(question.near, dtype=float)
         goal = placement(question.frame) @ placement(question.pose)
-        tcp = basis.tcp if question.tcp_offset is None else question.tcp_offset
+        tcp = now.tcp if question.tcp_offset is None else question.tcp_offset
         flange = goal @ placement(tcp).inverse
         try:
             q = self._inverse.solve(flange.rotation, flange.position, near)
@@ -48,32 +44,24 @@ class Reachable:
             raise RefusalError(error.code, "pose", f"pose {_shown(goal)}: {error}", error.limit) from error
         return Posture(q=tuple(q.tolist()))
 
-    def pose(self, question: k.ForwardKinematics, basis: ToolBasis) -> ToolPose:
+    def pose(self, question: k.ForwardKinematics, now: Snapshot) -> ToolPose:
         """Return the pose that the tool has at joint positions.
 
         Raises:
             RefusalError: They have the wrong number, or are outside the joints' range.
         """
-        q = basis.q
+        q = now.q
         if question.q is not None:
             check_joints(question.q, self._description)
             q = np.array(question.q, dtype=float)
-        tcp = basis.tcp if question.tcp_offset is None else question.tcp_offset
+        tcp = now.tcp if question.tcp_offset is None else question.tcp_offset
         found = placement(question.frame).inverse @ Tracker(self._description, tcp).pose(q)
         return ToolPose(pose=found.vector)
 
     def refusal(
         self, error: WayError, field: str, share: float, goal: Placement, tcp: Sequence[float]
     ) -> RefusalError:
-        """Return the refusal of a command whose path the joints cannot follow.
-
-        Args:
-            error: Where the way ends.
-            field: Field of the command.
-            share: Share of the way at which it ends, 0 to 1 [-].
-            goal: Pose at the end of the path.
-            tcp: Tool centre point in the flange frame.
-        """
+        """Return the refusal of a command whose path, by this field, ends at a share of the way, 0 to 1 [-]."""
         at = f"{field}: after {100.0 * share:.0f} % of the way, at {_shown(error.pose)}"
         for pose, where in ((goal, f"{field} {_shown(goal)}"), (error.pose, at)):
             flange = pose @ placement(tcp).inverse

@@ -36,10 +36,7 @@ def surplus_of(
     direction; those of an abrupt one, no quicker than `TvistFilter` lets them. Negative weights add at most what the
     limit of acceleration permits within the filter's length.
 
-    Args:
-        tvist: The filter; it is not changed.
-        estimators: Its estimator, for one payload each.
-        description: The robot.
+    `estimators` are that of the filter, which is not changed, for one payload each.
     """
     limits, peak = arm_limits(description), tvist.peak
     reach = np.minimum(description.limits.position, np.pi)

@@ -10,8 +10,7 @@ from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
-from tvist_controller.planning.plan import Plan
-from tvist_controller.planning.plans import Plans
+from tvist_controller.planning.plan import Plan, Plans
 from tvist_controller.programs.steadiness import Steadiness
 from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import Command

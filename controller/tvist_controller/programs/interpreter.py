@@ -7,7 +7,6 @@ from typing import Literal
 from tvist_controller.commands.events import Emit
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.instruments.peripherals import Peripherals
-from tvist_controller.planning.basis import StatementBasis
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.journey import Turns
 from tvist_protocol.programs import MAX_SCRIPT, Interpreter
@@ -51,9 +50,9 @@ class StatementQueue:
         self._interpreted = self._executed = self._cleared = self._forgotten = 0
 
     @property
-    def basis(self) -> StatementBasis:
-        """What the next statement is compiled after."""
-        return StatementBasis(self._last)
+    def last(self) -> Script | None:
+        """What the next statement is compiled after; None if no program takes statements."""
+        return self._last
 
     @property
     def published(self) -> Interpreter | None:

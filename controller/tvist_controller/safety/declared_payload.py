@@ -11,6 +11,7 @@ from tvist_controller.motion.filter_control import Filters
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import Planning
+from tvist_controller.planning.snapshot import FILTER
 from tvist_controller.safety.payload_monitor import PayloadMonitor
 from tvist_controller.setup import body
 from tvist_plant.description import RobotDescription
@@ -113,9 +114,9 @@ class DeclaredPayload:
             changes_io=True,
             check=_check,
             plan=Planning(
-                "filter",
+                FILTER,
                 FilterPlanner,
-                lambda planner, command, on: planner.with_payload(_payload_of(command), on),
+                lambda planner, command, now: planner.with_payload(_payload_of(command), now.filter),
             ),
         ),
     )

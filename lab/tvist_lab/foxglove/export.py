@@ -58,7 +58,7 @@ def export(content: RecordingFile, path: Path) -> list[str]:
 
     Raises:
         RecordingError: The recording does not say what its robot looks like.
-        ExportError: A file cannot be written. None has changed then, except that the layout may be new.
+        ExportError: A file cannot be written. None has changed then, except that only the layout may be old.
     """
     arm, above = arm_of(content), topics(content.robot)[State].removesuffix("state")
     (stood, stiff), (drawn, lacking) = _stood(content, arm), _curves(content.recording)
@@ -74,10 +74,10 @@ def export(content: RecordingFile, path: Path) -> list[str]:
         ((time, f"{above}curves", None, values) for time, values in drawn),
     ]
     try:
-        with whole_file(written_by(path, FOXGLOVE)[1]) as stream:
-            stream.write(_layout(content.robot, arm).encode())
         with whole_file(path) as stream:
             _write(merge(*own, _recorded(content.path, above), key=itemgetter(0)), stream)
+        with whole_file(written_by(path, FOXGLOVE)[1]) as stream:
+            stream.write(_layout(content.robot, arm).encode())
     except OSError as error:
         raise ExportError(f"{path} cannot be written: {error.strerror or error}") from error
     return [*stiff, *lacking]

@@ -48,14 +48,14 @@ def export(recording: Recording, path: Path, kind: str) -> None:
 
     Raises:
         ExportError: A file cannot be written, for example because the disk is full. No file has changed
-            then, except that the description of a CSV may be new.
+            then, except that a CSV may be new and its description old.
     """
     try:
+        with whole_file(path) as stream:
+            FORMATS[kind](recording, stream)
         if kind == "csv":
             with whole_file(sidecar(path)) as stream:
                 stream.write(_csv_on_the_web(recording, path))
-        with whole_file(path) as stream:
-            FORMATS[kind](recording, stream)
     except (OSError, pl.exceptions.PolarsError) as error:
         raise ExportError(f"{path} cannot be written: {_reason(error)}") from error
 
