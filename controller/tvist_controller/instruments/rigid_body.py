@@ -70,8 +70,8 @@ class RigidBody:
     def tool(self, motion: Floats, offset: list[float]) -> Floats:
         """Return the motion of the tool centre point in the base frame, shape (18,).
 
-        Its pose, x y z [m] and rotation vector [rad]; its velocity, linear [m/s] and angular [rad/s]; its acceleration,
-        linear [m/s²] and angular [rad/s²].
+        Its pose, x y z [m] and rotation vector [rad]; its velocity, linear [m/s] and angular [rad/s]; its
+        acceleration, linear [m/s²] and angular [rad/s²].
 
         Args:
             motion: The joints' motion.

@@ -35,21 +35,21 @@ SETTLED = 1e-8
 class ElasticFeedForward:
     """Commands for drives that move an elastic arm.
 
-    With the lead w of `elastic_lead` the drives get q* + w, q̇* + ẇ, and τ* + B (q̈* + ẅ) + friction(q̇* + ẇ), where τ*
-    contains what the bending links' own acceleration adds. Central
-    differences give ẇ and ẅ, so commands are a tick later than their target, as `delay` says. ẅ is a fourth derivative
-    of the reference, so that must be smooth; where it is not, as at the beginning of a stop, ẅ is limited to the torque
-    that the target leaves, and w and ẇ stay continuous.
+    With the lead w of `elastic_lead` the drives get q* + w, q̇* + ẇ, and τ* + B (q̈* + ẅ) + friction(q̇* + ẇ),
+    where τ* contains what the bending links' own acceleration adds. Central differences give ẇ and ẅ, so commands
+    are a tick later than their target, as `delay` says. ẅ is a fourth derivative of the reference, so that must be
+    smooth; where it is not, as at the beginning of a stop, ẅ is limited to the torque that the target leaves, and w
+    and ẇ stay continuous.
 
     Args:
-        description: The robot, of which masses, geometry, the places where links bend, rotors, friction and torque
-            limits are used.
-        stiffness: Stiffness of each gear and bending, in the order of the model's coordinates, shape (N,) [N m/rad].
+        description: The robot, of which masses, geometry, the places where links bend, rotors, friction and
+            torque limits are used.
+        stiffness: Stiffness of each gear and bending, as the model's coordinates, shape (N,) [N m/rad].
         damping_time: Damping divided by stiffness, shape (N,) [s].
         period: Tick [s].
         torques: Whether torques count with the lead; otherwise only positions and velocities do.
-        law: Identified friction, see `friction_at`, shape (5, n). None for a share of the Coulomb friction in the
-            description.
+        law: Identified friction, see `friction_at`, shape (5, n). None for a share of the Coulomb friction in
+            the description.
     """
 
     def __init__(

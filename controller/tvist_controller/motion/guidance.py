@@ -95,9 +95,9 @@ class Guidance:
         return self.follow(trigger, speed, shaped=shaped)
 
     def stop_joints(self, acceleration: float | None, trigger: str = "stop_j") -> None:
-        """Come to rest with a deceleration of the fastest joint [rad/s^2]; a guided motion with all of them in phase.
+        """Come to rest with a deceleration of the fastest joint [rad/s^2]; None for what the torque permits.
 
-        None is for the deceleration that the torque permits.
+        A guided motion brakes with all joints in phase.
         """
         motion = self.motion
         if motion.activity is not Activity.GUIDED or acceleration is None:
@@ -111,9 +111,10 @@ class Guidance:
         self._halt(trigger, stop, stop.duration)
 
     def stop_tool(self, acceleration: float, angular_acceleration: float) -> None:
-        """Come to rest with a deceleration of the tool [m/s^2, rad/s^2], which goes on straight if `speed_l` moves it.
+        """Come to rest with a deceleration of the tool [m/s^2, rad/s^2].
 
-        Other motions brake with the deceleration of the joints that corresponds to it at their present velocities.
+        It goes on straight if `speed_l` moves it. Other motions brake with the deceleration of the joints that
+        corresponds to it at their present velocities.
         """
         cycle = self._cycle
         state, present, tool = cycle.line.shaped.newest, cycle.trajectory, self.tool

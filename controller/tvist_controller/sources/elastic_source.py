@@ -33,9 +33,9 @@ def elastic_feed_forward(
 
 
 def springs_of(description: RobotDescription, calibration: Calibration) -> tuple[Floats, Floats]:
-    """Return stiffness [N m/rad] and damping time [s] of gears and bending links by a calibration, each of shape (N,).
+    """Return stiffness [N m/rad] and damping time [s] of gears and bending links, each of shape (N,).
 
-    Springs and gains in the robot file are not used.
+    They are those of a calibration; springs and gains in the robot file are not used.
 
     Raises:
         EstimatorError: See `elastic_feed_forward`.
