@@ -63,9 +63,10 @@ class RigidBody:
         self._payload: Payload | None = None
         self._offset = [0.0] * 6
         self._joints_to_elbow = min(description.joints, ELBOW)
-        self.tool(
-            np.zeros((3, description.joints)), self._offset
-        )  # loads compiled code, which takes many ticks
+        still = np.zeros((3, description.joints))
+        self.tool(still, self._offset)  # this loads compiled code, which takes many ticks, as the next two do
+        self.flange_rotation(still[0])
+        momentum_of(self._arm.chain, still[0], still[1], self._arm.scratch)
 
     def tool(self, motion: Floats, offset: list[float]) -> Floats:
         """Return the motion of the tool centre point in the base frame, shape (18,).

@@ -155,8 +155,12 @@ class Arm:
 
         The pseudo-inverse is that of the Jacobian nearby; None for that at q.
         """
+        rotation, position = map(
+            np.ascontiguousarray, goal
+        )  # of one layout, so that the kernel is compiled once
         found, error = q.copy(), np.empty(6)
-        newton(self.chain, *goal, self.inverse(q)[1] if inverse is None else inverse, steps, found, error)
+        nearby = self.inverse(q)[1] if inverse is None else inverse
+        newton(self.chain, rotation, position, nearby, steps, found, error)
         return found, error
 
     def torque(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:

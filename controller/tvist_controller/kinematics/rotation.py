@@ -66,5 +66,5 @@ def turn(start: Floats, end: Floats) -> Floats:
 def turned(rotation: Floats, angle: Floats) -> Floats:
     """Return a rotation matrix turned about the base frame's axes by a rotation vector."""
     result = np.empty((3, 3))
-    turn_into(angle, rotation, result)
+    turn_into(angle, np.ascontiguousarray(rotation), result)
     return result

@@ -6,6 +6,7 @@ import numpy as np
 
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.rotation import turn, turned
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import GENTLEST_STOP, GuidedTorqueRoom, arm_limits
 from tvist_controller.line.line_mode import LineMode
@@ -42,10 +43,12 @@ class Guidance:
 
     def _rehearse(self) -> None:
         """Compile what a motion of the tool uses, or load it from disk, before a tick needs it."""
-        q, still = self.reach * 0.1, np.zeros(len(self.reach))
-        speed = Speed((q, still, still), self.limits, self.torque, PERIOD, arm=self._kinematics)
-        speed.aim(self._kinematics.jacobian(q)[:, 0] * 1e-3, 1.0, 1.0)
+        q, still, arm = self.reach * 0.1, np.zeros(len(self.reach)), self._kinematics
+        speed = Speed((q, still, still), self.limits, self.torque, PERIOD, arm=arm)
+        speed.aim(arm.jacobian(q)[:, 0] * 1e-3, 1.0, 1.0)
         speed.next()
+        rotation, position = arm.pose(q)
+        arm.near((turned(rotation, turn(rotation, rotation)), position), q)
 
     def servo(self, q: Floats, lookahead: float, gain: float, *, shaped: bool) -> int:
         """Follow a posture, see `Servo`; return the motion's number.
