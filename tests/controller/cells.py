@@ -4,14 +4,14 @@ import msgspec
 import numpy as np
 
 from tvist_controller.cell.description import Cell, as_declared
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.paths.poses import Placement, placement
 
 from .robots import UR5E
 from .scripts import URSIM, a_robot
 
 TOOL = {"name": "2F-85", "mass": 0.9, "cog": (0, 0, 0.06), "tcp": (0, 0, 0.163, 0, 0, 0)}
-HERE = Placement(*ToolKinematics(UR5E, TOOL["tcp"]).pose(np.array(URSIM)))
+HERE = Placement(*Arm(UR5E, TOOL["tcp"]).pose(np.array(URSIM)))
 """Pose of the tool centre point at the start."""
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from tests.touching_arm import TouchingArm
 
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_plant.description import Payload as Body
 from tvist_plant.plant import GRAVITY, Measurement
 from tvist_protocol import forces as f
@@ -12,7 +12,7 @@ from tvist_protocol.values import Payload
 from .robots import UR5E, NoArm, Robot
 from .scripts import URSIM
 
-KINEMATICS = ToolKinematics(UR5E)
+KINEMATICS = Arm(UR5E)
 NOTHING = Payload(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
 LIMITS = (0.1, 0.1, 0.1, 0.5, 0.5, 0.5)
 Z = (False, False, True, False, False, False)

@@ -3,11 +3,10 @@
 import numpy as np
 from tests.plant.arms import chain, changed, forward_kinematics
 
-from tvist_controller.kinematics.denavit_hartenberg import dh_table, kinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_plant.description import load
 
 UR5E = load("ur5e")
-NO_TOOL = np.eye(3), np.zeros(3)
 RIGHT = np.pi / 2
 
 
@@ -61,8 +60,7 @@ EVEN_UR = arm(
 
 
 def pose_of(description, q):
-    rotation, position, _ = kinematics(dh_table(description), *NO_TOOL, np.asarray(q, dtype=float))
-    return rotation, position
+    return Arm(description).pose(np.asarray(q, dtype=float))
 
 
 def error(description, pose, q):

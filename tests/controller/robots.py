@@ -203,9 +203,8 @@ class Robot:
         return np.array([getattr(state, name) for state in self.states])
 
 
-def spring_loads(springs, joints, target):
-    """Torques on all springs of an arm whose links do not bend, and the flange's Jacobian."""
-    load = np.empty(springs.motion.shape[1])
-    springs.motion[:, joints] = target.q, target.qd, target.qdd
-    loads_of(springs.chain, springs.motion, springs.scratch, springs.jacobian, load)
-    return load, springs.jacobian
+def spring_loads(lead, target):
+    """Torques on all springs of an arm whose links do not bend."""
+    lead.motion[:, lead.joints.astype(int)] = target
+    loads_of(lead)
+    return lead.loads[0]

@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 from tests.plant.arms import frames
 
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.rotation import rotation_vector
 from tvist_controller.line.differentiator import Differentiator, Target
+from tvist_controller.line.drive_feed_forward import DriveFeedForward
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.joint_controllers import JointControllers, command_drives
-from tvist_controller.line.kinematics import ForwardKinematics, rotation_vector
+from tvist_controller.line.joint_controllers import command_drives
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
@@ -141,7 +143,7 @@ def command_of(controllers, target, torque, gravity):
 def commanded(description, *targets):
     """Last of several drive commands, with torque and gravity as inverse dynamics gives them."""
     dynamics = InverseDynamics(description, body(paper_payload(description)))
-    controllers = JointControllers(description, H)
+    controllers = DriveFeedForward(description, H)
     for target in targets:
         torque, gravity = dynamics.torque(target.q, target.qd, target.qdd), dynamics.gravity(target.q)
         command = command_of(controllers, target, torque, gravity)
@@ -187,7 +189,7 @@ def test_at_rest_the_command_is_the_position_and_gravity():
 
 
 def test_a_reset_forgets_the_wind_up():
-    controllers, still = JointControllers(UR5E, H), np.zeros(6)
+    controllers, still = DriveFeedForward(UR5E, H), np.zeros(6)
     command_of(controllers, Target(Q1, still, still), np.full(6, 50.0), still)
     controllers.reset(still)
     assert not command_of(controllers, Target(Q1, still, still), still, still).qd.any()
@@ -211,7 +213,7 @@ POSTURES = [Q1, Q2, Q3, np.zeros(6), *np.random.default_rng(1).uniform(-3, 3, (1
 @pytest.mark.parametrize("q", POSTURES)
 def test_the_pose_is_the_product_of_denavit_hartenberg(q):
     """Rotation vectors lose half the digits near a half turn, where Q1 to Q3 are."""
-    pose, _ = ForwardKinematics(UR5E).tool(q, np.zeros(6))
+    pose = Arm(UR5E).motion(q, np.zeros(6))[:6]
     expected = frames(UR5E, q)[-1]
     assert pose[:3] == pytest.approx(expected[:3, 3], abs=1e-12)
     assert rodrigues(np.array(pose[3:])) == pytest.approx(expected[:3, :3], abs=1e-7)
@@ -221,9 +223,9 @@ def test_the_pose_is_the_product_of_denavit_hartenberg(q):
 @pytest.mark.parametrize("joints", [1, 2, 5, 6])
 def test_the_speed_is_the_pose_s_change(joints):
     description, random = cut(joints), np.random.default_rng(joints)
-    kinematics, step = ForwardKinematics(description), 1e-6
+    arm, step = Arm(description), 1e-6
     q, qd = random.uniform(-3, 3, (2, joints))
-    _, speed = kinematics.tool(q, qd)
+    speed = arm.motion(q, qd)[6:]
     after, before = frames(description, q + step * qd)[-1], frames(description, q - step * qd)[-1]
     rate = (after - before) / (2 * step)
     spin = rate[:3, :3] @ frames(description, q)[-1][:3, :3].T
@@ -246,4 +248,4 @@ def test_a_half_turn_has_a_rotation_vector_of_that_length():
 
 def test_the_payload_moves_no_kinematics():
     other = msgspec.structs.replace(UR5E, payload=Payload())
-    assert ForwardKinematics(other).tool(Q3, Q1) == ForwardKinematics(UR5E).tool(Q3, Q1)
+    assert (Arm(other).motion(Q3, Q1) == Arm(UR5E).motion(Q3, Q1)).all()

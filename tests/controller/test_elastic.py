@@ -8,15 +8,13 @@ from hypothesis import strategies as st
 from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, calibration, cut, spring_loads
 
 from tvist_controller.calibrations import load
-from tvist_controller.line.differentiator import Target
-from tvist_controller.line.elastic_feed_forward import MOST, ROTOR, ElasticFeedForward
-from tvist_controller.line.elastic_model import ElasticModel
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.line.elastic_lead import MOST, ROTOR, follow
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.kinematics import ForwardKinematics
-from tvist_controller.line.motor_command import follow
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.setup import Setup, body, paper_payload
-from tvist_controller.sources.elastic_source import elastic_model
+from tvist_controller.sources.elastic_source import springs_of
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
@@ -29,7 +27,7 @@ NAMES = ("elastic", "elastic-position", "elastic-auto")
 
 
 def stage(description=UR5E, **how) -> ElasticFeedForward:
-    return ElasticFeedForward(description, elastic_model(description, MODAL), H, **how)
+    return ElasticFeedForward(description, *springs_of(description, MODAL), H, **how)
 
 
 def line(shaper: str, q=Q1, *, mass=5.0, believed=None, description=UR5E, plant=None) -> Line:
@@ -65,14 +63,13 @@ def ringing(truths, rest=300):
 
 def test_one_joint_leads_by_its_inertia_times_acceleration_over_stiffness():
     description, stiffness = cut(1), 20_000.0
-    model = ElasticModel(description, np.array([stiffness]), np.zeros(1))
-    feed = ElasticFeedForward(description, model, H)
+    feed = ElasticFeedForward(description, np.array([stiffness]), np.zeros(1), H)
     dynamics = InverseDynamics(description, Payload())
     inertia = dynamics.inertia(np.zeros(1))[0, 0]
     for k in range(60):
         time = k * H
-        target = Target(*(np.array([value]) for value in (time**3, 3.0 * time**2, 6.0 * time)))
-        command = feed.command(target, np.array([inertia * 6.0 * time]), dynamics.payload_parameters)
+        target = np.array([[time**3], [3.0 * time**2], [6.0 * time], [inertia * 6.0 * time]])
+        command = feed.command(target, dynamics.payload_parameters)
     earlier = time - H
     assert command.q[0] - earlier**3 == pytest.approx(inertia * 6.0 * earlier / stiffness, rel=1e-9)
     assert command.qd[0] - 3.0 * earlier**2 == pytest.approx(inertia * 6.0 / stiffness, rel=1e-6)
@@ -95,26 +92,22 @@ def test_nothing_of_springs_and_gains_in_the_robot_file_is_used():
     for description in (UR5E, strange):
         feed, dynamics = stage(description), InverseDynamics(description, UR5E.payload)
         for k in range(20):
-            target = Target(Q3 + 1e-4 * k**2, np.full(6, 0.1 * k), np.full(6, 50.0))
-            torque = dynamics.torque(target.q, target.qd, target.qdd)
-            command = feed.command(target, torque, dynamics.payload_parameters)
+            target = np.array([Q3 + 1e-4 * k**2, np.full(6, 0.1 * k), np.full(6, 50.0)])
+            command = feed.command(np.vstack((target, dynamics.torque(*target))), dynamics.payload_parameters)
         commands.append(np.concatenate([command.q, command.qd, command.torque]))
     assert commands[0].tobytes() == commands[1].tobytes()
 
 
 def test_a_payload_counts_like_a_body_of_the_model():
     heavy, light = (InverseDynamics(UR5E, payload) for payload in (UR5E.payload, Payload()))
-    target = Target(Q3, np.zeros(6), np.array([1.0, -2.0, 3.0, 1.0, 0.5, 2.0]))
+    target = np.array([Q3, np.zeros(6), [1.0, -2.0, 3.0, 1.0, 0.5, 2.0]])
     loads = {}
     for name, dynamics in (("heavy", heavy), ("light", light)):
-        springs = stage()._springs
-        springs.carry(dynamics.payload_parameters)
-        joints = elastic_model(UR5E, MODAL).joints
-        found = spring_loads(springs, joints, target)[0][joints]
-        loads[name] = found
+        feed = stage()
+        feed.carry(dynamics.payload_parameters)
+        loads[name] = spring_loads(feed.lead, target)[feed.lead.joints.astype(int)]
     rigid = {
-        name: dynamics.torque(*(getattr(target, field) for field in ("q", "qd", "qdd")))
-        - dynamics.gravity(target.q)
+        name: dynamics.torque(*target) - dynamics.gravity(target[0])
         for name, dynamics in (("heavy", heavy), ("light", light))
     }
     assert loads["heavy"] - loads["light"] == pytest.approx(rigid["heavy"] - rigid["light"], abs=1e-9)
@@ -182,11 +175,11 @@ def left_with(change) -> float:
 
 def test_the_bending_of_links_is_indispensable_and_rotor_inertia_need_not_be_exact():
     def rigid_links(elastic):
-        _, _, _, flexes, springs, *_ = elastic._parts
+        flexes, springs = elastic.lead.flexes.astype(int), elastic.lead.springs
         springs[0, flexes] = 1e12
 
     def other_rotors(elastic):
-        elastic._drives[ROTOR] *= 1.2
+        elastic.lead.drives[ROTOR] *= 1.2
 
     known = left_with(lambda _: None)
     assert left_with(rigid_links) > 4.0 * known
@@ -215,11 +208,11 @@ def test_the_acceleration_of_bending_links_counts_where_the_smoothing_is_short(m
 
 def test_the_flange_accelerates_as_a_rigid_arms_would():
     """Independent of the lead's formula: the flexible arm's flange beside the rigid kinematics of its target."""
-    wrong, kinematics = {}, ForwardKinematics(UR5E)
+    wrong, arm = {}, Arm(UR5E)
     for name, late in (("none", 0), ("elastic", 1)):
         samples, truths = move(line(name, Q1, description=UR5E.clean()), Q3)
         flange = np.array([truth.flange_position for truth in truths])[late:]
-        rigid = np.array([kinematics.tool(sample.target.q, np.zeros(6))[0][:3] for sample in samples])
+        rigid = np.array([arm.pose(sample.target.q)[1] for sample in samples])
         away = flange - rigid[: len(flange)]
         wrong[name] = np.sqrt((np.diff(away, 2, axis=0) ** 2).sum(axis=1).mean()) / H**2
     assert wrong["elastic"] < 0.25 * wrong["none"]
@@ -361,16 +354,15 @@ def test_a_lead_that_the_torque_does_not_permit_is_limited_and_told():
     told = []
     for k in range(200):
         jerky = 20.0 * np.sign(np.sin(0.3 * k)) * np.ones(6)
-        target = Target(Q3, np.zeros(6), jerky)
-        torque = dynamics.torque(target.q, target.qd, target.qdd)
-        feed.command(target, torque, dynamics.payload_parameters)
+        target = np.array([Q3, np.zeros(6), jerky])
+        feed.command(np.vstack((target, dynamics.torque(*target))), dynamics.payload_parameters)
         told.append(feed.limited)
     assert any(told)
 
 
 def test_friction_that_is_less_at_breakaway_takes_as_much_of_the_torque_as_in_motion():
     law = np.array([[10.0], [0.5], [0.05], [0.03], [1e-9]]) * np.ones(6)
-    assert stage(law=law)._drives[MOST] == pytest.approx(0.95 * LIMIT - 10.0)
+    assert stage(law=law).lead.drives[MOST] == pytest.approx(0.95 * LIMIT - 10.0)
 
 
 def watched_commands(robot):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tvist_controller.kinematics.tool import ToolKinematics, turn
-from tvist_controller.line.kinematics import ForwardKinematics
-from tvist_controller.trajectory import JointSpeed, MotionLimits
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.rotation import turn
+from tvist_controller.trajectory import MotionLimits, Speed
 from tvist_controller.trajectory.servo import _step
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
@@ -212,7 +212,7 @@ def test_a_step_does_not_overload_the_drives_of_the_flexible_arm():
 
 
 def test_a_step_that_the_acceleration_allows_takes_one_tick_and_lands_exactly():
-    arm = JointSpeed((HOME, np.zeros(6), np.zeros(6)), MotionLimits(3.14, 40.0, 2000.0), Anything(), H)
+    arm = Speed((HOME, np.zeros(6), np.zeros(6)), MotionLimits(3.14, 40.0, 2000.0), Anything(), H)
     random, before = np.random.default_rng(1), np.zeros(6)
     for _ in range(200):
         qd = before + random.uniform(-0.02, 0.02, 6)
@@ -313,10 +313,8 @@ def test_the_lease_is_the_dead_man_s_switch():
 
 
 def poses(arm, tcp=(0.0,) * 6):
-    kinematics = ForwardKinematics(UR5E)
-    kinematics.set_tool(tcp)
-    found = [kinematics.tool(np.array(q), np.zeros(6))[0] for q in arm.column("target_q")]
-    return np.array(found)
+    kinematics = Arm(UR5E, tcp)
+    return np.array([kinematics.motion(np.array(q), np.zeros(6))[:6] for q in arm.column("target_q")])
 
 
 @pytest.mark.parametrize("tcp", [REST, (0.05, 0.0, 0.2, 0.0, 0.5, 0.0)])
@@ -371,7 +369,7 @@ def test_at_a_singular_posture_the_tool_moves_where_it_can():
 
 
 def test_the_jacobian_is_the_derivative_of_the_pose():
-    kinematics = ToolKinematics(UR5E).with_tool((0.1, -0.05, 0.2, 0.3, 0.1, -0.2))
+    kinematics = Arm(UR5E).with_tool((0.1, -0.05, 0.2, 0.3, 0.1, -0.2))
     jacobian, step = kinematics.jacobian(HOME), 1e-6
     for joint, column in enumerate(jacobian.T):
         (before, p), (after, r) = (

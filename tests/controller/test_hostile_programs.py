@@ -10,11 +10,12 @@ from tests.examples import examples
 
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.foresight.stopper import Outlook
-from tvist_controller.kinematics.straight_step import LOST, pseudo_inverse, straight_step
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.pose import LOST, pseudo_inverse
 from tvist_controller.programs.functions.state import PoseFunctions
 from tvist_controller.programs.journey import DELAY, PAUSE
-from tvist_controller.trajectory.speed import TRIES
+from tvist_controller.trajectory import speed as module
+from tvist_controller.trajectory.speed import TRIES, speed_step
 from tvist_protocol import motions as m
 from tvist_protocol.commands import UnlockProtectiveStop
 from tvist_protocol.programs import ProgramRun
@@ -141,8 +142,8 @@ def test_a_program_that_fails_has_used_what_it_used(monkeypatch):
 def test_a_tick_of_speedl_factors_few_jacobians_in_any_posture(q, program, monkeypatch):
     """For a program and for a client of the network alike."""
     robot = a_robot(q=tuple(q))
-    factored = Counts(monkeypatch, ToolKinematics, "inverse")
-    tried = Counts(monkeypatch, ToolKinematics, "straight")
+    factored = Counts(monkeypatch, Arm, "inverse")
+    tried = Counts(monkeypatch, module, "speed_step")
     random = Random(1)
     for _ in range(60):
         twist = [random.choice((-0.3, 0.0, 0.3)) for _ in range(6)]
@@ -161,7 +162,7 @@ def test_a_tick_of_speedl_factors_few_jacobians_in_any_posture(q, program, monke
 def test_a_tool_that_a_stretched_arm_cannot_move_is_told_at_once(q):
     """Outwards along the stretched arm there is no motion: before, the command was held without a word."""
     robot = Robot(q=tuple(q), shaper="none")
-    kinematics = ToolKinematics(UR5E)
+    kinematics = Arm(UR5E)
     left, values, _ = np.linalg.svd(kinematics.jacobian(np.array(q)))
     assert values[-1] < LOST
     lost = 0.1 * left[:, -1]
@@ -323,7 +324,7 @@ def test_plans_of_killed_threads_are_ordered_one_after_the_other():
 def test_nothing_is_compiled_when_a_tool_first_moves():
     """What a tick of `speedl` uses is compiled, or loaded, when the robot is made."""
     robot = a_robot()
-    known = {one: list(one.signatures) for one in (straight_step, pseudo_inverse)}
+    known = {one: list(one.signatures) for one in (speed_step, pseudo_inverse)}
     start(robot, "speedl([0, 0, 0.1, 0, 0, 0], a=1, t=0.1)")
     robot.tick(60)
     assert all(list(one.signatures) == before != [] for one, before in known.items())

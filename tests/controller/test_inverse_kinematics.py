@@ -5,7 +5,6 @@ import itertools
 import numpy as np
 import pytest
 from tests.controller.postures import (
-    NO_TOOL,
     PUMA,
     UR5E,
     error,
@@ -19,7 +18,7 @@ from tests.controller.robots import cut
 from tests.examples import share
 from tests.plant.arms import chain, changed
 
-from tvist_controller.kinematics.denavit_hartenberg import dh_table, kinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
 from tvist_controller.kinematics.least_squares import descend
 from tvist_plant.description import load
@@ -27,10 +26,10 @@ from tvist_plant.description import load
 
 def missed(description, ik, pose, rng, starts=64):
     """Postures that a numerical search finds and `all` does not have."""
-    dh, known = dh_table(description), ik.all(*pose)
+    links, known = Arm(description).chain, ik.all(*pose)
     for start in rng.uniform(-np.pi, np.pi, (starts, description.joints)):
         q = start.copy()
-        if descend(dh, *pose, q, 0.0, 100, q) < 1e-10:
+        if descend(links, *pose, q, 0.0, 100, q) < 1e-10:
             distances = np.abs(wrapped(known - q)).max(axis=1)
             if distances.min(initial=np.inf) > 1e-4:
                 yield q
@@ -109,12 +108,12 @@ def test_other_arms_are_solved_numerically(description):
 def test_a_redundant_arm_moves_as_little_as_it_can():
     """At the nearest posture, the way to the wish is perpendicular to all motions that keep the pose."""
     rng, description = np.random.default_rng(5), chain(7)
-    ik, dh = InverseKinematics(description), dh_table(description)
+    ik, arm = InverseKinematics(description), Arm(description)
     for _ in range(10):
         q = rng.uniform(-2, 2, 7)
         near = q + 0.1 * rng.normal(size=7)
         found = ik.solve(*pose_of(description, q), near)
-        kept = np.linalg.svd(kinematics(dh, *NO_TOOL, found)[2])[2][6]
+        kept = np.linalg.svd(arm.jacobian(found))[2][6]
         assert abs(kept @ (near - found)) < 1e-5
 
 

@@ -5,7 +5,8 @@ import pinocchio as pin
 import pytest
 from tests.plant.arms import chain
 
-from tvist_controller.kinematics.denavit_hartenberg import bias, dh_table, kinematics
+from tvist_controller.kinematics import arm, pose, rotation
+from tvist_controller.kinematics.arm import Arm
 from tvist_plant.description import Payload, load
 from tvist_plant.model import FLANGE, rigid_model
 
@@ -31,31 +32,37 @@ def cases(description, number=20):
     "description", ARMS, ids=lambda description: f"{description.robot.name}-{description.joints}"
 )
 def test_pose_jacobian_and_bias_are_pinocchios(description):
-    dh = dh_table(description)
+    bare = Arm(description)
     for model, frame, tool, q, qd in cases(description):
         data = model.createData()
         pin.forwardKinematics(model, data, q, qd, np.zeros_like(q))
         placement = pin.updateFramePlacement(model, data, frame)
         expected = pin.getFrameClassicalAcceleration(model, data, frame, AXES).vector.copy()
-        offset = np.array(tool.rotation, order="C"), tool.translation
-        rotation, position, jacobian = kinematics(dh, *offset, q)
-        np.testing.assert_allclose(rotation, placement.rotation, rtol=0, atol=1e-12)
+        tooled = bare.with_tool([*tool.translation, *pin.log3(tool.rotation)])
+        turned, position, jacobian = tooled.located(q)
+        np.testing.assert_allclose(turned, placement.rotation, rtol=0, atol=1e-12)
         np.testing.assert_allclose(position, placement.translation, rtol=0, atol=1e-12)
         np.testing.assert_allclose(
             jacobian, pin.computeFrameJacobian(model, data, q, frame, AXES), rtol=0, atol=1e-12
         )
-        np.testing.assert_allclose(bias(dh, tool.translation, q, qd), expected, rtol=1e-12, atol=1e-12)
+        still = np.zeros_like(q)
+        np.testing.assert_allclose(tooled.acceleration(q, qd, still), expected, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(tooled.motion(q, qd)[6:], jacobian @ qd, rtol=1e-12, atol=1e-12)
 
 
-def test_the_compiled_kernels_equal_their_python_source():
-    dh = dh_table(ARMS[0])
-    for _, _, tool, q, qd in cases(ARMS[0], 5):
-        offset = np.array(tool.rotation, order="C"), tool.translation
-        for one, other in zip(kinematics(dh, *offset, q), kinematics.py_func(dh, *offset, q), strict=True):
-            np.testing.assert_allclose(one, other, rtol=0, atol=1e-14)
-        np.testing.assert_allclose(
-            bias(dh, tool.translation, q, qd),
-            bias.py_func(dh, tool.translation, q, qd),
-            rtol=1e-13,
-            atol=1e-13,
-        )
+def test_the_compiled_kernels_equal_their_python_source(monkeypatch):
+    tooled = Arm(ARMS[0], (0.1, -0.2, 0.3, 0.4, -1.0, 2.0))
+    states = [(q, qd) for _, _, _, q, qd in cases(ARMS[0], 5)]
+
+    def found():
+        parts = [
+            (*tooled.located(q), tooled.motion(q, qd), tooled.acceleration(q, qd, qd)) for q, qd in states
+        ]
+        return np.concatenate([part.ravel() for some in parts for part in some])
+
+    compiled = found()
+    for module in (arm, pose, rotation):
+        for name, one in vars(module).copy().items():
+            if hasattr(one, "py_func"):
+                monkeypatch.setattr(module, name, one.py_func)
+    np.testing.assert_allclose(compiled, found(), rtol=1e-13, atol=1e-13)

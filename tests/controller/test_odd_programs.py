@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.host import Host
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.paths.poses import placement_vector
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
@@ -67,7 +67,7 @@ def test_what_a_message_could_not_hold_is_an_exception_of_the_program(line, why)
 @pytest.mark.parametrize("far", [1.0, 100.0])
 def test_a_path_out_of_reach_takes_no_memory_however_long_it_is(far, little_memory):
     """The circle through three points that are nearly on a line is as large as the earth."""
-    x, y, z, *turn = placement_vector(*ToolKinematics(UR5E).pose(np.array(URSIM)))
+    x, y, z, *turn = placement_vector(*Arm(UR5E).pose(np.array(URSIM)))
     via, pose = (x + 2 * far, y + 3e-6 * far, z, *turn), (x + far, y, z, *turn)
     assert a_robot().send(m.MoveC, via=via, pose=pose).code in {"no_solution", "singular"}
 

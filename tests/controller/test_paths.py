@@ -7,7 +7,7 @@ from tests.plant.arms import chain
 from tests.search.draws import SHAPERS
 from tests.search.subject import Subject
 
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.setup import paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetTcp
@@ -342,7 +342,7 @@ def test_a_redundant_arm_makes_blends_too():
     description = chain(7)
     q = np.linspace(0.5, 1.2, 7) * np.where(np.arange(7) % 2, 1.0, -1.0)
     robot = Subject(description, q, paper_payload(description, 0.0), shaper="none")
-    tool = ToolKinematics(description)
+    tool = Arm(description)
     rotation, position = tool.pose(q)
     targets = [
         position + np.array(moved) for moved in ((0.03, 0.0, 0.0), (0.03, 0.03, 0.0), (0.0, 0.03, 0.03))

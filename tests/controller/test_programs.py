@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.paths.poses import placement_vector
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
@@ -17,7 +17,7 @@ from tvist_protocol.values import Payload
 from .robots import UR5E, Robot
 from .scripts import URSIM, a_robot, failure, finish, playing, run, said, script, start
 
-KINEMATICS = ToolKinematics(UR5E)
+KINEMATICS = Arm(UR5E)
 HERE = placement_vector(*KINEMATICS.pose(np.array(URSIM)))
 NEAR = [angle + 0.2 for angle in URSIM]
 

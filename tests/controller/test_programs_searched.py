@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.paths.poses import placement_vector
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
@@ -13,7 +13,7 @@ from tvist_protocol.replies import Accepted, Done
 from .robots import UR5E
 from .scripts import URSIM, a_robot, failure, finish, playing, said, start
 
-x, y, z, *turn = placement_vector(*ToolKinematics(UR5E).pose(np.array(URSIM)))
+x, y, z, *turn = placement_vector(*Arm(UR5E).pose(np.array(URSIM)))
 NEAR = [angle + 0.2 for angle in URSIM]
 LINE = f"movel(p{[x, y + 0.1, z, *turn]}, a=1.0, v=0.2)"
 TURN = (0.3, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -32,7 +32,7 @@ def test_a_client_may_move_the_arm_while_a_line_is_planned(ticks):
     assert failure(robot) is None
     ended = [(event.kind, event.id) for event in robot.events if event.id is not None]
     assert ended == [("motion_started", 1), ("motion_stopped", 1), ("motion_started", 2), ("motion_done", 2)]
-    _, there = ToolKinematics(UR5E).pose(np.array(robot.states[-1].reference_q))
+    _, there = Arm(UR5E).pose(np.array(robot.states[-1].reference_q))
     np.testing.assert_allclose(there, (x, y + 0.1, z), atol=1e-6)
 
 

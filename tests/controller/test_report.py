@@ -62,7 +62,7 @@ def test_with_a_tool():
     report = told.moving(40)
     other = msgspec.structs.replace(
         report,
-        kinematics=report.kinematics.with_tool((0.1, -0.2, 0.3, 1.0, 2.0, -0.5)),
+        arm=report.arm.with_tool((0.1, -0.2, 0.3, 1.0, 2.0, -0.5)),
         made=None,
         written=None,
     )

@@ -18,8 +18,8 @@ from tests.plant.arms import chain, frames
 
 import tvist_controller.kinematics
 from tvist_controller.kinematics import choice
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.choice import closest, improved_postures, search
-from tvist_controller.kinematics.denavit_hartenberg import dh_table
 from tvist_controller.kinematics.geometry import arm_table
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
 from tvist_controller.kinematics.least_squares import approach
@@ -29,7 +29,7 @@ from tvist_controller.kinematics.least_squares import approach
 def test_the_nearest_posture_is_found_where_postures_merge_or_a_joint_is_free(case):
     description, q = FREE[case]
     q, rng, ik = np.array(q), np.random.default_rng(6), InverseKinematics(description)
-    dh, pose = dh_table(description), pose_of(description, q)
+    links, pose = Arm(description).chain, pose_of(description, q)
     np.testing.assert_allclose(ik.solve(*pose, q), q, rtol=0, atol=1e-6)
     for scale in (1e-3, 0.1, 1.0, 3.0):
         near = np.clip(q + scale * rng.normal(size=6), -6, 6)
@@ -38,7 +38,7 @@ def test_the_nearest_posture_is_found_where_postures_merge_or_a_joint_is_free(ca
         distance = np.linalg.norm(found - near)
         assert distance <= np.linalg.norm(q - near) + 1e-6
         for start in near + rng.uniform(-np.pi, np.pi, (32, 6)):
-            if approach(dh, *pose, near, start) < 1e-9 and np.all(
+            if approach(links, *pose, near, start) < 1e-9 and np.all(
                 np.abs(start) <= description.limits.position
             ):
                 assert distance <= np.linalg.norm(start - near) + 1e-4, (found, start)
@@ -97,13 +97,14 @@ def uncompile(monkeypatch):
 def test_the_compiled_kernels_equal_their_python_source(case, monkeypatch):
     description, q = FREE.get(case, (UR5E, (0.5, -1.0, 1.2, 0.4, 0.6, 0.7)))
     table, pose, near = arm_table(description), pose_of(description, q), np.array(q) + 0.1
+    links = Arm(description).chain
     expected, found = np.empty((2, 8, 6))
     one, other = np.empty((2, 6))
-    improved_postures(table, *pose, near, expected)
-    status = closest(table, *pose, near, one)
+    improved_postures(table, links, *pose, near, expected)
+    status = closest(table, links, *pose, near, one)
     uncompile(monkeypatch)
-    choice.improved_postures(table, *pose, near, found)
-    assert choice.closest(table, *pose, near, other) == status
+    choice.improved_postures(table, links, *pose, near, found)
+    assert choice.closest(table, links, *pose, near, other) == status
     assert status % choice.ON_CURVE == choice.FOUND
     exist = ~np.isnan(expected[:, 0])
     np.testing.assert_array_equal(~np.isnan(found[:, 0]), exist)
@@ -114,9 +115,10 @@ def test_the_compiled_kernels_equal_their_python_source(case, monkeypatch):
 def test_the_compiled_search_equals_its_python_source(monkeypatch):
     description, q = chain(4), np.array([0.5, -1.0, 1.2, 0.4])
     table, pose, near = arm_table(description), pose_of(description, q), q + 0.1
+    links = Arm(description).chain
     starts = np.random.default_rng(10).uniform(-3, 3, (5, 4))
     expected, found = np.empty((2, 12, 4))
-    best = search(table, starts, *pose, near, expected)
+    best = search(table, links, starts, *pose, near, expected)
     uncompile(monkeypatch)
-    assert choice.search(table, starts, *pose, near, found) == best
+    assert choice.search(table, links, starts, *pose, near, found) == best
     np.testing.assert_allclose(found[best], expected[best], rtol=0, atol=1e-9)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from tests.search import space
 
-from tvist_controller.api.planning import ToolKinematics
+from tvist_controller.api.planning import Arm
 
 Random = np.random.Generator
 MOST_STATEMENTS = 7
@@ -20,7 +20,7 @@ class Author:
     def __init__(self, description, q, random):
         self._limit, self._q, self._random = np.array(description.limits.position), q, random
         self._fastest, self._hardest = min(description.limits.velocity), min(description.limits.acceleration)
-        self._kinematics = ToolKinematics(description)
+        self._kinematics = Arm(description)
 
     def program(self, name):
         """A program; in some, threads move the arm before it does, or run beside it, and are killed sooner or later."""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from tests.search.subject import Subject
 
-from tvist_controller.api.planning import ToolKinematics, placement_vector, turned
+from tvist_controller.api.planning import Arm, placement_vector, turned
 from tvist_protocol import motions as m
 from tvist_protocol.replies import Reply
 
@@ -18,7 +18,7 @@ NEAR, TURN = 0.2, 0.6
 
 def _pose(robot, random, share=1.0):
     """A pose of the flange near the present one."""
-    return pose_near(ToolKinematics(robot.description), robot.references[-1], random, share)
+    return pose_near(Arm(robot.description), robot.references[-1], random, share)
 
 
 def pose_near(kinematics, q, random, share=1.0):

@@ -9,14 +9,13 @@ from types import SimpleNamespace
 
 import msgspec
 import numpy as np
-import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.controller.robots import UR5E, Robot
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.line.kinematics import ForwardKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_plant.description import Payload, load
 from tvist_plant.drives import DriveCommand
 from tvist_plant.foreign import called
@@ -186,9 +185,9 @@ def test_interfaces_that_lack_a_question_leave_it_open(sent):
     ("leaning", "told"), [(0.0, False), (0.1, False), (0.2, True), (np.pi / 2, True), (np.pi, True)]
 )
 def test_a_robot_that_is_mounted_otherwise_is_told_by_its_accelerometer(leaning, told):
-    pose, _ = ForwardKinematics(UR5E).tool(Q, np.zeros(6))
+    rotation, _ = Arm(UR5E).pose(Q)
     up = 9.6 * np.array([np.sin(leaning), 0.0, np.cos(leaning)])
-    felt = pin.exp3(np.array(pose[3:])).T @ up
+    felt = rotation.T @ up
     assert tells_gravity(felt)
     assert (mounting_trouble(UR5E, Q, felt) is not None) == told
     assert not tells_gravity(np.zeros(3))
@@ -407,7 +406,7 @@ FAR, TEXT = place_of("ur://127.0.0.1:9"), package(PackageKind.TEXT_MESSAGE, b"\x
 FIELDS = {**NEEDED, **r.OUTPUTS, **OPTIONAL}
 DOUBLES = [name for name, field in FIELDS.items() if field.wire.value.endswith("d")]
 STANDS = {name: (0,) * field.wire.length for name, field in FIELDS.items()} | {
-    "actual_TCP_pose": ForwardKinematics(UR5E).tool(Q, np.zeros(6))[0], "robot_mode": (7,), "safety_mode": (1,),
+    "actual_TCP_pose": tuple(Arm(UR5E).motion(Q, np.zeros(6))[:6]), "robot_mode": (7,), "safety_mode": (1,),
     "payload": (5.0,), "speed_scaling": (1.0,), "target_speed_fraction": (1.0,),
 }  # fmt: skip
 

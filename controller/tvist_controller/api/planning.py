@@ -3,11 +3,12 @@
 The modules behind it may change.
 """
 
-from tvist_controller.kinematics.tool import ToolKinematics, turned
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.rotation import turned
 from tvist_controller.paths.poses import placement_vector
 
 __all__ = [
-    "ToolKinematics",
+    "Arm",
     "placement_vector",
     "turned",
 ]

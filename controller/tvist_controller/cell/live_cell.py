@@ -10,7 +10,7 @@ import pinocchio as pin
 from tvist_controller.cell.description import Cell, Part, Tool, Wire, bit_of
 from tvist_controller.cell.gripper import PORT, Gripper, answer
 from tvist_controller.commands.events import Emit
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.paths.poses import Placement, placement
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import Floats, payload_inertia
@@ -96,7 +96,7 @@ class LiveCell:
             terminals.set_tcp(cell.tools[0].tcp)
         self._cell, self._plant, self._terminals, self._emit = cell, plant, terminals, emit
         self._hand = plant if plant.can(Plant.grip) else None
-        self._kinematics = ToolKinematics(description)
+        self._kinematics = Arm(description)
         self.gripper = (
             None if cell.gripper is None else Gripper(cell.gripper.stroke, activated=cell.gripper.activated)
         )

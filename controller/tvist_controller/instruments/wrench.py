@@ -1,6 +1,5 @@
 """The wrench at the tool: the external force and torque, estimated from the drives' torques."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,10 +15,11 @@ from tvist_controller.instruments.joint_lists import (
     as_rows,
     joint_lists,
 )
-from tvist_controller.kinematics.elimination import eliminate
-from tvist_plant.chain import bend, chain_of, start, step_along, twist
-from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.model import FLANGE, Floats, rigid_model
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.least_squares import solve_in_place
+from tvist_controller.kinematics.pose import locate
+from tvist_plant.description import RobotDescription
+from tvist_plant.model import Floats
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State
 
@@ -37,50 +37,6 @@ def since_zeroed(wrench: list[float], zero: list[float] | None) -> list[float]:
 
 
 @compiled_for_ticks
-def determinant(A: Floats) -> float:
-    """Determinant of a matrix, shape (n, n), by elimination with pivots; the matrix is used up."""
-    n, found = A.shape[0], 1.0
-    for k in range(n):
-        pivot = k
-        for i in range(k + 1, n):
-            if abs(A[i, k]) > abs(A[pivot, k]):
-                pivot = i
-        if A[pivot, k] == 0.0:
-            return 0.0
-        if pivot != k:
-            found = -found
-            for j in range(k, n):
-                A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
-        found *= A[k, k]
-        for i in range(k + 1, n):
-            factor = A[i, k] / A[k, k]
-            for j in range(k + 1, n):
-                A[i, j] -= factor * A[k, j]
-    return found
-
-
-@compiled_for_ticks
-def jacobian_at(chain: Floats, offset: Floats, q: Floats, J: Floats) -> None:
-    """Jacobian of a point that is fixed to the end of a chain: translation, then rotation, base frame, shape (6, n)."""
-    R, o, S = np.empty((3, 3)), np.empty(3), np.empty(6)
-    start(R, o)
-    n = q.shape[0]
-    for j in range(n):
-        step_along(chain[j], R, o)
-        bend(R, q[j])
-        twist(R, o, S)
-        for k in range(3):
-            J[k, j], J[3 + k, j] = S[3 + k], S[k]
-    step_along(chain[n], R, o)
-    for k in range(3):
-        o[k] += R[k, 0] * offset[0] + R[k, 1] * offset[1] + R[k, 2] * offset[2]
-    for j in range(n):
-        J[0, j] += J[4, j] * o[2] - J[5, j] * o[1]
-        J[1, j] += J[5, j] * o[0] - J[3, j] * o[2]
-        J[2, j] += J[3, j] * o[1] - J[4, j] * o[0]
-
-
-@compiled_for_ticks
 def product(A: Floats, B: Floats) -> Floats:
     """Product of two small matrices."""
     found = np.zeros((A.shape[0], B.shape[1]))
@@ -92,44 +48,38 @@ def product(A: Floats, B: Floats) -> Floats:
 
 
 @compiled_for_ticks
-def force_at(chain: Floats, offset: Floats, q: Floats, torque: Floats, force: Floats) -> None:
-    """Compute the force that causes torques; see `ToolWrench.estimate`.
+def force_at(chain: Floats, q: Floats, torque: Floats, force: Floats) -> None:
+    """Compute force and torque [N, N m], shape (6,), at a chain's end that cause torques on the joints, shape (n,).
 
-    Args:
-        chain: The links, see `tvist_plant.chain`, shape (n+1, 22).
-        offset: Point in the frame of the end, shape (3,) [m].
-        q: Joint positions, shape (n,) [rad].
-        torque: Torques on the joints, shape (n,) [N m].
-        force: Result: force and torque, shape (6,) [N, N m].
+    See `ToolWrench.estimate`.
     """
     n = q.shape[0]
     J = np.empty((6, n))
-    jacobian_at(chain, offset, q, J)
+    locate(chain, q, np.empty((3, 3)), np.empty(3), J)
     square = product(J.T, J) if n <= 6 else product(J, J.T)
-    manipulability = math.sqrt(max(determinant(square.copy()), 0.0))
+    known = torque.copy() if n <= 6 else product(J, torque.reshape(n, 1))[:, 0].copy()
+    found = known.copy()
+    manipulability = solve_in_place(square.copy(), found)
     if manipulability < NEAR_SINGULAR:
         damping = DAMPING * (1.0 - manipulability / NEAR_SINGULAR)
         for k in range(square.shape[0]):
             square[k, k] += damping * damping
-    known = torque.copy() if n <= 6 else product(J, torque.reshape(n, 1))[:, 0].copy()
-    eliminate(square, known)
+        found = known
+        solve_in_place(square, found)
     for k in range(6):
-        force[k] = known[k]
+        force[k] = found[k]
         if n <= 6:
             force[k] = 0.0
             for j in range(n):
-                force[k] += J[k, j] * known[j]
+                force[k] += J[k, j] * found[j]
 
 
 @compiled_for_ticks
-def estimate(
-    chain: Floats, offset: Floats, motion: Floats, drives: Floats, slip: Floats, out: Floats
-) -> None:
+def estimate(chain: Floats, motion: Floats, drives: Floats, slip: Floats, out: Floats) -> None:
     """Estimate what acts on the arm from outside; see `ToolWrench.estimate`.
 
     Args:
-        chain: The links, see `tvist_plant.chain`, shape (n+1, 22).
-        offset: Point in the frame of the end, shape (3,) [m].
+        chain: The links, the tool centre point being their end, see `tvist_plant.chain`, shape (n+1, 22).
         motion: See `joint_lists`, shape (10, n).
         drives: Inertia of the rotors [kg m²] and Coulomb friction [N m], shape (2, n).
         slip: Share of the friction that acts, shape (n,) [-].
@@ -138,7 +88,7 @@ def estimate(
     for j in range(slip.shape[0]):
         expected = motion[SHAPED_MOMENT, j] + drives[0, j] * motion[SHAPED_QDD, j] + drives[1, j] * slip[j]
         out[6 + j] = expected - motion[ACTUAL_MOMENT, j]
-    force_at(chain, offset, motion[ACTUAL_Q], out[6:], out[:6])
+    force_at(chain, motion[ACTUAL_Q], out[6:], out[:6])
 
 
 class ToolWrench:
@@ -149,12 +99,11 @@ class ToolWrench:
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        model = rigid_model(description, Payload())
-        self._chain = chain_of(model, model.getFrameId(FLANGE))
+        self._arm = Arm(description)
         drives = description.drives
         self._drives = np.array([drives.rotor_inertia, drives.coulomb_friction])
         self._width, self._linear = drives.friction_width, drives.linear_friction
-        self._offset, self._point = [0.0] * 6, np.zeros(3)
+        self._offset = [0.0] * 6
         # Loads compiled code, which takes many ticks.
         self.estimate(np.zeros((ROWS, description.joints)), self._offset)
 
@@ -175,11 +124,11 @@ class ToolWrench:
             Shape (6 + n,).
         """
         if offset != self._offset:
-            self._offset, self._point = list(offset), np.array(offset[:3])
+            self._offset, self._arm = list(offset), self._arm.with_tool(offset)
         share = motion[SHAPED_QD] / self._width
         out = np.empty(6 + len(share))
         slip = share if self._linear else np.tanh(share)
-        estimate(self._chain, self._point, motion, self._drives, slip, out)
+        estimate(self._arm.chain, motion, self._drives, slip, out)
         return out
 
     def of(self, state: State, offset: Sequence[float]) -> Floats:

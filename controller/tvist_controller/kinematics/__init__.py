@@ -1,1 +1,1 @@
-"""Kinematics of the rigid arm from its Denavit-Hartenberg parameters, compiled: forward, differential, inverse."""
+"""The rigid arm: kinematics forward and inverse, and the torques that a motion needs."""

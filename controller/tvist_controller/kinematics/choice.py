@@ -5,18 +5,11 @@ import math
 import numpy as np
 
 from tvist_controller._compiled import compiled
-from tvist_controller.kinematics.denavit_hartenberg import Floats, kinematics_into
 from tvist_controller.kinematics.geometry import representation
-from tvist_controller.kinematics.least_squares import (
-    ACCURACY,
-    AIM,
-    NO_TOOL_POSITION,
-    NO_TOOL_ROTATION,
-    approach,
-    descend,
-    pose_error,
-)
+from tvist_controller.kinematics.least_squares import ACCURACY, AIM, approach, descend
+from tvist_controller.kinematics.pose import locate, pose_error
 from tvist_controller.kinematics.postures import DEFINITE, FREE, postures
+from tvist_plant.model import Floats
 
 FOUND, NO_SOLUTION, OUT_OF_RANGE = 0, 1, 2
 ON_CURVE = 4
@@ -45,11 +38,14 @@ def represent(arm: Floats, near: Floats, q: Floats) -> tuple[float, bool]:
 
 
 @compiled
-def all_postures(arm: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats) -> int:
+def all_postures(
+    arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats
+) -> int:
     """Compute all postures in closed form; of a curve of them, the ones nearest to `near`.
 
     Args:
         arm: Table of `arm_table`, shape (7, 5).
+        chain: The links to the flange, see `tvist_plant.chain`, shape (7, 22).
         rotation: Rotation of the flange, shape (3, 3).
         position: Position of the flange, shape (3,) [m].
         near: Joint positions, shape (6,) [rad].
@@ -60,12 +56,14 @@ def all_postures(arm: Floats, rotation: Floats, position: Floats, near: Floats, 
     """
     freedom = postures(arm, rotation, position, 0.0, table)
     if freedom == FREE:
-        _sample_curves(arm, rotation, position, near, table)
+        _sample_curves(arm, chain, rotation, position, near, table)
     return freedom
 
 
 @compiled
-def _sample_curves(arm: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats) -> None:
+def _sample_curves(
+    arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats
+) -> None:
     """Compute the postures at many values of the free angle, and move the nearest of each kind along its curve."""
     sample, least = np.empty((8, 6)), np.full(8, math.inf)
     table[:8, 0] = math.nan
@@ -83,7 +81,7 @@ def _sample_curves(arm: Floats, rotation: Floats, position: Floats, near: Floats
         if math.isnan(table[row, 0]):
             continue
         posture = table[row].copy()
-        if approach(arm[:6], rotation, position, near, posture) <= ACCURACY:
+        if approach(chain, rotation, position, near, posture) <= ACCURACY:
             _, inside = represent(arm, near, posture)
             # The way from a posture within the ranges to the nearest one may lead out of them.
             if inside or least[row] >= OUTSIDE:
@@ -91,15 +89,17 @@ def _sample_curves(arm: Floats, rotation: Floats, position: Floats, near: Floats
 
 
 @compiled
-def improved_postures(arm: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats) -> None:
+def improved_postures(
+    arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats
+) -> None:
     """Compute what `all_postures` does, and improve each by least squares as far as its error is not rounding."""
-    all_postures(arm, rotation, position, near, table)
+    all_postures(arm, chain, rotation, position, near, table)
     for row in range(8):
         if math.isnan(table[row, 0]):
             continue
         represent(arm, near, table[row])
         posture = table[row].copy()
-        if descend(arm[:6], rotation, position, near, 0.0, 5, posture) <= ACCURACY:
+        if descend(chain, rotation, position, near, 0.0, 5, posture) <= ACCURACY:
             table[row] = posture
         else:
             table[row, 0] = math.nan
@@ -107,22 +107,23 @@ def improved_postures(arm: Floats, rotation: Floats, position: Floats, near: Flo
 
 @compiled
 def _start_from_near(
-    arm: Floats, rotation: Floats, position: Floats, near: Floats, on_curve: bool, row: Floats
+    chain: Floats, rotation: Floats, position: Floats, near: Floats, on_curve: bool, row: Floats
 ) -> None:
     """Find the posture next to `near`: close to a singularity, rounding of the pose moves those of `postures` far."""
     posture = near.copy()
-    if descend(arm[:6], rotation, position, near, 0.0, 30, posture) <= ACCURACY:
+    if descend(chain, rotation, position, near, 0.0, 30, posture) <= ACCURACY:
         if on_curve:
-            approach(arm[:6], rotation, position, near, posture)
+            approach(chain, rotation, position, near, posture)
         row[:] = posture
 
 
 @compiled
-def closest(arm: Floats, rotation: Floats, position: Floats, near: Floats, q: Floats) -> int:
+def closest(arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, q: Floats) -> int:
     """Find the nearest posture in closed form.
 
     Args:
         arm: Table of `arm_table`, shape (7, 5).
+        chain: The links to the flange, see `tvist_plant.chain`, shape (7, 22).
         rotation: Rotation of the flange, shape (3, 3).
         position: Position of the flange, shape (3,) [m].
         near: Joint positions, shape (6,) [rad].
@@ -133,10 +134,10 @@ def closest(arm: Floats, rotation: Floats, position: Floats, near: Floats, q: Fl
     """
     table = np.empty((9, 6))
     table[8, 0] = math.nan
-    freedom = all_postures(arm, rotation, position, near, table)
+    freedom = all_postures(arm, chain, rotation, position, near, table)
     curve = ON_CURVE if freedom == FREE else 0
     if freedom != DEFINITE:
-        _start_from_near(arm, rotation, position, near, freedom == FREE, table[8])
+        _start_from_near(chain, rotation, position, near, freedom == FREE, table[8])
     squares, outside = np.empty(9), np.empty(9)
     for row in range(9):
         squares[row] = math.inf
@@ -155,10 +156,10 @@ def closest(arm: Floats, rotation: Floats, position: Floats, near: Floats, q: Fl
             if best < 0:
                 break
             q[:] = table[best]
-            kinematics_into(arm[:6], NO_TOOL_ROTATION, NO_TOOL_POSITION, q, now, place, J)
+            locate(chain, q, now, place, J)
             far, angle = pose_error(rotation, position, now, place, error)
             # Written so that a number that is none does not pass.
-            if max(far, angle) <= AIM or descend(arm[:6], rotation, position, q, 0.0, 5, q) <= ACCURACY:
+            if max(far, angle) <= AIM or descend(chain, rotation, position, q, 0.0, 5, q) <= ACCURACY:
                 return (OUT_OF_RANGE if wrong else FOUND) + curve
             squares[best] = math.inf
     return NO_SOLUTION + curve
@@ -166,12 +167,19 @@ def closest(arm: Floats, rotation: Floats, position: Floats, near: Floats, q: Fl
 
 @compiled
 def search(
-    arm: Floats, starts: Floats, rotation: Floats, position: Floats, near: Floats, found: Floats
+    arm: Floats,
+    chain: Floats,
+    starts: Floats,
+    rotation: Floats,
+    position: Floats,
+    near: Floats,
+    found: Floats,
 ) -> int:
     """Find postures of any arm by least squares, from `near` and from given starts.
 
     Args:
-        arm: Table of `arm_table`, shape (n + 1, 5), or (n + 1, 17) with placements.
+        arm: Table of `arm_table`, shape (n + 1, 5).
+        chain: The links to the flange, see `tvist_plant.chain`, shape (n+1, 22).
         starts: Further starts, shape (k, n) [rad].
         rotation: Rotation of the flange, shape (3, 3).
         position: Position of the flange, shape (3,) [m].
@@ -183,19 +191,17 @@ def search(
     Returns:
         Index of the nearest posture within the joints' ranges; -1 if there is none.
     """
-    joints = arm.shape[0] - 1
-    dh = arm[:joints]
     best, least = -1, math.inf
     for start in range(len(starts) + 1):
         first, second = found[2 * start], found[2 * start + 1]
         first[:] = near if start == 0 else starts[start - 1]
         second[0] = math.nan
-        if not descend(dh, rotation, position, near, 0.0, 100, first) <= ACCURACY:
+        if not descend(chain, rotation, position, near, 0.0, 100, first) <= ACCURACY:
             first[0] = math.nan
             continue
         represent(arm, near, first)
         second[:] = first
-        if not approach(dh, rotation, position, near, second) <= ACCURACY:
+        if not approach(chain, rotation, position, near, second) <= ACCURACY:
             second[0] = math.nan
         for row in range(2 * start, 2 * start + 2):
             if not math.isnan(found[row, 0]):

@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from tvist_controller._compiled import compiled
-from tvist_controller.kinematics.denavit_hartenberg import PLACED, Floats, dh_table
 from tvist_plant.description import RobotDescription
+from tvist_plant.model import Floats
 
 ANY, PARALLEL, SPHERICAL = 0.0, 1.0, 2.0
 """No closed form; axes 2, 3 and 4 are parallel (UR); axes 4, 5 and 6 meet in one point (spherical wrist)."""
@@ -16,19 +16,19 @@ EXACT = 1e-9
 
 
 def arm_table(description: RobotDescription) -> Floats:
-    """Return what the kernels of inverse kinematics need to know of an arm, shape (n + 1, 5).
+    """Return what the closed form of inverse kinematics needs to know of an arm, shape (n + 1, 5).
 
-    The first n rows are those of `dh_table`, with the joint's largest distance from zero [rad] in the fifth column.
-    With placements, the shape is (n + 1, 17).
-    The last row has the form (`ANY`, `PARALLEL` or `SPHERICAL`), the length l₃ [m] of the forearm between the axes of
-    elbow and wrist in the arm's plane, and its angle ψ [rad] to the x axis of its Denavit-Hartenberg frame.
+    The first n rows have a, d [m], cos α and sin α of each joint, whose turn about z is followed by Tz(d) Tx(a) Rx(α);
+    they are zero for an arm with placements. The fifth column has the joint's largest distance from zero [rad]. The
+    last row has the form (`ANY`, `PARALLEL` or `SPHERICAL`), the length l₃ [m] of the forearm between the axes of elbow
+    and wrist in the arm's plane, and its angle ψ [rad] to the x axis of its Denavit-Hartenberg frame.
     """
-    dh = dh_table(description)
-    limits = np.array(description.limits.position, dtype=float)
-    if dh.shape[1] > PLACED:
-        placed = np.vstack((dh, np.zeros(dh.shape[1])))
-        placed[:-1, PLACED - 1], placed[-1, 0] = limits, ANY
-        return placed
+    table = np.zeros((description.joints + 1, 5))
+    table[:-1, 4] = description.limits.position
+    if description.kinematics.placement:
+        return table
+    links, alpha = description.kinematics, np.array(description.kinematics.alpha)
+    table[:-1, :4] = dh = np.column_stack((links.a, links.d, np.cos(alpha), np.sin(alpha)))
     form = _form(dh)
     forearm, angle = 0.0, 0.0
     if form == PARALLEL:
@@ -36,19 +36,20 @@ def arm_table(description: RobotDescription) -> Floats:
     elif form == SPHERICAL:
         forearm = math.hypot(dh[2, 0], dh[3, 1])
         angle = math.atan2(-dh[2, 3] * dh[1, 2] * dh[3, 1], dh[2, 0])
-    return np.vstack((np.column_stack((dh, limits)), (form, forearm, angle, 0.0, 0.0)))
+    table[-1, :3] = form, forearm, angle
+    return table
 
 
 def is_of_ur_form(description: RobotDescription) -> bool:
     """Return whether an arm has six joints, of which the axes 2, 3 and 4 are parallel, as UR's arms have."""
-    return _form(dh_table(description)) == PARALLEL
+    return bool(arm_table(description)[-1, 0] == PARALLEL)
 
 
 def _form(dh: Floats) -> float:
     """Recognise a form that `postures` solves."""
-    if len(dh) != 6 or dh.shape[1] > PLACED:
+    if len(dh) != 6:
         return ANY
-    a, d, cosine, sine = dh[:, :4].T
+    a, d, cosine, sine = dh.T
     turned, straight = np.abs(cosine) < EXACT, np.abs(sine) < EXACT
     if not (turned[0] and straight[1] and turned[3] and turned[4] and abs(a[1]) > EXACT):
         return ANY

@@ -5,6 +5,7 @@ from typing import Any, Literal
 import numpy as np
 from numba import float64, types
 
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.choice import (
     FOUND,
     NO_SOLUTION,
@@ -13,9 +14,9 @@ from tvist_controller.kinematics.choice import (
     improved_postures,
     search,
 )
-from tvist_controller.kinematics.denavit_hartenberg import Floats
 from tvist_controller.kinematics.geometry import ANY, arm_table
 from tvist_plant.description import RobotDescription
+from tvist_plant.model import Floats
 
 STARTS = 63
 """Postures, besides the given one, from which an arm without closed form is searched."""
@@ -58,14 +59,11 @@ class InverseKinematics:
 
     `prepare` compiles what `solve` uses, or loads it from numba's cache; else
     the first call does so.
-
-    Args:
-        description: The robot.
     """
 
     def __init__(self, description: RobotDescription) -> None:
         self._names = description.robot.joints
-        self._arm = arm_table(description)
+        self._arm, self._chain = arm_table(description), Arm(description).chain
         self._limits = self._arm[:-1, 4]
         self._closed = bool(self._arm[-1, 0] != ANY)
         span = np.minimum(self._limits, np.pi)
@@ -103,7 +101,7 @@ class InverseKinematics:
         if not self._closed:
             return self._search(rotation, position, near)
         q = near.copy()
-        status = closest(self._arm, rotation, position, near, q)
+        status = closest(self._arm, self._chain, rotation, position, near, q)
         self.searched = status >= ON_CURVE
         status %= ON_CURVE
         if status != FOUND:
@@ -129,15 +127,15 @@ class InverseKinematics:
         unlimited[:-1, 4] = 2.0 * np.pi
         if self._closed:
             found = np.empty((8, 6))
-            improved_postures(unlimited, rotation, position, zero, found)
+            improved_postures(unlimited, self._chain, rotation, position, zero, found)
         else:
             found = np.empty((2 * STARTS + 2, len(zero)))
-            search(unlimited, self._starts, rotation, position, zero, found)
+            search(unlimited, self._chain, self._starts, rotation, position, zero, found)
         return _distinct(found[~np.isnan(found[:, 0])])
 
     def _search(self, rotation: Floats, position: Floats, near: Floats) -> Floats:
         found = np.empty((2 * STARTS + 2, len(near)))
-        best = search(self._arm, self._starts, rotation, position, near, found)
+        best = search(self._arm, self._chain, self._starts, rotation, position, near, found)
         if best >= 0:
             return np.array(found[best])
         found = found[~np.isnan(found[:, 0])]
@@ -172,8 +170,8 @@ def _distinct(found: Floats) -> Floats:
 
 _TABLE, _RESULT = types.Array(float64, 2, "C"), types.Array(float64, 1, "C")
 _MATRIX, _VECTOR = (types.Array(float64, axes, "A", readonly=True) for axes in (2, 1))
-CLOSED_FORM = closest, (_TABLE, _MATRIX, _VECTOR, _VECTOR, _RESULT)
-NUMERICAL = search, (_TABLE, _TABLE, _MATRIX, _VECTOR, _VECTOR, _TABLE)
+CLOSED_FORM = closest, (_TABLE, _TABLE, _MATRIX, _VECTOR, _VECTOR, _RESULT)
+NUMERICAL = search, (_TABLE, _TABLE, _TABLE, _MATRIX, _VECTOR, _VECTOR, _TABLE)
 """Kernels of `solve`, with the types of their arguments: arrays of any layout."""
 
 

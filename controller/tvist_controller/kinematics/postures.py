@@ -18,8 +18,8 @@ q₄ (axes 4 and 6 coincide, spherical wrist) if sin q₅ = 0; q₂ if the wrist
 import math
 
 from tvist_controller._compiled import compiled
-from tvist_controller.kinematics.denavit_hartenberg import Floats
 from tvist_controller.kinematics.geometry import PARALLEL
+from tvist_plant.model import Floats
 
 AT_BORDER = 1e-10
 """Distance [m] beyond the reach that counts as rounding, and sine or length [m] below which a joint is free."""

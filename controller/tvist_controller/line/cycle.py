@@ -39,7 +39,7 @@ class ControlCycle:
         plant: Plant to control; None for the flexible arm of the description.
         elastic: Elastic feed-forward to use with the filter; None for that of the paper's controller.
         compensate_sag: Whether the drives lead by the twist of the gears under gravity.
-        law: Identified friction to feed forward, see `friction.LAWS`; None for a share of the description's.
+        law: Identified friction to feed forward, see `friction_at`; None for a share of the description's.
 
     Raises:
         ValueError: The plant cannot start there, or its measurement has the wrong shape.
@@ -76,8 +76,8 @@ class ControlCycle:
         """Joint controllers: what the drives are sent for a target."""
         self.drives.use(elastic)
         self.drives.compensate(law)
-        self.kernel_parts = dynamics.chain, dynamics.gravitation, dynamics.scratch, drives.rows
-        """Links, gravity, scratch and joint controllers, as `line_tick` takes them."""
+        self.kernel_parts = dynamics.chain, dynamics.scratch, drives.rows
+        """Links, scratch and joint controllers, as `line_tick` takes them."""
         self.mode = LineMode.REST
         """What the line does."""
         self.placements = 0

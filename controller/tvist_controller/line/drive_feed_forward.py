@@ -3,10 +3,10 @@
 import numpy as np
 from msgspec import Struct
 
-from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.line.joint_controllers import JointControllers
-from tvist_controller.line.line_tick import Q_R, QD, QD_R, QDD, STATIC, TORQUE, TORQUE_FF, Q
+from tvist_controller.line.joint_controllers import LAW, WINDUP, YIELDING, joint_rows
+from tvist_controller.line.line_tick import Q_R, QD_R, STATIC, TORQUE, TORQUE_FF, Q
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 
@@ -33,7 +33,7 @@ class DriveFeedForward:
         description: The robot.
         period: Tick [s].
         compensate_sag: Whether the motors lead by the twist of the gears under gravity.
-        positions: See `JointControllers`.
+        positions: See `joint_rows`.
     """
 
     def __init__(
@@ -44,12 +44,10 @@ class DriveFeedForward:
         compensate_sag: bool = False,
         positions: bool = False,
     ) -> None:
-        self._joints = JointControllers(
-            description, period, compensate_sag=compensate_sag, positions=positions
-        )
         self._law: Floats | None = None
-        self.rows = self._joints.rows
+        self.rows = joint_rows(description, period, compensate_sag=compensate_sag, positions=positions)
         """Parameters and state of the paper's joint controllers, see `joint_controllers`."""
+        self._sags = compensate_sag and not positions
         self.wanted: ElasticFeedForward | None = None
         """The elastic feed-forward in use, or about to be; None for that of the paper's controller."""
         self._elastic: ElasticFeedForward | None = None
@@ -71,13 +69,16 @@ class DriveFeedForward:
         """Feed identified friction forward from the next rest on, since its torque may be another one.
 
         Args:
-            law: See `friction.LAWS`, shape (5, n); None for a share of the friction in the description.
+            law: See `friction_at`, shape (5, n); None for a share of the friction in the description.
         """
         self._law = law
 
+    def _rely_on_law(self) -> None:
+        self.rows[LAW:] = 0.0 if self._law is None else self._law
+
     def rest(self) -> None:
         """Complete a transition at once if the motors do not lead either, since the reference rests: both are equal."""
-        self._joints.compensate(self._law)
+        self._rely_on_law()
         if self._elastic is self.wanted and self._share == self._full:
             return
         if self._elastic is None or self._share == 0 or self._elastic.settled:
@@ -85,13 +86,9 @@ class DriveFeedForward:
             self._share = self._full
 
     def reset(self, gravity: Floats) -> None:
-        """Restart at rest.
-
-        Args:
-            gravity: Torque that balances gravity there, shape (n,) [N m].
-        """
-        self._joints.compensate(self._law)
-        self._joints.reset(gravity)
+        """Restart at rest, where a torque balances gravity, shape (n,) [N m]."""
+        self._rely_on_law()
+        self.rows[WINDUP] = self.rows[YIELDING] * gravity
         self._begin()
         self._share = self._full
 
@@ -119,10 +116,8 @@ class DriveFeedForward:
         if elastic is None or self._share == 0:
             self.reference = None
             return plain
-        command = elastic.command(
-            Target(signals[Q], signals[QD], signals[QDD]), signals[TORQUE], carried,
-            self._joints.sag(signals[STATIC]), smooth=may_begin,
-        )  # fmt: skip
+        sag = self.rows[YIELDING] * signals[STATIC] if self._sags else None
+        command = elastic.command(signals[Q : TORQUE + 1], carried, sag, smooth=may_begin)
         motors = elastic.motors
         if self._share < FADE:
             command = self._blend(plain, command)

@@ -1,4 +1,4 @@
-"""By how much motors have to lead so that an elastic arm follows its target.
+"""By how much motors have to lead so that an elastic arm follows its target, and what its drives get, compiled.
 
 A gear that transmits a load τ without gravity twists by τ/K_g, and a link that carries one bends by φ = -τ_f/k_b. Both
 lag by the damping time D/K, a fraction of a tick. The joints have to turn by the twist, and by what moves the flange
@@ -13,223 +13,298 @@ While links bend and joints move the flange back, both accelerate masses of the 
 contains these, too: without them the modes in which links bend, at 20 to 50 Hz, would be left to ring.
 """
 
+from typing import NamedTuple
+
 import numpy as np
-import numpy.typing as npt
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.kinematics.elimination import eliminate
-from tvist_controller.line.differentiator import Floats
-from tvist_plant.chain import torques
-
-Integers = npt.NDArray[np.int64]
+from tvist_controller.kinematics.least_squares import solve_in_place
+from tvist_controller.line.joint_controllers import LAWS, friction_at
+from tvist_plant.chain import SCRATCH, WIDTH, torques
+from tvist_plant.model import Floats
 
 DAMPED = 0.1
 """λ, in the order of the lever arms that may be taken for none [m]."""
+RECOVERY = 120.0
+"""Rate at which the lead returns to the formula after its acceleration was limited, critically damped [1/s]."""
+ROTOR, FRICTION, MOST, LEAST, LAW = range(5)
+"""Rows of a drive's parameters: rotor inertia [kg m^2]; Coulomb friction to feed forward [N m], or its slope if it is
+linear [N m s/rad]; torque that motion and lead may need together, and that the lead may always need [N m]; and the
+first row of the identified friction, see `friction_at`.
+"""
+COORDINATES, JOINTS, FLEXES, PERIOD, FRICTION_WIDTH, LINEAR, WITH_TORQUES, WITH_LAW, HEAD = range(9)
+"""Places of the single numbers at the front of the memory; their number. The last three are 1 or 0: whether friction is
+linear, whether torques count with the lead, and whether friction was identified, which then counts instead."""
+
+
+class Lead(NamedTuple):
+    """Parts of the memory of an arm with N coordinates, n joints and m ways in which links bend, all of them views."""
+
+    joints: Floats
+    """Indices of the joints among the coordinates, shape (n,)."""
+    flexes: Floats
+    """Indices of the bending, shape (m,)."""
+    chain: Floats
+    """Links of the arm with those that bend, see `tvist_plant.chain`, shape (N+1, 22)."""
+    bodies: Floats
+    """Scratch of the chain, shape (N+1, 28)."""
+    springs: Floats
+    """Stiffness of each spring [N m/rad], and its damping time divided by the tick [-], shape (2, N)."""
+    drives: Floats
+    """Rows of `ROTOR` and so on, shape (9, n)."""
+    late: Floats
+    """Target of the tick before and the torque that it needs, shape (4, n)."""
+    leads: Floats
+    """What is wanted and what is led at the last three ticks, the newest first, shape (2, 3, n) [rad]."""
+    before: Floats
+    """Deflections without damping of the tick before, shape (N,) [rad]."""
+    motion: Floats
+    """Angles, velocities and accelerations of the coordinates, the first two zero for the bending, shape (3, N)."""
+    jacobian: Floats
+    """Translation of the flange, shape (3, N) [m/rad]."""
+    loads: Floats
+    """Torques on the springs without gravity, if the bending did not accelerate and as it does, shape (2, N) [N m]."""
+    bent: Floats
+    """Bending at the last three ticks, the newest first, shape (3, m) [rad]."""
+
+
+def shapes(N: int, n: int, m: int) -> Lead:
+    """Shapes of the parts."""
+    sizes = (
+        (n,), (m,), (N + 1, WIDTH), (N + 1, SCRATCH), (2, N), (LAW + LAWS, n), (4, n), (2, 3, n), (N,), (3, N),
+        (3, N), (2, N), (3, m),
+    )  # fmt: skip
+    return Lead(*sizes)  # type: ignore[arg-type]
+
+
+def memory_for(N: int, n: int, m: int) -> Floats:
+    """Return memory for an arm with N coordinates, n joints and m ways in which links bend, full of zeros."""
+    memory = np.zeros(HEAD + sum(int(np.prod(shape)) for shape in shapes(N, n, m)))
+    memory[COORDINATES], memory[JOINTS], memory[FLEXES] = N, n, m
+    return memory
 
 
 @compiled_for_ticks
-def move_back(jacobian: Floats, joints: Integers, moved: Floats, back: Floats) -> None:
-    """Compute by what the joints have to turn to move the flange, J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ times its way.
+def parts(memory: Floats) -> Lead:
+    """Return the parts of a memory by name, as views."""
+    N, n, m = int(memory[COORDINATES]), int(memory[JOINTS]), int(memory[FLEXES])
+    a = HEAD + n + m
+    b = a + (N + 1) * WIDTH
+    c = b + (N + 1) * SCRATCH
+    d = c + 2 * N
+    e = d + (LAW + LAWS) * n
+    f = e + 4 * n
+    g = f + 6 * n
+    h = g + 4 * N
+    i = h + 3 * N
+    j = i + 2 * N
+    return Lead(
+        memory[HEAD : HEAD + n],
+        memory[HEAD + n : a],
+        memory[a:b].reshape(N + 1, WIDTH),
+        memory[b:c].reshape(N + 1, SCRATCH),
+        memory[c:d].reshape(2, N),
+        memory[d:e].reshape(LAW + LAWS, n),
+        memory[e:f].reshape(4, n),
+        memory[f:g].reshape(2, 3, n),
+        memory[g : g + N],
+        memory[g + N : h].reshape(3, N),
+        memory[h:i].reshape(3, N),
+        memory[i:j].reshape(2, N),
+        memory[j:].reshape(3, m),
+    )
 
-    Args:
-        jacobian: Translation of the flange, shape (3, N) [m/rad].
-        joints: Indices of the n joints, shape (n,).
-        moved: The way, which is changed, shape (3,) [m].
-        back: Result, shape (n,) [rad].
-    """
-    n = joints.shape[0]
+
+@compiled_for_ticks
+def move_back(lead: Lead, moved: Floats, back: Floats) -> None:
+    """Compute by what the joints turn to move the flange by a way that is used up, J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ moved."""
+    n = lead.joints.shape[0]
     square = np.zeros((3, 3))
     for row in range(3):
         square[row, row] = DAMPED * DAMPED
         for column in range(3):
             for j in range(n):
-                square[row, column] += jacobian[row, joints[j]] * jacobian[column, joints[j]]
-    eliminate(square, moved)
+                c = int(lead.joints[j])
+                square[row, column] += lead.jacobian[row, c] * lead.jacobian[column, c]
+    solve_in_place(square, moved)
     for j in range(n):
         back[j] = 0.0
         for row in range(3):
-            back[j] += jacobian[row, joints[j]] * moved[row]
+            back[j] += lead.jacobian[row, int(lead.joints[j])] * moved[row]
 
 
 @compiled_for_ticks
-def bending_accelerations(
-    load: Floats,
-    jacobian: Floats,
-    joints: Integers,
-    flexes: Integers,
-    stiffness: Floats,
-    bent: Floats,
-    period: float,
-    found: Floats,
-) -> None:
-    """Compute the accelerations of bending links, and of the joints that move the flange back meanwhile.
+def bending_accelerations(lead: Lead, period: float, found: Floats) -> None:
+    """Compute the accelerations of bending links, and of the joints that move the flange back meanwhile, shape (N,).
 
     They are second differences, and therefore those of the tick before; at 30 Hz this is a sixteenth of a period late.
-
-    Args:
-        load: Torques on the springs for links that do not accelerate, without gravity, shape (N,) [N m].
-        jacobian: See `move_back`.
-        joints: Indices of the n joints, shape (n,).
-        flexes: Indices of the bending, at least one, shape (m,).
-        stiffness: Stiffness of each spring, shape (N,) [N m/rad].
-        bent: Bending at the last three ticks, the newest first; moved on by one, shape (3, m) [rad].
-        period: Tick [s].
-        found: Result, in the order of the model's coordinates, shape (N,) [rad/s^2].
     """
-    moved, back = np.zeros(3), np.empty(joints.shape[0])
-    for k in range(flexes.shape[0]):
-        c = flexes[k]
-        bent[2, k], bent[1, k], bent[0, k] = bent[1, k], bent[0, k], -load[c] / stiffness[c]
+    bent, moved, back = lead.bent, np.zeros(3), np.empty(lead.joints.shape[0])
+    for k in range(lead.flexes.shape[0]):
+        c = int(lead.flexes[k])
+        bent[2, k], bent[1, k], bent[0, k] = bent[1, k], bent[0, k], -lead.loads[0, c] / lead.springs[0, c]
         found[c] = (bent[0, k] - 2.0 * bent[1, k] + bent[2, k]) / (period * period)
         for row in range(3):
-            moved[row] -= jacobian[row, c] * found[c]
-    move_back(jacobian, joints, moved, back)
-    for j in range(joints.shape[0]):
-        found[joints[j]] = back[j]
+            moved[row] -= lead.jacobian[row, c] * found[c]
+    move_back(lead, moved, back)
+    for j in range(lead.joints.shape[0]):
+        found[int(lead.joints[j])] = back[j]
 
 
 @compiled_for_ticks
-def loads_of(
-    chain: Floats,
-    motion: Floats,
-    scratch: Floats,
-    jacobian: Floats,
-    load: Floats,
-) -> None:
-    """Compute the torques on all springs without gravity, which is static: it makes the arm sag, not swing.
-
-    Args:
-        chain: Links of the arm with those that bend, see `tvist_plant.chain`, shape (N+1, 22).
-        motion: Angles, velocities and accelerations of joints and bending, shape (3, N).
-        scratch: Scratch of the chain, shape (N+1, 28).
-        jacobian: Result: translation of the flange, shape (3, N) [m/rad].
-        load: Result, shape (N,) [N m].
-    """
-    torques(chain, motion[0], motion[1], motion[2], 0.0, scratch, load)
+def loads_of(lead: Lead) -> None:
+    """Compute the first torques on all springs, without gravity, which is static, and the Jacobian."""
+    motion, bodies, jacobian, load = lead.motion, lead.bodies, lead.jacobian, lead.loads[0]
+    torques(lead.chain, motion[0], motion[1], motion[2], 0.0, bodies, load)
     N = load.shape[0]
-    x, y, z = scratch[N, 9], scratch[N, 10], scratch[N, 11]
+    x, y, z = bodies[N, 9], bodies[N, 10], bodies[N, 11]
     for c in range(N):
-        S = scratch[c]
+        S = bodies[c]
         jacobian[0, c] = S[3] + S[1] * z - S[2] * y
         jacobian[1, c] = S[4] + S[2] * x - S[0] * z
         jacobian[2, c] = S[5] + S[0] * y - S[1] * x
 
 
 @compiled_for_ticks
-def wanted_lead(
-    load: Floats,
-    jacobian: Floats,
-    joints: Integers,
-    flexes: Integers,
-    stiffness: Floats,
-    late: Floats,
-    before: Floats,
-    lead: Floats,
-) -> None:
-    """Compute w.
-
-    Args:
-        load: Torques on the springs without gravity, shape (N,) [N m].
-        jacobian: Translation of the flange, shape (3, N) [m/rad].
-        joints: Indices of the n joints, shape (n,).
-        flexes: Indices of the bending, shape (m,).
-        stiffness: Stiffness of each spring, shape (N,) [N m/rad].
-        late: Damping time divided by the tick, shape (N,) [-].
-        before: Deflections without damping of the tick before, replaced by the present ones, shape (N,) [rad].
-        lead: Result, shape (n,) [rad].
-    """
-    n, m = joints.shape[0], flexes.shape[0]
+def wanted_lead(lead: Lead, load: Floats, found: Floats) -> None:
+    """Compute w, shape (n,) [rad], from torques on the springs, shape (N,) [N m]."""
+    n, m = lead.joints.shape[0], lead.flexes.shape[0]
+    stiffness, late, before = lead.springs[0], lead.springs[1], lead.before
     moved, back = np.zeros(3), np.zeros(n)
     for k in range(m):
-        c = flexes[k]
+        c = int(lead.flexes[k])
         own = -load[c] / stiffness[c]
         bent = own + late[c] * (before[c] - own)
         before[c] = own
         for row in range(3):
-            moved[row] -= jacobian[row, c] * bent
+            moved[row] -= lead.jacobian[row, c] * bent
     if m > 0:
-        move_back(jacobian, joints, moved, back)
+        move_back(lead, moved, back)
     for j in range(n):
-        c = joints[j]
+        c = int(lead.joints[j])
         own = load[c] / stiffness[c]
-        lead[j] = own + late[c] * (before[c] - own) + back[j]
+        found[j] = own + late[c] * (before[c] - own) + back[j]
         before[c] = own
 
 
 @compiled_for_ticks
-def lead_of(
-    chain: Floats,
-    q: Floats,
-    qd: Floats,
-    qdd: Floats,
-    joints: Integers,
-    flexes: Integers,
-    stiffness: Floats,
-    late: Floats,
-    bent: Floats,
-    before: Floats,
-    first: bool,
-    smooth: bool,
-    period: float,
-    motion: Floats,
-    scratch: Floats,
-    jacobian: Floats,
-    loads: Floats,
-    wanted: Floats,
-    torque: Floats,
-    rotor: Floats,
-    with_torques: bool,
-    needed: Floats,
-) -> None:
+def lead_of(lead: Lead, target: Floats, first: bool, smooth: bool, memory: Floats, needed: Floats) -> None:
     """Compute w for a target, and the torque that arm and rotors need for it.
 
     Args:
-        chain: See `loads_of`.
-        q: Target, shape (n,) [rad].
-        qd: Its velocity [rad/s].
-        qdd: Its acceleration [rad/s^2].
-        joints: Indices of the n joints, shape (n,).
-        flexes: Indices of the bending, shape (m,).
-        stiffness: Stiffness of each spring, shape (N,) [N m/rad].
-        late: Damping time divided by the tick, shape (N,) [-].
-        bent: Bending at the last three ticks, the newest first; moved on by one, shape (3, m) [rad].
-        before: Deflections without damping of the tick before, replaced by the present ones, shape (N,) [rad].
+        lead: The arm, whose wanted leads are moved on by one.
+        target: q, q̇ and q̈, and τ* of the rigid arm, shape (4, n).
         first: Whether there was no tick before.
         smooth: Whether the reference is, so that second differences say how bending links accelerate.
-        period: Tick [s].
-        motion: Scratch, shape (3, N); zero for the bending, in the first two rows.
-        scratch: Scratch of the chain, shape (N+1, 28).
-        jacobian: Scratch, shape (3, N).
-        loads: Result: torques on the springs if the bending did not accelerate, and as it does, shape (2, N) [N m].
-        wanted: Leads of the last three ticks, the newest first; moved on by one, shape (3, n) [rad].
-        torque: τ* of the rigid arm, shape (n,) [N m].
-        rotor: Rotor inertia, shape (n,) [kg m^2].
-        with_torques: Whether torques count with the lead.
+        memory: The memory of the arm.
         needed: Result, shape (n,) [N m].
     """
-    m = flexes.shape[0]
-    for j in range(joints.shape[0]):
-        c = joints[j]
-        motion[0, c], motion[1, c], motion[2, c] = q[j], qd[j], qdd[j]
+    n, m, motion, loads, wanted = (
+        target.shape[1],
+        lead.flexes.shape[0],
+        lead.motion,
+        lead.loads,
+        lead.leads[0],
+    )
+    for j in range(n):
+        c = int(lead.joints[j])
+        motion[0, c], motion[1, c], motion[2, c] = target[0, j], target[1, j], target[2, j]
     for k in range(m):
-        motion[2, flexes[k]] = 0.0
-    loads_of(chain, motion, scratch, jacobian, loads[0])
+        motion[2, int(lead.flexes[k])] = 0.0
+    loads_of(lead)
     if first:
-        for c in range(before.shape[0]):
-            before[c] = loads[0, c] / stiffness[c]
+        for c in range(lead.before.shape[0]):
+            lead.before[c] = loads[0, c] / lead.springs[0, c]
         for k in range(m):
-            before[flexes[k]] *= -1.0
-            bent[:, k] = before[flexes[k]]
+            lead.before[int(lead.flexes[k])] *= -1.0
+            lead.bent[:, k] = lead.before[int(lead.flexes[k])]
     loads[1] = loads[0]
     if m > 0:
         more = np.empty(loads.shape[1])
-        bending_accelerations(loads[0], jacobian, joints, flexes, stiffness, bent, period, more)
+        bending_accelerations(lead, memory[PERIOD], more)
         if smooth:
             motion[2] += more
-            torques(chain, motion[0], motion[1], motion[2], 0.0, scratch, loads[1])
+            torques(lead.chain, motion[0], motion[1], motion[2], 0.0, lead.bodies, loads[1])
     wanted[2], wanted[1] = wanted[1], wanted[0]
-    wanted_lead(loads[1], jacobian, joints, flexes, stiffness, late, before, wanted[0])
-    for j in range(joints.shape[0]):
-        needed[j] = torque[j] + rotor[j] * qdd[j]
+    wanted_lead(lead, loads[1], wanted[0])
+    for j in range(n):
+        needed[j] = target[3, j] + lead.drives[ROTOR, j] * target[2, j]
+        if memory[WITH_TORQUES] > 0.0:
+            needed[j] += loads[1, int(lead.joints[j])] - loads[0, int(lead.joints[j])]
+
+
+@compiled_for_ticks
+def follow(wanted: Floats, led: Floats, room: Floats, period: float) -> bool:
+    """Advance the lead by one tick: to what is wanted, with at most a given acceleration.
+
+    Where the acceleration was limited, the lead returns to what is wanted like a critically damped oscillator.
+
+    Args:
+        wanted: What is wanted at this tick and the two before, the newest first, shape (3, n) [rad].
+        led: Leads of the last three ticks, the newest first; moved on by one, shape (3, n) [rad].
+        room: Largest acceleration of each joint's lead, shape (n,) [rad/s^2].
+        period: Tick [s].
+
+    Returns:
+        Whether an acceleration was limited.
+    """
+    limited = False
+    for j in range(led.shape[1]):
+        now, before = led[0, j], led[1, j]
+        away = now - wanted[1, j]
+        drift = (away - before + wanted[2, j]) / period
+        acceleration = (wanted[0, j] - 2.0 * wanted[1, j] + wanted[2, j]) / (period * period)
+        acceleration -= RECOVERY * (RECOVERY * away + 2.0 * drift)
+        if abs(acceleration) > room[j]:
+            limited = True
+            acceleration = room[j] if acceleration > 0.0 else -room[j]
+        led[2, j], led[1, j] = before, now
+        led[0, j] = 2.0 * now - before + period * period * acceleration
+    return limited
+
+
+@compiled_for_ticks
+def command_motors(memory: Floats, target: Floats, ticks: int, smooth: bool, motors: Floats) -> bool:
+    """Compute the lead for a target, then what the motors get for the target of the tick before.
+
+    Args:
+        memory: Memory of the arm, see `parts`.
+        target: See `lead_of`, as for `smooth`.
+        ticks: Number of targets before this one; the first three leads are as wanted.
+        smooth: Whether the reference is smooth.
+        motors: Result: positions [rad], velocities [rad/s], accelerations [rad/s^2] and torques [N m] of the motors,
+            shape (4, n).
+
+    Returns:
+        Whether the lead was limited.
+    """
+    lead, period, with_torques = parts(memory), memory[PERIOD], memory[WITH_TORQUES] > 0.0
+    n, late, drives, wanted, led = target.shape[1], lead.late, lead.drives, lead.leads[0], lead.leads[1]
+    needed, limited = np.empty(n), False
+    lead_of(lead, target, ticks == 0, smooth, memory, needed)
+    if ticks == 0:
+        late[:3], late[3] = target[:3], needed
+    if ticks < 3:
+        for row in range(ticks + 1, 3):
+            wanted[row] = wanted[0]
+        led[:] = wanted
+    else:
+        room = np.empty(n)
+        for j in range(n):
+            room[j] = max(drives[MOST, j] - abs(late[3, j]), drives[LEAST, j]) / drives[ROTOR, j]
+        limited = follow(wanted, led, room, period)
+    for j in range(n):
+        rise = (led[0, j] - 2.0 * led[1, j] + led[2, j]) / (period * period)
+        motors[0, j] = late[0, j] + led[1, j]
+        motors[1, j] = late[1, j] + (led[0, j] - led[2, j]) / (2.0 * period)
+        motors[2, j] = late[2, j] + rise
+        speed = motors[1, j] if with_torques else late[1, j]
+        if memory[WITH_LAW] > 0.0:
+            motors[3, j] = late[3, j] + friction_at(drives[LAW:], j, speed)
+        else:
+            share = speed if memory[LINEAR] > 0.0 else np.tanh(speed / memory[FRICTION_WIDTH])
+            motors[3, j] = late[3, j] + drives[FRICTION, j] * share
         if with_torques:
-            needed[j] += loads[1, joints[j]] - loads[0, joints[j]]
+            motors[3, j] += drives[ROTOR, j] * rise
+    late[:3], late[3] = target[:3], needed
+    return limited

@@ -22,9 +22,6 @@ class Guard(Protocol):
     def __call__(self, state: Target) -> JointStop | None:
         """Decide whether a reference may be played.
 
-        Args:
-            state: State of motion that it would lead to.
-
         Returns:
             None if it may be played; otherwise the stop from the previous state, to be made instead.
         """

@@ -1,4 +1,4 @@
-"""Commands to the drives: set-points with their feed-forward."""
+"""Commands to the drives: set-points with their feed-forward; feedback control runs in the drives themselves."""
 
 import math
 
@@ -6,17 +6,33 @@ import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.friction import LAWS, friction_at
 from tvist_plant.description import RobotDescription
 
+LAWS = 5
+"""Number of parameters of identified friction: F_c [N m], F_s/F_c [-], v_s [rad/s], w [rad/s], F_v [N m s/rad]."""
 ROTOR, COMPLIANCE, YIELDING, COULOMB, VISCOUS, WIDTH, PER_SECOND, WINDUP, LAW = range(9)
 """Rows of the parameters of each joint: rotor inertia B [kg m^2], c_w/K_g [rad/(N m)], 1/K_g if the sag is compensated
 [rad/(N m)], Coulomb [N m] and viscous friction [N m s/rad], speed over which the former changes its sign [rad/s], 1/h
-[1/s]; the wind-up of the last tick [rad]; and the first row of the identified friction, see `friction_law`, which
-counts instead of the friction before it. Its F_c is zero if none was identified.
+[1/s]; the wind-up of the last tick [rad]; and the first row of the identified friction, see `friction_at`, which counts
+instead of the friction before it. Its F_c is zero if none was identified.
 """
 ROWS = LAW + LAWS
 """Number of rows."""
+
+
+@compiled_for_ticks
+def friction_at(law: Floats, j: int, speed: float) -> float:
+    """Return identified friction at a speed v: [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v [N m] (Stribeck).
+
+    Args:
+        law: Parameters of each joint in the order of `LAWS`, shape (5, n).
+        j: The joint.
+        speed: v, that of the motor [rad/s].
+    """
+    slow = speed / law[2, j]
+    coulomb = law[0, j] * (1.0 + (law[1, j] - 1.0) * math.exp(-slow * slow))
+    friction: float = coulomb * math.tanh(speed / law[3, j]) + law[4, j] * speed
+    return friction
 
 
 @compiled_for_ticks
@@ -24,6 +40,13 @@ def command_drives(
     q: Floats, rates: Floats, torque: Floats, gravity: Floats, joints: Floats, command: Floats
 ) -> None:
     """Compute the drive command for a target.
+
+    - Torque: τ_ff = τ* + B q̈* + friction; the rotors' inertia and a share of Coulomb friction are added to the
+      torque of the rigid arm. Friction that was identified counts in full, at the speed of the motors.
+    - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g. The motor leads by a share c_w of that, so that the
+      link is closer to its reference.
+    - Sag: the twist by gravity itself, g/K_g, is left, as on the paper's robot, or the motor leads by all of it, so
+      that the link rests on its reference. g(q*) has neither feedback nor a delay, and is as smooth as q*.
 
     Args:
         q: q*, shape (n,) [rad].
@@ -48,15 +71,10 @@ def command_drives(
         command[2, j] = torque[j] + joints[ROTOR, j] * rates[1, j] + friction
 
 
-class JointControllers:
-    """Feed-forward for the drives; their feedback control runs in the drives themselves.
-
-    - Torque: τ_ff = τ* + B q̈* + friction; the rotors' inertia and a share of Coulomb friction are added to the
-      torque of the rigid arm. Friction that was identified counts in full, at the speed of the motors.
-    - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g. The motor leads by a share c_w of that, so that the
-      link is closer to its reference.
-    - Sag: the twist by gravity itself, g/K_g, is left, as on the paper's robot, or the motor leads by all of it, so
-      that the link rests on its reference. g(q*) has neither feedback nor a delay, and is as smooth as q*.
+def joint_rows(
+    description: RobotDescription, period: float, *, compensate_sag: bool = False, positions: bool = False
+) -> Floats:
+    """Return the parameters of each joint, in the order of `ROTOR` and so on, shape (13, n).
 
     Args:
         description: The robot.
@@ -65,43 +83,16 @@ class JointControllers:
         positions: Whether the command is the reference, without wind-up and sag, since the arm's own controller adds
             these.
     """
-
-    def __init__(
-        self,
-        description: RobotDescription,
-        period: float,
-        *,
-        compensate_sag: bool = False,
-        positions: bool = False,
-    ) -> None:
-        drives, n = description.drives, description.joints
-        friction, stiffness = np.array(drives.coulomb_friction), np.array(drives.gear_stiffness)
-        self.rows = rows = np.zeros((ROWS, n))
-        """Parameters of each joint and its wind-up, in the order of `ROTOR` and so on, shape (13, n)."""
-        rows[ROTOR] = drives.rotor_inertia
-        if not positions:
-            rows[COMPLIANCE] = np.array(drives.windup_feedforward) / stiffness
-        if compensate_sag and not positions:
-            rows[YIELDING] = 1.0 / stiffness
-        if drives.linear_friction:
-            rows[VISCOUS] = friction / drives.friction_width
-        else:
-            rows[COULOMB] = drives.friction_feedforward * friction
-        rows[WIDTH], rows[PER_SECOND] = drives.friction_feedforward_width, 1.0 / period
-        self._sags = compensate_sag and not positions
-
-    def compensate(self, law: Floats | None) -> None:
-        """Feed identified friction forward, see `friction_law`; None for a share of the description's friction."""
-        self.rows[LAW:] = 0.0 if law is None else law
-
-    def reset(self, gravity: Floats) -> None:
-        """Restart at rest.
-
-        Args:
-            gravity: Torque that balances gravity there, shape (n,) [N m].
-        """
-        self.rows[WINDUP] = self.rows[YIELDING] * gravity
-
-    def sag(self, gravity: Floats) -> Floats | None:
-        """Lead by which the motors compensate the twist under gravity, shape (n,) [rad]; None if they do not."""
-        return np.asarray(self.rows[YIELDING] * gravity) if self._sags else None
+    drives = description.drives
+    friction, stiffness = np.array(drives.coulomb_friction), np.array(drives.gear_stiffness)
+    rows = np.zeros((ROWS, description.joints))
+    rows[ROTOR] = drives.rotor_inertia
+    if not positions:
+        rows[COMPLIANCE] = np.array(drives.windup_feedforward) / stiffness
+        rows[YIELDING] = compensate_sag / stiffness
+    if drives.linear_friction:
+        rows[VISCOUS] = friction / drives.friction_width
+    else:
+        rows[COULOMB] = drives.friction_feedforward * friction
+    rows[WIDTH], rows[PER_SECOND] = drives.friction_feedforward_width, 1.0 / period
+    return rows

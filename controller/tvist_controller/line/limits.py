@@ -11,6 +11,7 @@ from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.trajectory import AnyStop, MotionLimits, Path
 from tvist_plant.chain import collect_inertia, torques
 from tvist_plant.description import RobotDescription
+from tvist_plant.plant import GRAVITY
 
 TORQUE_SHARE = 0.9
 """Share of the joints' torque that a stop or a stream may use [-]."""
@@ -50,12 +51,10 @@ def rate_of(speed: float, velocity: float, slowest: float | None) -> float:
 
 
 @compiled_for_ticks
-def keeps_torque(
-    chain: Floats, q: Floats, qd: Floats, qdd: Floats, gravity: float, scratch: Floats, most: Floats
-) -> bool:
+def keeps_torque(chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Floats, most: Floats) -> bool:
     """Return whether a state of motion keeps within torques, shape (n,) [N m]; see `tvist_plant.chain.torques`."""
     found = np.empty(q.shape[0])
-    torques(chain, q, qd, qdd, gravity, scratch, found)
+    torques(chain, q, qd, qdd, GRAVITY, scratch, found)
     keeps = True
     for j in range(q.shape[0]):
         keeps = keeps and abs(found[j]) <= most[j]
@@ -63,23 +62,20 @@ def keeps_torque(
 
 
 @compiled_for_ticks
-def torque_room(
-    chain: Floats, q: Floats, qd: Floats, gravity: float, scratch: Floats, most: Floats, share: float
-) -> float:
+def torque_room(chain: Floats, q: Floats, qd: Floats, scratch: Floats, most: Floats, share: float) -> float:
     """Return the largest acceleration of all joints at once, in any direction, that keeps torques, shape (n,) [N m].
 
     Args:
-        chain: As in `tvist_plant.chain.torques`; also q, qd, gravity and scratch.
+        chain: As in `tvist_plant.chain.torques`; also q, qd and scratch.
         q: Joint positions.
         qd: Velocities.
-        gravity: Gravitational acceleration.
         scratch: Scratch.
         most: The torques.
         share: Factor of the torque that belongs to the acceleration [-].
     """
     n, least = q.shape[0], math.inf
     found, M = np.zeros(n), np.empty((n, n))
-    torques(chain, q, qd, np.zeros(n), gravity, scratch, found)
+    torques(chain, q, qd, np.zeros(n), GRAVITY, scratch, found)
     collect_inertia(scratch, M)
     for i in range(n):
         pushed = 0.0
@@ -90,12 +86,7 @@ def torque_room(
 
 
 class StreamTorqueRoom:
-    """The acceleration of a stream that the joints' torques permit, after gravity and velocities.
-
-    Args:
-        description: The robot.
-        dynamics: Its inverse dynamics with the declared payload.
-    """
+    """The acceleration of a stream that the joints' torques permit, after gravity and velocities."""
 
     def __init__(self, description: RobotDescription, dynamics: InverseDynamics) -> None:
         self._most = TORQUE_SHARE * np.array(description.limits.torque)
@@ -117,14 +108,14 @@ class StreamTorqueRoom:
         dynamics = self._dynamics
         if dynamics.changing:
             return bool((dynamics.effort(q, qd, qdd) <= most).all())
-        return keeps_torque(dynamics.chain, q, qd, qdd, dynamics.gravitation, dynamics.scratch, most)
+        return keeps_torque(dynamics.chain, q, qd, qdd, dynamics.scratch, most)
 
     def _room(self, q: Floats, qd: Floats, most: Floats, share: float) -> float:
         dynamics = self._dynamics
         if dynamics.changing:
             left = most - dynamics.effort(q, qd, np.zeros_like(q))
             return float((left / (share * np.abs(dynamics.inertia(q)).sum(axis=1))).min())
-        return torque_room(dynamics.chain, q, qd, dynamics.gravitation, dynamics.scratch, most, share)
+        return torque_room(dynamics.chain, q, qd, dynamics.scratch, most, share)
 
 
 class GuidedTorqueRoom(StreamTorqueRoom):
@@ -224,12 +215,6 @@ def largest_torque(dynamics: InverseDynamics, path: Path, velocity: float, accel
 
     Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), so it is largest at a corner of the range of ẋ² and ẍ. Seventeen
     points of the path are checked.
-
-    Args:
-        dynamics: Inverse dynamics with the declared payload.
-        path: Path of the motion.
-        velocity: Velocity limit of the path's parameter [rad/s].
-        acceleration: Acceleration of the path's parameter [rad/s^2].
     """
     way = path.end - path.start
     resting, pushed = _on_way(dynamics, path, path.start, way, velocity, acceleration)

@@ -9,6 +9,7 @@ from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.differentiator import Floats, differentiate
 from tvist_controller.line.joint_controllers import command_drives
 from tvist_plant.chain import collect_gravity, torques
+from tvist_plant.plant import GRAVITY
 
 REFERENCE, Q, QD, QDD, TORQUE, STATIC, Q_R, QD_R, TORQUE_FF, SIGNALS = range(10)
 """Rows of the signals of a tick: the newest reference q, the target q*, q̇* and q̈* with its torque τ*, the part of τ*
@@ -24,7 +25,6 @@ def to_drives(
     reference: Floats,
     period: float,
     chain: Floats,
-    gravity: float,
     bodies: Floats,
     joints: Floats,
     signals: Floats,
@@ -38,7 +38,6 @@ def to_drives(
         reference: Reference of this tick before shaping, shape (n,) [rad].
         period: Tick [s].
         chain: Links of the rigid arm with its declared payload, shape (n+1, 22).
-        gravity: Gravitational acceleration [m/s^2].
         bodies: Scratch, shape (n+1, 28).
         joints: Parameters of the joint controllers, shape (13, n); their wind-up is changed.
         signals: Result, shape (9, n), see `SIGNALS`.
@@ -47,8 +46,8 @@ def to_drives(
     for j in range(middle.shape[0]):
         signals[REFERENCE, j], signals[Q, j] = reference[j], middle[j]
     differentiate(before, middle, last, period, rates)
-    torques(chain, middle, rates[0], rates[1], gravity, bodies, torque)
-    collect_gravity(bodies, gravity, static)
+    torques(chain, middle, rates[0], rates[1], GRAVITY, bodies, torque)
+    collect_gravity(bodies, GRAVITY, static)
     command_drives(middle, rates, torque, static, joints, signals[Q_R:])
 
 
@@ -58,7 +57,6 @@ def all_to_drives(
     shaped: Floats,
     period: float,
     chain: Floats,
-    gravity: float,
     bodies: Floats,
     joints: Floats,
     targets: Floats,
@@ -69,9 +67,8 @@ def all_to_drives(
     Args:
         start: Shaped reference at rest before them, shape (n,) [rad].
         shaped: Shaped reference of each tick, shape (T, n) [rad].
-        period: See `to_drives`, as for the next three.
+        period: See `to_drives`, as for the next two.
         chain: Links.
-        gravity: Gravitational acceleration.
         bodies: Scratch.
         joints: Parameters of the joint controllers.
         targets: Result: q*, q̇* and q̈*, shape (T, 3, n).
@@ -82,7 +79,7 @@ def all_to_drives(
     before, middle = start, start
     for k in range(shaped.shape[0]):
         last = shaped[k]
-        to_drives(before, middle, last, last, period, chain, gravity, bodies, joints, signals)
+        to_drives(before, middle, last, last, period, chain, bodies, joints, signals)
         for j in range(n):
             targets[k, 0, j], targets[k, 1, j], targets[k, 2, j] = middle[j], signals[QD, j], signals[QDD, j]
             for row in range(3):

@@ -11,7 +11,7 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.line_tick import all_to_drives
-from tvist_controller.trajectory import Trajectory
+from tvist_controller.trajectory import Known
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, Measurement, Response, SimulatedArm
@@ -33,11 +33,7 @@ class Driven:
 
 
 class Still(SimulatedArm):
-    """A plant that does nothing but keep its last command.
-
-    Args:
-        joints: Number of joints.
-    """
+    """A plant that does nothing but keep its last command."""
 
     payload = Payload()
 
@@ -55,28 +51,6 @@ class Still(SimulatedArm):
         """Keep a command; see `Plant.step`."""
         self.last = command
         return self._nothing
-
-
-class Player(Trajectory):
-    """A reference that is completely known.
-
-    Args:
-        q: Its samples, shape (T, n) [rad].
-    """
-
-    def __init__(self, q: Floats) -> None:
-        self._q, self._next = q, 0
-
-    def next(self) -> Floats:
-        """Return the next sample; after the last one, return that again."""
-        q: Floats = self._q[min(self._next, len(self._q) - 1)]
-        self._next += 1
-        return q
-
-    @property
-    def finished(self) -> bool:
-        """Whether the last sample was returned."""
-        return self._next >= len(self._q)
 
 
 class DrivenLine:
@@ -139,7 +113,7 @@ class DrivenLine:
         targets, commands = np.empty((2, ticks, 3, shaped.shape[1]))
         for tick in range(ticks):
             if tick == resting:
-                self._cycle.begin(Player(shaped))
+                self._cycle.begin(Known(list(shaped), PERIOD))
             target, command = self._cycle.step().target, self._drives.last
             targets[tick] = target.q, target.qd, target.qdd
             commands[tick] = command.q, command.qd, command.torque
@@ -148,11 +122,6 @@ class DrivenLine:
 
 def respond(plant: SimulatedArm, driven: Driven, seed: int) -> Response:
     """Let a plant follow what its drives get, from rest.
-
-    Args:
-        plant: The plant; it must provide the truth.
-        driven: What its drives get.
-        seed: Seed of its random effects.
 
     Raises:
         PlantError: The state is no longer finite.

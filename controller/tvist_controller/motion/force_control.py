@@ -6,14 +6,14 @@ from typing import Protocol
 import numpy as np
 
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.kinematics.tool import turn
+from tvist_controller.kinematics.rotation import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.force_sensing import SILENT, ContactWatch, ExternalSensor
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.monitor import Finding, Monitor
 from tvist_controller.motion.task_frame import Feature, frame_of
-from tvist_controller.trajectory import Compliant, ForceTask, Guided, JointSpeed, Rest
+from tvist_controller.trajectory import Compliant, ForceTask, Guided, Rest, Speed
 from tvist_controller.trajectory.compliant import CRAWL
 from tvist_controller.trajectory.force_law import FREE_DAMPING
 from tvist_plant.plant import PERIOD
@@ -169,7 +169,7 @@ class ForceControl(Monitor):
         elif self._cycle.mode.at_rest:
             inner = Rest(state[0])
         else:
-            inner = stop = JointSpeed(state, guidance.limits, guidance.torque, PERIOD)
+            inner = stop = Speed(state, guidance.limits, guidance.torque, PERIOD)
             stop.aim(np.zeros_like(state[0]), guidance.limits.acceleration)
         return Compliant(
             state, guidance.limits, guidance.reach, guidance.torque, PERIOD, tool=lambda: guidance.tool, inner=inner,

@@ -5,12 +5,13 @@ from typing import TypeVar
 import numpy as np
 
 from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.kinematics.tool import ToolKinematics
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.rotation import turn, turned
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import GENTLEST_STOP, GuidedTorqueRoom, arm_limits
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.trajectory import Compliant, Guided, JointSpeed, MotionLimits, Servo, Speed, ToolSpeed
+from tvist_controller.trajectory import Compliant, Guided, MotionLimits, Servo, Speed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.transitions import Activity
 
@@ -34,8 +35,17 @@ class Guidance:
         """Largest position of each joint in either direction, shape (n,) [rad]."""
         self.torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.dynamics)
         """Motion that the torque permits."""
-        self._tcp, self._kinematics = motion.tcp, ToolKinematics(motion.cycle.description)
-        self._kinematics.rehearse(PERIOD)
+        self._tcp, self._kinematics = motion.tcp, Arm(motion.cycle.description)
+        self._rehearse()
+
+    def _rehearse(self) -> None:
+        """Compile what a motion of the tool uses, or load it from disk, before a tick needs it."""
+        q, still, arm = self.reach * 0.1, np.zeros(len(self.reach)), self._kinematics
+        speed = Speed((q, still, still), self.limits, self.torque, PERIOD, arm=arm)
+        speed.aim(arm.jacobian(q)[:, 0] * 1e-3, 1.0, 1.0)
+        speed.next()
+        rotation, position = arm.pose(q)
+        arm.near((turned(rotation, turn(rotation, rotation)), position), q)
 
     def servo(self, q: Floats, lookahead: float, gain: float, *, shaped: bool) -> int:
         """Follow a posture, see `Servo`; return the motion's number.
@@ -51,43 +61,43 @@ class Guidance:
         return self.follow("servo_j", servo, shaped=shaped)
 
     def move_joints(self, qd: Floats, acceleration: float, *, shaped: bool) -> int:
-        """Approach velocities of the joints, see `JointSpeed`; return the motion's number.
+        """Approach velocities of the joints, see `Speed`; return the motion's number.
 
         Raises:
             RefusalError: See `servo`.
         """
         self.check("speed_j", shaped=shaped)
-        speed, most = self._present(JointSpeed, shaped), self._most(shaped)
-        if speed is None:
-            rate = self.motion.motions.speed
-            speed = JointSpeed(self._start(shaped), most, self.torque, PERIOD, rate=rate)
         if shaped:
-            qd = qd * min(1.0, most.velocity / max(float(np.abs(qd).max()), most.velocity))
-        speed.aim(qd, acceleration)
-        return self.follow("speed_j", speed, shaped=shaped)
+            most = self._most(shaped).velocity
+            qd = qd * min(1.0, most / max(float(np.abs(qd).max()), most))
+        return self._approach("speed_j", None, qd, (acceleration,), shaped=shaped)
 
     def move_tool(
         self, twist: Floats, acceleration: float, angular_acceleration: float, *, shaped: bool
     ) -> int:
-        """Approach a velocity of the tool, see `ToolSpeed`; return the motion's number.
+        """Approach a velocity of the tool, see `Speed`; return the motion's number.
 
         Raises:
             RefusalError: See `servo`.
         """
         self.check("speed_l", shaped=shaped)
-        speed, tool = self._present(ToolSpeed, shaped), self.tool
-        if speed is None or speed.kinematics is not tool:
+        accelerations = (acceleration, angular_acceleration)
+        return self._approach("speed_l", self.tool, twist, accelerations, shaped=shaped)
+
+    def _approach(
+        self, trigger: str, tool: Arm | None, goal: Floats, accelerations: tuple[float, ...], *, shaped: bool
+    ) -> int:
+        speed = self._present(Speed, shaped)
+        if speed is None or speed.arm is not tool:
             rate = self.motion.motions.speed
-            speed = ToolSpeed(self._start(shaped), self._most(shaped), tool, self.torque, PERIOD, rate=rate)
-        speed.aim(twist, acceleration, angular_acceleration)
-        return self.follow("speed_l", speed, shaped=shaped)
+            speed = Speed(self._start(shaped), self._most(shaped), self.torque, PERIOD, rate=rate, arm=tool)
+        speed.aim(goal, *accelerations)
+        return self.follow(trigger, speed, shaped=shaped)
 
     def stop_joints(self, acceleration: float | None, trigger: str = "stop_j") -> None:
-        """Come to rest with a deceleration of the joints; a guided motion with all of them in phase.
+        """Come to rest with a deceleration of the fastest joint [rad/s^2]; None for what the torque permits.
 
-        Args:
-            acceleration: Deceleration of the fastest joint [rad/s^2]; None for what the torque permits.
-            trigger: Trigger of the table of transitions.
+        A guided motion brakes with all joints in phase.
         """
         motion = self.motion
         if motion.activity is not Activity.GUIDED or acceleration is None:
@@ -95,19 +105,16 @@ class Guidance:
             return
         acceleration = min(max(acceleration, GENTLEST_STOP), self.limits.acceleration)
         state = self.state
-        stop = JointSpeed(state, self.limits, self.torque, PERIOD)
+        stop = Speed(state, self.limits, self.torque, PERIOD)
         stop.aim(np.zeros_like(state[0]), acceleration)
         stop.acceleration = acceleration
         self._halt(trigger, stop, stop.duration)
 
     def stop_tool(self, acceleration: float, angular_acceleration: float) -> None:
-        """Come to rest with a deceleration of the tool, which goes on straight if `speed_l` moves it.
+        """Come to rest with a deceleration of the tool [m/s^2, rad/s^2].
 
-        Other motions brake with the deceleration of the joints that corresponds to it at their present velocities.
-
-        Args:
-            acceleration: Deceleration [m/s^2].
-            angular_acceleration: Angular deceleration [rad/s^2].
+        It goes on straight if `speed_l` moves it. Other motions brake with the deceleration of the joints that
+        corresponds to it at their present velocities.
         """
         cycle = self._cycle
         state, present, tool = cycle.newest, cycle.trajectory, self.tool
@@ -116,18 +123,20 @@ class Guidance:
             float(np.linalg.norm(twist[:3])) / acceleration,
             float(np.linalg.norm(twist[3:])) / angular_acceleration,
         )
-        straight = self.motion.activity is Activity.GUIDED and isinstance(present, ToolSpeed)
+        straight = (
+            self.motion.activity is Activity.GUIDED and isinstance(present, Speed) and present.arm is not None
+        )
         if not straight or duration == 0.0:
             self.stop_joints(fastest / duration if duration > 0.0 else None, "stop_l")
             return
         harder = max(duration * GENTLEST_STOP / fastest, 1.0)
-        stop = ToolSpeed(self._start(shaped=False), self.limits, tool, self.torque, PERIOD)
+        stop = Speed(self._start(shaped=False), self.limits, self.torque, PERIOD, arm=tool)
         stop.aim(np.zeros(6), harder * acceleration, harder * angular_acceleration)
         stop.acceleration = harder * fastest / duration
         self._halt("stop_l", stop, stop.duration)
 
     @property
-    def tool(self) -> ToolKinematics:
+    def tool(self) -> Arm:
         """Kinematics of the present tool centre point."""
         if self.motion.tcp != self._tcp:
             self._tcp = self.motion.tcp
@@ -191,7 +200,7 @@ class Guidance:
         lead = self.compliant
         if lead is None or lead.inner.finished:
             return
-        stop = JointSpeed(self._start(shaped=False), self.limits, self.torque, PERIOD)
+        stop = Speed(self._start(shaped=False), self.limits, self.torque, PERIOD)
         stop.aim(np.zeros(len(self.reach)), deceleration)
         lead.take(stop)
 

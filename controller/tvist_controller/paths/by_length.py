@@ -23,11 +23,7 @@ def evenly(blend: ToolBlend) -> "ToolBlend | EvenBlend":
 
 
 class EvenBlend(ToolCurve):
-    """A blend whose parameter is the length of its way.
-
-    Args:
-        blend: The blend; the tool nowhere stops on it.
-    """
+    """A blend whose parameter is the length of its way."""
 
     def __init__(self, blend: ToolBlend) -> None:
         self._blend = blend

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.kinematics.tool import turn, turned
+from tvist_controller.kinematics.rotation import turn, turned
 from tvist_controller.paths.poses import Placement
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import hermite
@@ -53,12 +53,7 @@ class ToolWay(ToolCurve):
 
 
 class ToolLine(ToolWay):
-    """Straight line, on which the tool turns evenly by the shortest way.
-
-    Args:
-        start: Pose at the start.
-        end: Pose at the end.
-    """
+    """Straight line, on which the tool turns evenly by the shortest way."""
 
     def __init__(self, start: Placement, end: Placement) -> None:
         self._start, self._end = start, end
@@ -137,13 +132,7 @@ class ToolArc(ToolWay):
 
 
 class ToolPart(ToolCurve):
-    """A part of a path of the tool, in its direction or against it.
-
-    Args:
-        whole: The path.
-        start: Length of it at which the part begins [m].
-        end: Length of it at which the part ends [m].
-    """
+    """A part of a path of the tool, in its direction or against it."""
 
     def __init__(self, whole: ToolCurve, start: float, end: float) -> None:
         self._whole, self._from = whole, start

@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tvist_controller.kinematics.tool import ToolKinematics, turn
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.pose import ACCURATE
+from tvist_controller.kinematics.rotation import turn
 from tvist_controller.paths.poses import Placement
 from tvist_controller.paths.tool_curves import ToolCurve, ToolState
 from tvist_controller.trajectory.limits import Floats
@@ -19,10 +21,10 @@ CLOSEST = 1e-5
 """Smallest distance of two knots; a way that needs closer ones passes a singular posture [m]."""
 TOLERANCE = 1e-6
 """Largest error of the tool between two knots [m, rad]."""
-EXACT = 1e-12
-"""Error below which a posture counts as a solution [m, rad]."""
-ITERATIONS = 12
-"""Largest number of Newton's steps to a knot."""
+REFRESHED = 3
+"""Number of times that Newton's method may get a new Jacobian on the way to a knot."""
+FARTHEST = 1.0
+"""Angle of a joint beyond which a knot counts as another posture [rad]."""
 STEEPEST = 300.0
 """Angle that a joint may turn for each metre of the tool's way; beyond it the arm is close to a singular posture
 [rad/m]."""
@@ -50,7 +52,7 @@ class Tracker:
     """
 
     def __init__(self, description: RobotDescription, tcp: Sequence[float]) -> None:
-        self._tool = ToolKinematics(description, tcp)
+        self._tool = Arm(description, tcp)
 
     def pose(self, q: Floats) -> Placement:
         """Return the pose of the tool at joint positions, shape (n,) [rad]."""
@@ -58,18 +60,13 @@ class Tracker:
 
     def solve(self, goal: Placement, q: Floats) -> Floats | None:
         """Return joint positions near q at which the tool has a pose, shape (n,) [rad]; None if Newton finds none."""
-        for _ in range(ITERATIONS):
-            rotation, position, jacobian = self._tool.all(q)
-            error = np.concatenate((goal.position - position, turn(rotation, goal.rotation)))
-            size = float(np.abs(error).max())
-            if size < EXACT:
-                return q
-            step = _solved(jacobian, error)
-            if step is None or np.abs(step).max() > 1.0:
+        found = q
+        for _ in range(REFRESHED):
+            found, error = self._tool.near(goal, found)
+            if not np.abs(found - q).max() <= FARTHEST:
                 return None
-            q = q + step
-            if size < 1e-8:  # Newton converges quadratically: the next error is below rounding
-                return q
+            if np.abs(error).max() <= ACCURATE:
+                return found
         return None
 
     def rates(self, q: Floats, state: ToolState) -> tuple[Floats, Floats] | None:
@@ -78,15 +75,11 @@ class Tracker:
         first = _solved(jacobian, state.first)
         if first is None or np.abs(first).max() > STEEPEST:
             return None
-        second = _solved(jacobian, state.second - self._tool.bias(q, first))
+        second = _solved(jacobian, state.second - self._tool.acceleration(q, first, np.zeros(len(q))))
         return None if second is None else (first, second)
 
     def follow(self, curve: ToolCurve, q: Floats) -> Knots:
         """Return the joints' way along a path of the tool.
-
-        Args:
-            curve: The path.
-            q: Joint positions at its start, shape (n,) [rad].
 
         Raises:
             WayError: A singular posture is on the way, or its poses cannot be reached.

@@ -37,7 +37,7 @@ class PlannedFilter:
     elastic: ElasticFeedForward | None
     """Elastic feed-forward for the drives; None if the filter does without."""
     law: Floats | None = None
-    """Identified friction of the joints, see `friction.LAWS`; None if it is not known."""
+    """Identified friction of the joints, see `friction_at`; None if it is not known."""
 
 
 class FilterPlanner:

@@ -4,8 +4,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
-from tvist_controller.kinematics.tool import ToolKinematics, turn
+from tvist_controller.kinematics.rotation import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.paths.poses import placement, placement_vector
@@ -28,11 +29,11 @@ class ProgramKinematics:
     ) -> None:
         self._motion, self._spend = motion, spend
         self._inverse = InverseKinematics(description)
-        self._flange = ToolKinematics(description)
+        self._flange = Arm(description)
         self._tcp: tuple[float, ...] = (0.0,) * 6
         self._tool = self._flange
 
-    def _with(self, tcp: Sequence[float] | None) -> ToolKinematics:
+    def _with(self, tcp: Sequence[float] | None) -> Arm:
         """The kinematics of a tool; of the present one if there is none given."""
         wanted = self._motion.tcp if tcp is None else tuple(tcp)
         if wanted != self._tcp:

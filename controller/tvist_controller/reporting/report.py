@@ -3,8 +3,9 @@
 import numpy as np
 from msgspec import Struct
 
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.rotation import rotation_vector
 from tvist_controller.line.differentiator import Floats, middle_of
-from tvist_controller.line.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.line.sample import Sample
 from tvist_controller.reporting.state_layout import Layout, width, write_state
 from tvist_plant.description import RobotDescription
@@ -58,8 +59,8 @@ class Report(Struct, gc=False):
     """Sequence number of the newest accepted set-point."""
     missed: int
     """Number of ticks that began too late."""
-    kinematics: ForwardKinematics
-    """Kinematics of the tool, which must not change."""
+    arm: Arm
+    """The arm with its tool, which must not change."""
     layouts: Layouts
     """Layouts of such states."""
     made: State | None = None
@@ -93,7 +94,7 @@ class Report(Struct, gc=False):
         write_state(
             out, places, integers, tick, sequence or 0, PERIOD, self.speed, self.delay, sample.signals,
             before, middle, last, measured.q, measured.qd, measured.moment, measured.accelerometer,
-            self.kinematics.chain, self.kinematics.offset, f_d, self.zeta,
+            self.arm.chain, f_d, self.zeta,
             NOTHING if motors is None else motors.rows, NOWHERE if sample.wrench is None else sample.wrench,
         )  # fmt: skip
         return out.tobytes()
@@ -102,7 +103,7 @@ class Report(Struct, gc=False):
         sample, motors = self.sample, self.sample.motors
         unshaped = None if sample.unshaped is None else middle_of(sample.unshaped, PERIOD)
         target, measured = sample.target, sample.measured
-        motion = self.kinematics.motion(measured.q, measured.qd).tolist()
+        motion = self.arm.motion(measured.q, measured.qd).tolist()
         robot_mode, safety_mode, runtime = self.modes
         return State(
             tick=self.tick,
@@ -144,7 +145,7 @@ class Reporter:
 
     def __init__(self, description: RobotDescription, plant: Plant) -> None:
         self._joints = description.joints
-        self._kinematics = ForwardKinematics(description)
+        self._arm = Arm(description)
         self._layouts = Layouts()
         self._true_modes: dict[str, list[float]] = {}
         self._plant = plant
@@ -164,12 +165,12 @@ class Reporter:
         """Return the report of a tick; every tick needs one."""
         return Report(
             tick, sample, modes, speed, tvist.f_d, tvist.zeta, tvist.delay + drive_delay,
-            tvist.clipped, setpoint_sequence, missed_ticks, self._kinematics, self._layouts,
+            tvist.clipped, setpoint_sequence, missed_ticks, self._arm, self._layouts,
         )  # fmt: skip
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
-        self._kinematics = self._kinematics.with_tool(offset)
+        self._arm = self._arm.with_tool(offset)
 
     def truth(self, tick: int, *, with_modes: bool) -> Truth:
         """Return what a real robot cannot measure; a `ValueError` says that the plant does not provide it.

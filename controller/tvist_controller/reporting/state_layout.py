@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.kinematics.arm import end_motion
 from tvist_controller.line.differentiator import Floats, differentiate
-from tvist_controller.line.kinematics import tool_motion
 from tvist_controller.line.line_tick import TORQUE
 from tvist_protocol.codec import encode
 from tvist_protocol.stream import State
@@ -68,7 +68,6 @@ def gather(
     moment: Floats,
     accelerometer: Floats,
     chain: Floats,
-    tool: Floats,
     f_d: Floats,
     zeta: Floats,
 ) -> int:
@@ -79,7 +78,7 @@ def gather(
     for j in range(n):
         numbers[k + j], numbers[k + n + j], numbers[k + 2 * n + j] = q[j], qd[j], moment[j]
     k += 3 * n
-    tool_motion(chain, tool, q, qd, numbers[k : k + 12])
+    end_motion(chain, q, qd, numbers[k : k + 12])
     for j in range(3):
         numbers[k + 12 + j] = accelerometer[j]
     numbers[k + 15] = speed
@@ -108,8 +107,7 @@ def write_state(
     qd: Floats,
     moment: Floats,
     accelerometer: Floats,  # shape (3,) [m/s^2]
-    chain: Floats,  # see `tool_motion`
-    tool: Floats,
+    chain: Floats,  # see `end_motion`
     f_d: Floats,  # damped frequencies, shape (modes,) [Hz]
     zeta: Floats,
     motors: Floats,  # velocities, accelerations and torques, if there are any, shape (3, n) or (0, n)
@@ -118,7 +116,7 @@ def write_state(
     """Write the numbers of a state into the bytes of such a state."""
     numbers = np.empty(places.shape[0])
     numbers[0] = tick * period
-    end = gather(numbers, speed, delay, signals, q, qd, moment, accelerometer, chain, tool, f_d, zeta)
+    end = gather(numbers, speed, delay, signals, q, qd, moment, accelerometer, chain, f_d, zeta)
     unshaped: int = middle.shape[0]
     if unshaped > 0:
         for j in range(unshaped):

@@ -4,9 +4,8 @@ import numpy as np
 
 from tvist_controller.calibrations.modal import drivetrain, friction_law
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.line.elastic_model import ElasticModel
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.model import flexible_model
+from tvist_plant.model import Floats, flexible_model
 from tvist_protocol.calibration import Calibration
 from tvist_shaping.base import Filter
 from tvist_shaping.errors import EstimatorError
@@ -27,16 +26,16 @@ def elastic_feed_forward(
     """
     if tvist.feed_forward == "rigid":
         return None
-    model = elastic_model(description, calibration)
+    springs = springs_of(description, calibration)
     law = friction_law(calibration.modal.parameters, description) if calibration.modal is not None else None
     torques = tvist.feed_forward == "elastic"
-    return ElasticFeedForward(description, model, tvist.period, torques=torques, law=law)
+    return ElasticFeedForward(description, *springs, tvist.period, torques=torques, law=law)
 
 
-def elastic_model(description: RobotDescription, calibration: Calibration) -> ElasticModel:
-    """Combine masses, geometry and the places where links bend with the springs of a calibration.
+def springs_of(description: RobotDescription, calibration: Calibration) -> tuple[Floats, Floats]:
+    """Return stiffness [N m/rad] and damping time [s] of gears and bending links, each of shape (N,).
 
-    Springs and gains in the robot file are not used.
+    They are those of a calibration; springs and gains in the robot file are not used.
 
     Raises:
         EstimatorError: See `elastic_feed_forward`.
@@ -48,4 +47,4 @@ def elastic_model(description: RobotDescription, calibration: Calibration) -> El
         raise EstimatorError("robot", calibration.robot, f"{description.robot.model!r}, which this arm is")
     springs = drivetrain(calibration.modal.parameters, description, flexible_model(description, Payload()))
     stiffness = np.array(springs.stiffness)
-    return ElasticModel(description, stiffness, np.array(springs.damping) / stiffness)
+    return stiffness, np.array(springs.damping) / stiffness

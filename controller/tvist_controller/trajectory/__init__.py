@@ -6,7 +6,6 @@ from tvist_controller.trajectory.curve import Bends, Curve
 from tvist_controller.trajectory.double_s import DoubleS
 from tvist_controller.trajectory.force_law import ForceTask
 from tvist_controller.trajectory.guided import Guided, StuckError
-from tvist_controller.trajectory.joint_speed import JointSpeed
 from tvist_controller.trajectory.known import Known
 from tvist_controller.trajectory.limits import MotionLimits
 from tvist_controller.trajectory.motion import PlannedMotion, at_least, quickest_motion
@@ -17,7 +16,6 @@ from tvist_controller.trajectory.slowed_stop import SlowedStop
 from tvist_controller.trajectory.speed import Speed
 from tvist_controller.trajectory.stop import JointStop
 from tvist_controller.trajectory.stream import SetpointStream
-from tvist_controller.trajectory.tool_speed import ToolKinematics, ToolSpeed
 
 AnyStop = JointStop | PathStop | SlowedStop
 """Any stop."""
@@ -32,7 +30,6 @@ __all__ = [
     "Forecast",
     "Guided",
     "JointLine",
-    "JointSpeed",
     "JointStop",
     "Known",
     "MotionLimits",
@@ -45,8 +42,6 @@ __all__ = [
     "SlowedStop",
     "Speed",
     "StuckError",
-    "ToolKinematics",
-    "ToolSpeed",
     "Trajectory",
     "Way",
     "at_least",

@@ -76,11 +76,7 @@ class Trajectory(ABC):
 
 
 class Rest(Trajectory):
-    """No motion.
-
-    Args:
-        q: Joint angles to stay at, shape (n,) [rad].
-    """
+    """No motion."""
 
     def __init__(self, q: Floats) -> None:
         self._q = q

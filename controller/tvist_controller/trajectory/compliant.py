@@ -4,18 +4,17 @@ from collections.abc import Callable
 
 import numpy as np
 
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.rotation import turn, turned
 from tvist_controller.trajectory.base import Rest
-from tvist_controller.trajectory.following import Following
 from tvist_controller.trajectory.force_law import ForceTask, compliant_velocity
-from tvist_controller.trajectory.guided import Guided, StuckError
+from tvist_controller.trajectory.guided import Following, Guided, StuckError
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
-from tvist_controller.trajectory.tool_speed import ToolKinematics
+from tvist_controller.trajectory.speed import abrupt
 
 NEWTON = 3
 """Newton steps from the tool's pose to the joints' angles; two suffice for what the tool moves in a tick."""
-ACCURATE = 1e-10
-"""Error of the tool's pose at which they end [m or rad]."""
 OFF = 1e-5
 """Error of the tool's pose in a direction that does not give way above which the motion cannot go on [m or rad]."""
 FASTEST = 0.5
@@ -52,11 +51,11 @@ class Compliant(Following):
         torque: TorqueRoom,
         period: float,
         *,
-        tool: Callable[[], ToolKinematics],
+        tool: Callable[[], Arm],
         inner: Guided | Rest,
         felt: Callable[[], Floats],
     ) -> None:
-        super().__init__(state, _abrupt(limits, period), reach, torque, period)
+        super().__init__(state, abrupt(limits, period), reach, torque, period)
         self._tool, self.inner = tool, inner
         """The reference that moves the tool otherwise."""
         self._felt = felt
@@ -69,7 +68,7 @@ class Compliant(Following):
         """Share of the law's velocity that a singular posture permits, of the last tick [-]."""
         self._begin(tool())
 
-    def _begin(self, kinematics: ToolKinematics) -> None:
+    def _begin(self, kinematics: Arm) -> None:
         """Let a tool centre point give way from the joints' present motion on."""
         q, qd, _ = self.state
         self.kinematics = kinematics
@@ -114,7 +113,7 @@ class Compliant(Following):
 
     def adopt(self, limits: MotionLimits) -> None:
         """See `Guided.adopt`."""
-        super().adopt(_abrupt(limits, self._period))
+        super().adopt(abrupt(limits, self._period))
 
     def pace(self, speed: float, slowest: float | None) -> None:
         """Set the speed of the inner reference, and the velocity limit of all."""
@@ -148,7 +147,7 @@ class Compliant(Following):
             self._given = _out(axes, part * given)
             self._twist = _out(axes, kept) + self._given
             self._pose = self._shifted(present, h * self._twist)
-            found, error = self._joints(q, inverse)
+            found, error = self.kinematics.near(self._pose, q, inverse, NEWTON)
             if np.abs(error).max() <= OFF:
                 break
         else:
@@ -167,27 +166,17 @@ class Compliant(Following):
             return self._moved
         rotation, position = self._nominal
         self._nominal = there = self.kinematics.pose(self.inner.next())
-        way = np.concatenate((there[1] - position, self.kinematics.turn(rotation, there[0])))
+        way = np.concatenate((there[1] - position, turn(rotation, there[0])))
         self._moved = way / self._period
         return self._moved
 
     def _shifted(self, pose: tuple[Floats, Floats], way: Floats) -> tuple[Floats, Floats]:
-        return self.kinematics.turned(pose[0], way[3:]), pose[1] + way[:3]
+        return turned(pose[0], way[3:]), pose[1] + way[:3]
 
     def _off(self, q: Floats) -> Floats:
         """What the pose lacks to the one that is followed, shape (6,) [m, rad]."""
         rotation, position = self.kinematics.pose(q)
-        return np.concatenate((self._pose[1] - position, self.kinematics.turn(rotation, self._pose[0])))
-
-    def _joints(self, q: Floats, inverse: Floats) -> tuple[Floats, Floats]:
-        """Joints that reach the pose, from those nearby, and what is lacking then."""
-        error = self._off(q)
-        for _ in range(NEWTON):
-            q = q + inverse @ error
-            error = self._off(q)
-            if np.abs(error).max() <= ACCURATE:
-                break
-        return q, error
+        return np.concatenate((self._pose[1] - position, turn(rotation, self._pose[0])))
 
     def _drop(self, q: Floats, axes: Floats) -> None:
         """Give up, in the compliant axes, what the joints have not followed."""
@@ -195,11 +184,6 @@ class Compliant(Following):
         self._pose = self._shifted(self._pose, -_out(axes, lost))
         kept = np.where(self.task.compliant > 0.0, 0.0, _into(axes, self._given))
         self._given = _out(axes, kept)
-
-
-def _abrupt(limits: MotionLimits, period: float) -> MotionLimits:
-    """Limits with which the joints change their acceleration within a tick, as the speeds of joints do."""
-    return MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
 
 
 def _into(axes: Floats, base: Floats) -> Floats:

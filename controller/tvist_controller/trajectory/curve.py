@@ -66,9 +66,6 @@ class Curve(Path):
     def derivatives(self, s: Floats) -> tuple[Floats, Floats, Floats]:
         """Evaluate the curve at k points.
 
-        Args:
-            s: Parameters, shape (k,).
-
         Returns:
             q [rad], dq/ds and d²q/ds², each of shape (k, n).
         """

@@ -1,9 +1,10 @@
-"""Base of the references that a client guides: each of its commands replaces the one before."""
+"""Bases of the references that a client guides: each of its commands replaces the one before."""
 
 from abc import abstractmethod
 from collections.abc import Callable
 
 from tvist_controller.trajectory.base import Trajectory
+from tvist_controller.trajectory.limiter import Limiter, TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 
@@ -34,9 +35,55 @@ class Guided(Trajectory):
 
     @abstractmethod
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Set the speed.
+        """Set the programmed speed fraction [-] and the velocity limit of reduced speed, if it is reduced [rad/s]."""
 
-        Args:
-            speed: Programmed speed fraction [-].
-            slowest: Velocity limit of reduced speed [rad/s]; None if the speed is not reduced.
-        """
+
+class Following(Guided):
+    """Passes a signal through a `Limiter`: within the arm's limits, the joints' range and the available torque.
+
+    The client determines the timing of the signal, so the speed slider has no effect on it; reduced speed limits the
+    velocity.
+
+    Args:
+        state: Position [rad], velocity [rad/s] and acceleration [rad/s^2] to continue from, each of shape (n,).
+        limits: Limits of every joint.
+        reach: Largest position of each joint in either direction, shape (n,) [rad].
+        torque: Motion that the torque permits.
+        period: Tick [s].
+    """
+
+    def __init__(
+        self,
+        state: tuple[Floats, Floats, Floats],
+        limits: MotionLimits,
+        reach: Floats,
+        torque: TorqueRoom,
+        period: float,
+    ) -> None:
+        self.limits = self._arm = limits
+        self._reach, self._torque, self._period = reach, torque, period
+        self.rate = 1.0
+        self._follow(state)
+
+    def _follow(self, state: tuple[Floats, Floats, Floats]) -> None:
+        self._limiter = Limiter(
+            state[0], self.limits, self._period, reach=self._reach, torque=self._torque, state=state
+        )
+
+    @property
+    def state(self) -> tuple[Floats, Floats, Floats]:
+        """Position, velocity and acceleration of the reference, each of shape (n,)."""
+        return self._limiter.state
+
+    def adopt(self, limits: MotionLimits) -> None:
+        """See `Guided.adopt`."""
+        self.limits = self._arm = limits
+        self._follow(self.state)
+
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Set the speed that is reported, and the velocity limit."""
+        self.rate = speed
+        velocity = self._arm.velocity if slowest is None else min(slowest, self._arm.velocity)
+        if velocity != self.limits.velocity:
+            self.limits = MotionLimits(velocity, self._arm.acceleration, self._arm.jerk)
+            self._follow(self.state)

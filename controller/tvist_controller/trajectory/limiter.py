@@ -136,10 +136,6 @@ class Limiter:
     def follow(self, q: Floats, qd: Floats) -> Floats:
         """Advance by one tick towards a moving position.
 
-        Args:
-            q: Position of the signal, shape (n,) [rad].
-            qd: Velocity of the signal, shape (n,) [rad/s].
-
         Returns:
             Position of the reference, shape (n,) [rad].
         """

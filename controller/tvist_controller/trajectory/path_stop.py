@@ -89,9 +89,6 @@ class PathStop(Trajectory):
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
         """Position, velocity and acceleration of the joints at k times after the start.
 
-        Args:
-            times: Times, shape (k,) [s].
-
         Returns:
             Three arrays of shape (k, n).
         """

@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from tvist_controller.trajectory.following import Following
+from tvist_controller.trajectory.guided import Following
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
@@ -48,13 +48,7 @@ class Servo(Following):
         self.aim(self._q, LOOKAHEAD[0], GAIN[0])
 
     def aim(self, posture: Floats, lookahead: float, gain: float) -> None:
-        """Follow another posture.
-
-        Args:
-            posture: Joint angles, shape (n,) [rad].
-            lookahead: Time constant [s], clipped to `LOOKAHEAD`.
-            gain: Gain [1/s^2], clipped to `GAIN`.
-        """
+        """Follow another posture; time constant [s] and gain [1/s^2] are clipped to `LOOKAHEAD` and `GAIN`."""
         self._posture = np.array(posture, dtype=float)
         lag = min(max(lookahead, LOOKAHEAD[0]), LOOKAHEAD[1]) + DELAY * self._period
         k = max(min(max(gain, GAIN[0]), GAIN[1]), DAMPED / lag**2)

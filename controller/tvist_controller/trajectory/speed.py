@@ -1,13 +1,15 @@
-"""What approaches of a velocity have in common: how far a change goes in a tick, and at which rates it keeps limits."""
+"""Velocities of the joints or of the tool, approached with constant acceleration."""
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 
-from tvist_controller.trajectory.guided import Guided
+from tvist_controller.kinematics.arm import Arm
+from tvist_controller.trajectory.guided import Guided, StuckError
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
+from tvist_controller.trajectory.speed_step import FOUND, SINGULAR, speed_step
+from tvist_plant.chain import WIDTH
 
 HALVINGS = 8
 """Number of times that a change of velocity may be halved if the torque or the joints do not permit it."""
@@ -17,18 +19,26 @@ STANDING = 1e-6
 """Velocity below which all joints count as standing where a motion is taken over [rad/s]."""
 STEADY = 1e-12
 """Velocity below which a motion whose time hardly passes counts as being at rest [rad/s or m/s]."""
-FLAT = 1e-12
-"""Factor of a rate that counts as zero."""
 ROUNDING = 1e-9
 """Share of a tick by which rounding may delay the end of a change [-]."""
+USED = 0.95
+"""Share of the joints' acceleration that the tool is planned with; the rest is for the curvature within a tick [-]."""
+LOST_SHARE = 1e-3
+"""Share of a twist in lost directions above which joints that stand cannot begin it [-]."""
 
 
 class Speed(Guided):
-    """Base of the trajectories that approach a velocity.
+    """Accelerates all joints, or the tool, to a velocity and keeps it.
 
-    Each has a time of its own, in which the velocity approaches its goal with constant acceleration; the reference has
-    that velocity times the rate of this time. So at a constant rate r, velocities are multiplied by r and accelerations
-    by r². The rate changes as quickly as the acceleration permits.
+    The trajectory has a time of its own, in which the velocity u approaches its goal with constant acceleration, all of
+    its entries in phase; the reference has the velocity r u, with the rate r of that time. So at a constant rate,
+    velocities are multiplied by r and accelerations by r². The rate changes as quickly as the acceleration permits.
+    There is no jerk limit. In each tick the way is that of the mean of the velocities at its beginning and at its end;
+    if the torque or a joint's limits do not suffice, the velocity changes less, still in phase.
+
+    A tool goes straight: its pose is integrated, and the joints follow it by Newton's method, so the tool does not
+    drift. Near a singular posture the joints' way q(s) has a large second derivative with respect to the tool's way, so
+    q'' ṡ² may use up only a share of the joints' acceleration. This slows the tool down before it gets there.
 
     Args:
         state: Position [rad], velocity [rad/s] and acceleration [rad/s^2] to continue from, each of shape (n,).
@@ -36,6 +46,7 @@ class Speed(Guided):
         torque: Motion that the torque permits.
         period: Tick [s].
         rate: Rate of its time, 0 to 1 [-]; more if the joints are too fast for it at the start.
+        arm: The arm whose tool has the velocity; None for velocities of the joints.
     """
 
     def __init__(
@@ -46,19 +57,42 @@ class Speed(Guided):
         period: float,
         *,
         rate: float = 1.0,
+        arm: Arm | None = None,
     ) -> None:
         self._q, self._qd, self._qdd = (np.array(values, dtype=float) for values in state)
         self._torque, self._period = torque, period
         self.adopt(limits)
-        fastest = float(np.abs(self._qd).max())
-        self._stands = fastest <= STANDING
-        if self._stands:
-            self._qd = np.zeros_like(self._q)
+        self.arm = arm
+        """The arm whose tool has the velocity; None for velocities of the joints."""
+        n, fastest = len(self._q), float(np.abs(self._qd).max())
+        # The present step of a tool is the one that was made, even if the joints count as standing.
+        self._step = period * (self._qd - 0.5 * period * self._qdd)
+        if stands := fastest <= STANDING:
+            self._qd = np.zeros(n)
         self.rate = max(rate, min(fastest / limits.velocity, 1.0))
         self._speed, self._slowest = rate, limits.velocity
         self._share = 1.0
         """Share of the acceleration that was tried last [-]."""
-        self._goal = np.zeros_like(self._q)
+        self._chain, self._inverse = np.empty((0, WIDTH)), np.eye(n)
+        self._place, moving = np.zeros((4, 3)), self._qd
+        """Rotation and position of the tool, shape (4, 3)."""
+        if arm is not None:
+            rotation, position, jacobian = arm.located(self._q)
+            self._chain, self._place, moving = arm.chain, np.vstack((rotation, position)), jacobian @ self._qd
+        self._u = moving if stands else moving / self.rate
+        self._goal = self._u
+        self._most: tuple[float, ...] = (np.inf,)
+
+    def aim(self, goal: Floats, *accelerations: float) -> None:
+        """Approach another velocity.
+
+        Args:
+            goal: Velocities of the joints, shape (n,) [rad/s], or velocity [m/s] and angular velocity [rad/s] of the
+                tool in the base frame, shape (6,).
+            accelerations: Acceleration of the joint whose velocity changes most [rad/s^2], or the tool's linear [m/s^2]
+                and angular acceleration [rad/s^2].
+        """
+        self._goal, self._most = np.array(goal, dtype=float), accelerations
 
     def come_to_rest(self) -> None:
         """Approach zero, with the acceleration of the last command, until another one comes."""
@@ -66,69 +100,142 @@ class Speed(Guided):
 
     def adopt(self, limits: MotionLimits) -> None:
         """See `Guided.adopt`. The jerk is that of the acceleration changing its sign within a tick."""
-        self._arm = limits
-        self.limits = MotionLimits(
-            limits.velocity, limits.acceleration, 2.0 * limits.acceleration / self._period
-        )
+        self._arm_limits, self.limits = limits, abrupt(limits, self._period)
 
-    def _shares(self, most: float = 1.0) -> Iterator[float]:
-        """Shares of the acceleration to try in a tick, at last none: no tick may take long [-]."""
-        top = min(max(2.0 * self._share, 0.5**HALVINGS), 1.0)
-        for halved in range(TRIES):
-            self._share = top * 0.5**halved
-            yield min(top, most) * 0.5**halved
-        self._share = 0.0
-        yield 0.0
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Set the speed; the present one is kept until the next tick."""
+        self._speed, self._slowest = speed, self._arm_limits.velocity if slowest is None else slowest
+        if not self._u.any():
+            self.rate = speed
+
+    @property
+    def _accelerations(self) -> Floats:
+        """Accelerations in use: that of the joints, or both of the tool."""
+        most = np.array(self._most)
+        return most if self.arm is not None else np.minimum(most, self._arm_limits.acceleration)
+
+    @property
+    def duration(self) -> float:
+        """Time until the velocity is reached at full speed [s]."""
+        change = self._goal - self._u
+        sizes = [np.abs(change).max()]
+        if self.arm is not None:
+            sizes = [np.linalg.norm(change[:3]), np.linalg.norm(change[3:])]
+        return float((np.array(sizes) / self._accelerations).max())
 
     @property
     def state(self) -> tuple[Floats, Floats, Floats]:
         """Position, velocity and acceleration of the reference, each of shape (n,)."""
         return self._q, self._qd, self._qdd
 
+    @property
+    def finished(self) -> bool:
+        """Whether joints or tool have come to rest as commanded."""
+        return not (self._goal.any() or self._u.any())
+
+    def next(self) -> Floats:
+        """Advance by one tick and return the position of the joints.
+
+        Raises:
+            StuckError: The joints cannot move the tool on in its direction.
+        """
+        if self.finished:
+            self._step = self._qd = self._qdd = np.zeros_like(self._q)
+            return self._q
+        h, limits = self._period, self._arm_limits
+        if self.arm is None:
+            self._step = h * self._qd
+        else:
+            jacobian, self._inverse = self.arm.inverse(self._q + 0.5 * self._step)
+            if not self._u.any() and _exceeds(
+                self._goal - jacobian @ (self._inverse @ self._goal), self._goal
+            ):
+                raise StuckError(
+                    "the joints cannot move the tool in its direction from this singular posture"
+                )
+        found = None
+        ranges, duration = self._ranges(), self.duration
+        most = np.repeat(self._accelerations, len(self._u) // len(self._most))
+        for share in self._shares():
+            part = part_of(duration, share * self.rate * h)
+            u = self._goal if part == 1.0 else self._u + part * (self._goal - self._u)
+            given = np.array((self.rate, self._speed, self._slowest, limits.acceleration, self._lag, h))
+            place, q = np.empty((4, 3)), np.empty_like(self._q)
+            status, rate = speed_step(
+                self._chain, self._inverse, np.stack((self._q, self._step)), np.stack((self._u, u)), ranges,
+                share * h * most, given, self._place, place, q,
+            )  # fmt: skip
+            if status == SINGULAR:
+                raise StuckError("the tool cannot continue in its direction near a singular posture")
+            if status == FOUND:
+                found = q, u, rate, place
+                if self._torque.allows(self._q, self._step / h, (q - self._q - self._step) / self._lag):
+                    break
+        if found is None:
+            raise StuckError("the joints' limits do not let the tool continue in its direction")
+        self._take(*found)
+        return self._q
+
+    @property
+    def _lag(self) -> float:
+        """What a joint's acceleration is multiplied by in the difference from its step before [s^2].
+
+        That of joints is from the velocity at the beginning of the tick; that of a tool is from the step before.
+        """
+        return (0.5 if self.arm is None else 1.0) * self._period**2
+
+    def _ranges(self) -> Floats:
+        """Least and largest change of each joint's step, and largest step, shape (3, n) [rad].
+
+        A joint may get faster, but for the way to zero only what lets a stop keep its velocity.
+        """
+        h, limits, speed = self._period, self._arm_limits, np.abs(self._qd)
+        most = (1.0 + ROUNDING if self.arm is None else USED) * limits.acceleration
+        rise = np.minimum(rise_within(speed, limits, h), most)
+        up, down = np.where(self._qd > 0.0, rise, most), np.where(self._qd < 0.0, rise, most)
+        return np.stack((-down * self._lag, up * self._lag, h * np.maximum(limits.velocity, speed)))
+
+    def _shares(self) -> Iterator[float]:
+        """Shares of the acceleration to try in a tick, at last none: no tick may take long [-]."""
+        top = min(max(2.0 * self._share, 0.5**HALVINGS), 1.0)
+        for halved in range(TRIES):
+            self._share = top * 0.5**halved
+            yield self._share
+        self._share = 0.0
+        yield 0.0
+
+    def _take(self, q: Floats, u: Floats, rate: float, place: Floats) -> None:
+        h, step = self._period, q - self._q
+        self._qdd = (step - self._step) / self._lag
+        self._qd = step / h + 0.5 * h * self._qdd if self.arm is not None else rate * u
+        self._q, self._step, self._u, self.rate, self._place = q, step, u, rate, place
+        if not self._goal.any() and float(np.abs(rate * u).max()) <= STEADY:
+            self._u = np.zeros_like(u)
+
+
+def abrupt(limits: MotionLimits, period: float) -> MotionLimits:
+    """Return limits with which the joints may change the sign of their acceleration within a tick."""
+    return MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
+
 
 def part_of(duration: float, time: float) -> float:
-    """Return the part of a change that is made in some time; exactly 1 if the time suffices.
-
-    Args:
-        duration: Time that the whole change takes [s].
-        time: Available time [s].
-    """
+    """Return the part of a change of some duration that is made in a time [s]; exactly 1 if the time suffices."""
     return 1.0 if duration <= time * (1.0 + ROUNDING) else time / duration
 
 
-def fitting_rates(x: Floats, y: Floats, low: Floats, high: Floats) -> tuple[float, float]:
-    """Return the lowest and the highest r with low ≤ x + r y ≤ high in every entry; the first is larger if none fits.
-
-    Args:
-        x: Constant part, shape (n,).
-        y: Factor of r, shape (n,).
-        low: Lower limits, shape (n,).
-        high: Upper limits, shape (n,).
-    """
-    lowest, highest = -math.inf, math.inf
-    for own, slope, least, most in zip(x.tolist(), y.tolist(), low.tolist(), high.tolist(), strict=True):
-        if abs(slope) < FLAT:
-            if not least <= own <= most:
-                return math.inf, -math.inf
-            continue
-        ends = (least - own) / slope, (most - own) / slope
-        lowest, highest = max(lowest, min(ends)), min(highest, max(ends))
-    return lowest, highest
-
-
 def rise_within(speed: Floats, limits: MotionLimits, period: float) -> Floats:
-    """Return the acceleration at which each joint may get faster, so that a stop keeps its velocity limit.
+    """Return the acceleration at which joints of a speed, shape (n,), may get faster, so that a stop keeps the limit.
 
     A stop ends the present acceleration with the limit's jerk, and the joint gets faster until it has. Two ticks are
     reserved, since the acceleration of the newest reference is known as the mean of two ticks.
-
-    Args:
-        speed: Present speed of each joint, shape (n,) [rad/s].
-        limits: Limits of the joints.
-        period: Tick [s].
     """
     left, two = np.maximum(limits.velocity - speed, 0.0), 2.0 * period
     rise: Floats = np.minimum(
         limits.jerk * (np.sqrt(two * two + 2.0 * left / limits.jerk) - two), limits.acceleration
     )
     return rise
+
+
+def _exceeds(lost: Floats, twist: Floats) -> bool:
+    """Return whether what is lost of a twist is more than rounding and what a nearly singular posture costs."""
+    return float(np.abs(lost).max()) > LOST_SHARE * float(np.abs(twist).max())

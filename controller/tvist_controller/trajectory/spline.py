@@ -87,10 +87,6 @@ def evaluate(
 class SplineCurve(Curve):
     """A curve through knots whose positions and first two derivatives are known.
 
-    Args:
-        knots: The knots, at least two.
-        most: Largest acceleration of each joint, see `Curve`.
-
     Raises:
         ValueError: The knots are not finite, or do not move any joint.
     """

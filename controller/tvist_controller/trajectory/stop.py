@@ -8,16 +8,7 @@ from tvist_controller.trajectory.limits import Floats
 
 
 class JointStop(Trajectory):
-    """Shortest stop within limits of acceleration and jerk; every joint stops as soon as it can.
-
-    Args:
-        q: Position, shape (n,) [rad].
-        qd: Velocity, shape (n,) [rad/s].
-        qdd: Acceleration, shape (n,) [rad/s^2].
-        acceleration: Limit for every joint [rad/s^2].
-        jerk: Limit for every joint [rad/s^3].
-        period: Tick [s].
-    """
+    """Shortest stop within limits of acceleration and jerk; every joint stops as soon as it can."""
 
     def __init__(
         self, q: Floats, qd: Floats, qdd: Floats, *, acceleration: float, jerk: float, period: float

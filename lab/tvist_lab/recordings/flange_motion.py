@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from tvist_controller.api.planning import ToolKinematics
+from tvist_controller.api.planning import Arm
 from tvist_lab.recordings.recording import Floats, RecordingError
 from tvist_plant.description import RobotDescription
 
@@ -71,8 +71,8 @@ def at_flange(robot: RobotDescription, time: Floats, q: Floats, *, force: bool) 
     """
     grid, angles, known = _resampled(*_measured(time, q))
     step = grid[1] - grid[0]
-    kinematics = ToolKinematics(robot)
-    rotation, position, jacobian = map(np.array, zip(*(kinematics.all(row) for row in angles), strict=True))
+    arm = Arm(robot)
+    rotation, position, jacobian = map(np.array, zip(*(arm.located(row) for row in angles), strict=True))
     speeds = np.gradient(angles, step, axis=0)
     omega = np.einsum("tji,tjk,tk->ti", rotation, jacobian[:, 3:], speeds)
     if not force:

@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
-from tvist_controller.line.kinematics import ForwardKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import Floats
 from tvist_plant.plant import GRAVITY, Sight
@@ -151,9 +150,7 @@ def mounting_trouble(description: RobotDescription, q: Floats, felt: Floats) -> 
         q: Joint angles at rest, shape (6,) [rad].
         felt: Mean specific force in the flange frame, shape (3,) [m/s²].
     """
-    kinematics = ForwardKinematics(description)
-    pose, _ = kinematics.tool(q, np.zeros_like(q))
-    up = pin.exp3(np.array(pose[3:])) @ felt / np.linalg.norm(felt)
+    up = Arm(description).pose(q)[0] @ felt / np.linalg.norm(felt)
     leans = float(np.arccos(np.clip(up[2], -1.0, 1.0)))
     if leans <= LEANING:
         return None

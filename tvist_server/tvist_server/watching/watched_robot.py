@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from tvist_controller.instruments.motors import joint_ratings
-from tvist_controller.line.kinematics import ForwardKinematics
+from tvist_controller.kinematics.arm import Arm
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, Measurement, PlantError, RealArm, Sight
@@ -60,7 +60,7 @@ class WatchedRobot(RealArm):
                 f"the robot at {place}"
             )
         self._place, self._model, self.payload = place, model, payload
-        self._kinematics = ForwardKinematics(description)
+        self._arm = Arm(description)
         self._constants = [rating.torque_constant for rating in joint_ratings(description)]
         self._sights: deque[tuple[Sight, Row]] = deque()
         self._connection: Connection | None = None
@@ -203,9 +203,8 @@ class WatchedRobot(RealArm):
         if "tcp_offset" not in row:
             self._notes.append(f"whether it is a {self._model} is unknown, since it does not tell its tool")
             return
-        tool = self._kinematics.with_tool(row["tcp_offset"])
-        q = np.array(row["actual_q"])
-        here, there = np.array(tool.tool(q, np.zeros_like(q))[0][:3]), np.array(row["actual_TCP_pose"][:3])
+        tool = self._arm.with_tool(row["tcp_offset"])
+        here, there = tool.pose(np.array(row["actual_q"]))[1], np.array(row["actual_TCP_pose"][:3])
         apart = float(np.linalg.norm(here - there))
         if not apart <= OTHER:
             raise LostError(

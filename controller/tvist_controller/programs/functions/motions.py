@@ -22,7 +22,7 @@ from tvist_controller.programs.arguments import (
 from tvist_controller.programs.force_mode_moves import TURN, ForceModeMoves, approach
 from tvist_controller.programs.functions.family import Family, Parts
 from tvist_controller.programs.journey import Turns
-from tvist_controller.trajectory import Guided, JointSpeed, ToolSpeed
+from tvist_controller.trajectory import Guided, Speed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, Segment
 from tvist_protocol.transitions import Activity
@@ -255,7 +255,7 @@ class MotionFunctions(Family):
 
         def until_reached() -> Iterator[None]:
             yield
-            while isinstance(speed := self._guided, JointSpeed | ToolSpeed) and speed.duration > 0.0:
+            while isinstance(speed := self._guided, Speed) and speed.duration > 0.0:
                 yield
 
         return until_reached

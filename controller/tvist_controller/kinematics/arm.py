@@ -1,0 +1,193 @@
+"""The rigid arm as one chain of links: where its tool is, how that moves, and the torques that a motion needs.
+
+The end of the chain is the tool centre point. Everything is in the base frame: vectors at the tool centre point have
+the base's axes, as pinocchio's LOCAL_WORLD_ALIGNED. Kernels take the links as `tvist_plant.chain` describes them, shape
+(n+1, 22).
+"""
+
+import copy
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_controller._compiled import compiled, compiled_for_ticks
+from tvist_controller.kinematics.pose import locate, newton, pseudo_inverse
+from tvist_controller.kinematics.rotation import turned_by
+from tvist_plant.chain import BODY, SCRATCH, SHIFT, TURN, chain_of, collect_inertia, sweep, torques
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.model import FLANGE, Floats, payload_inertia, rigid_model
+from tvist_plant.plant import GRAVITY
+
+AT_FLANGE = (0.0,) * 6
+"""Tool centre point of an arm without a tool."""
+
+
+@compiled_for_ticks
+def bias_of(jacobian: Floats, qd: Floats, found: Floats) -> None:
+    """Compute the end's acceleration at constant velocities of the joints, J̇ q̇, shape (6,).
+
+    With ω and v the parts of the Jacobian's columns, joint k moves column j by ω_min(j,k) x v_max(j,k), and its ω_j by
+    ω_k x ω_j if it comes before joint j.
+    """
+    a = b = c = 0.0  # angular velocity of the links before
+    for k in range(6):
+        found[k] = 0.0
+    for j in range(qd.shape[0]):
+        u, v, w = jacobian[0, j], jacobian[1, j], jacobian[2, j]
+        x, y, z, rate = jacobian[3, j], jacobian[4, j], jacobian[5, j], qd[j]
+        found[3] += rate * (b * z - c * y)
+        found[4] += rate * (c * x - a * z)
+        found[5] += rate * (a * y - b * x)
+        d, e, f = 2.0 * a + x * rate, 2.0 * b + y * rate, 2.0 * c + z * rate
+        found[0] += rate * (e * w - f * v)
+        found[1] += rate * (f * u - d * w)
+        found[2] += rate * (d * v - e * u)
+        a, b, c = a + x * rate, b + y * rate, c + z * rate
+
+
+@compiled_for_ticks
+def end_motion(chain: Floats, q: Floats, qd: Floats, out: Floats) -> None:
+    """Compute position [m], rotation vector [rad], velocity [m/s] and angular velocity [rad/s] of the end, (12,)."""
+    R, J = np.empty((3, 3)), np.empty((6, q.shape[0]))
+    locate(chain, q, R, out[:3], J)
+    turned_by(R, out[3:6])
+    for k in range(6):
+        out[6 + k] = 0.0
+        for j in range(q.shape[0]):
+            out[6 + k] += J[k, j] * qd[j]
+
+
+@compiled_for_ticks
+def end_acceleration(chain: Floats, q: Floats, qd: Floats, qdd: Floats, out: Floats) -> None:
+    """Compute the end's acceleration and angular acceleration, J q̈ + J̇ q̇, shape (6,) [m/s^2, rad/s^2]."""
+    R, o, J = np.empty((3, 3)), np.empty(3), np.empty((6, q.shape[0]))
+    locate(chain, q, R, o, J)
+    bias_of(J, qd, out)
+    for k in range(6):
+        for j in range(q.shape[0]):
+            out[k] += J[k, j] * qdd[j]
+
+
+@compiled
+def torques_of(chain: Floats, q: Floats, qd: Floats, qdd: Floats, bodies: Floats, found: Floats) -> None:
+    """Torques for k states of motion, each of shape (k, n); see `tvist_plant.chain.torques`."""
+    for k in range(q.shape[0]):
+        torques(chain, q[k], qd[k], qdd[k], GRAVITY, bodies, found[k])
+
+
+class Arm:
+    """Kinematics and dynamics of the rigid arm.
+
+    Args:
+        description: The robot.
+        tcp: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
+    """
+
+    def __init__(self, description: RobotDescription, tcp: Sequence[float] = AT_FLANGE) -> None:
+        model = rigid_model(description, Payload())
+        flange = model.getFrameId(FLANGE)
+        self._flange = model.frames[flange].placement
+        self.chain = chain_of(model, flange)
+        """The links, with what the last one carries, shape (n+1, 22)."""
+        self.scratch = np.zeros((description.joints + 1, SCRATCH))
+        """Scratch of `tvist_plant.chain`, shape (n+1, 28)."""
+        self.bare = self.chain[-2, BODY:].copy()
+        """Inertial parameters of the last link without a payload, in pinocchio's order, shape (10,)."""
+        self._attach(tcp)
+
+    def _attach(self, tcp: Sequence[float]) -> None:
+        tool = pin.SE3(np.asarray(pin.exp3(np.array(tcp[3:], dtype=float))), np.array(tcp[:3], dtype=float))
+        end = self._flange * tool if any(tcp) else self._flange
+        self.chain[-1, TURN:SHIFT], self.chain[-1, SHIFT:BODY] = end.rotation.ravel(), end.translation
+
+    def with_tool(self, tcp: Sequence[float]) -> Self:
+        """Return the same arm with another tool centre point."""
+        other = copy.copy(self)
+        other.chain, other.scratch = self.chain.copy(), self.scratch.copy()
+        other._attach(tcp)  # noqa: SLF001  one of its own kind
+        return other
+
+    def loaded(self, payload: Payload) -> Floats:
+        """Return the inertial parameters of the last link with a payload on the flange, shape (10,)."""
+        if payload.mass == 0.0:
+            return self.bare
+        parameters: Floats = self.bare + self._flange.act(payload_inertia(payload)).toDynamicParameters()
+        return parameters
+
+    def pose(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return the rotation matrix, shape (3, 3), and the position, shape (3,) [m], of the tool."""
+        return self.located(q)[:2]
+
+    def jacobian(self, q: Floats) -> Floats:
+        """Return the Jacobian of velocity [m/s] and angular velocity [rad/s], shape (6, n)."""
+        return self.located(q)[2]
+
+    def located(self, q: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return rotation matrix, position and Jacobian of the tool."""
+        rotation, position, jacobian = np.empty((3, 3)), np.empty(3), np.empty((6, len(q)))
+        locate(self.chain, q, rotation, position, jacobian)
+        return rotation, position, jacobian
+
+    def motion(self, q: Floats, qd: Floats) -> Floats:
+        """Return pose and speed of the tool in one array, see `end_motion`, shape (12,)."""
+        out = np.empty(12)
+        end_motion(self.chain, q, qd, out)
+        return out
+
+    def acceleration(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """Return linear and angular acceleration of the tool, shape (6,) [m/s^2, rad/s^2]."""
+        out = np.empty(6)
+        end_acceleration(self.chain, q, qd, qdd, out)
+        return out
+
+    def inverse(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return the Jacobian, and its pseudo-inverse without the directions that are lost, shape (n, 6)."""
+        jacobian, inverse = self.jacobian(q), np.empty((len(q), 6))
+        pseudo_inverse(jacobian, inverse)
+        return jacobian, inverse
+
+    def near(
+        self, goal: tuple[Floats, Floats], q: Floats, inverse: Floats | None = None, steps: int = 12
+    ) -> tuple[Floats, Floats]:
+        """Return joint positions near others at which the tool has a pose, and what lacks to it, see `newton`.
+
+        The pseudo-inverse is that of the Jacobian nearby; None for that at q.
+        """
+        rotation, position = map(
+            np.ascontiguousarray, goal
+        )  # of one layout, so that the kernel is compiled once
+        found, error = q.copy(), np.empty(6)
+        nearby = self.inverse(q)[1] if inverse is None else inverse
+        newton(self.chain, rotation, position, nearby, steps, found, error)
+        return found, error
+
+    def torque(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """τ = M(q) q̈ + C(q, q̇) q̇ + g(q), shape (n,) [N m]."""
+        found = np.empty(len(q))
+        torques(self.chain, q, qd, qdd, GRAVITY, self.scratch, found)
+        return found
+
+    def torques(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """Torques for k states of motion, each argument of shape (k, n): shape (k, n) [N m]."""
+        found = np.empty_like(q)
+        torques_of(self.chain, q, qd, qdd, self.scratch, found)
+        return found
+
+    def gravities(self, q: Floats) -> Floats:
+        """g(q) at k postures, shape (k, n) [N m]."""
+        still = np.zeros_like(q)
+        return self.torques(q, still, still)
+
+    def gravity(self, q: Floats) -> Floats:
+        """g(q), shape (n,) [N m]."""
+        still = np.zeros(len(q))
+        return self.torque(q, still, still)
+
+    def inertia(self, q: Floats) -> Floats:
+        """M(q), shape (n, n) [kg m^2]."""
+        still, M = np.zeros(len(q)), np.zeros((len(q), len(q)))
+        sweep(self.chain, q, still, still, 0.0, self.scratch)
+        collect_inertia(self.scratch, M)
+        return np.asarray(M + np.triu(M, 1).T)

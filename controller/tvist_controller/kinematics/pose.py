@@ -1,0 +1,135 @@
+"""Where the end of a chain of links is, and the joint positions near others that bring it to a pose, compiled.
+
+All kernels can be called from other compiled functions; arrays are C-contiguous and of 64-bit floats.
+"""
+
+import math
+
+import numpy as np
+
+from tvist_controller._compiled import compiled
+from tvist_controller.kinematics.rotation import turned_by
+from tvist_plant.chain import bend, start, step_along
+from tvist_plant.model import Floats
+
+LOST = 1e-4
+"""Singular value of the Jacobian below which the joints cannot move the tool in its direction [m or rad per rad]."""
+SWEEPS = 15
+"""Largest number of sweeps over all pairs of the Jacobian's rows; seven are enough for any that was tried."""
+ACCURATE = 1e-12
+"""Error of a pose at which Newton's method ends [m or rad]."""
+
+
+@compiled
+def locate(chain: Floats, q: Floats, R: Floats, o: Floats, J: Floats) -> None:
+    """Compute rotation, shape (3, 3), position, shape (3,) [m], and Jacobian, shape (6, n), of a chain's end.
+
+    The Jacobian times q̇ is the end's velocity [m/s], then its angular velocity [rad/s].
+    """
+    n = q.shape[0]
+    start(R, o)
+    for j in range(n):
+        step_along(chain[j], R, o)
+        bend(R, q[j])
+        # Each column holds the joint's axis, and a point on it in place of the lever, until the end is known.
+        for k in range(3):
+            J[k, j], J[3 + k, j] = o[k], R[k, 2]
+    step_along(chain[n], R, o)
+    for j in range(n):
+        lx, ly, lz = o[0] - J[0, j], o[1] - J[1, j], o[2] - J[2, j]
+        ax, ay, az = J[3, j], J[4, j], J[5, j]
+        J[0, j] = ay * lz - az * ly
+        J[1, j] = az * lx - ax * lz
+        J[2, j] = ax * ly - ay * lx
+
+
+@compiled
+def pose_error(
+    rotation: Floats, position: Floats, now: Floats, place: Floats, error: Floats
+) -> tuple[float, float]:
+    """Compute the way from one pose (`now`, `place`) to another: translation [m] and rotation vector [rad], (6,).
+
+    Returns:
+        Length of the translation [m], and angle of the rotation [rad].
+    """
+    D = np.empty((3, 3))
+    for i in range(3):
+        error[i] = position[i] - place[i]
+        for j in range(3):
+            D[i, j] = rotation[i, 0] * now[j, 0] + rotation[i, 1] * now[j, 1] + rotation[i, 2] * now[j, 2]
+    turned_by(D, error[3:])
+    far = math.sqrt(error[0] * error[0] + error[1] * error[1] + error[2] * error[2])
+    return far, math.sqrt(error[3] * error[3] + error[4] * error[4] + error[5] * error[5])
+
+
+@compiled
+def pseudo_inverse(jacobian: Floats, inverse: Floats) -> None:  # noqa: C901, PLR0912  a kernel: its branches are loops
+    """Compute the pseudo-inverse, shape (n, 6), of a Jacobian without its lost directions, by one-sided rotations.
+
+    numba's own decomposition needs scipy, which a served robot does without (Hestenes, 1958).
+    """
+    n = jacobian.shape[1]
+    W, V = jacobian.copy(), np.eye(6)
+    for _ in range(SWEEPS):
+        turned = False
+        for i in range(5):
+            for j in range(i + 1, 6):
+                a, b, c = 0.0, 0.0, 0.0
+                for k in range(n):
+                    a, b, c = a + W[i, k] * W[i, k], b + W[j, k] * W[j, k], c + W[i, k] * W[j, k]
+                if c * c <= 1e-28 * a * b or min(a, b) < 1e-20:
+                    continue
+                turned = True
+                zeta = (b - a) / (2.0 * c)
+                t = math.copysign(1.0, zeta) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
+                cosine = 1.0 / math.sqrt(1.0 + t * t)
+                sine = cosine * t
+                for k in range(n):
+                    W[i, k], W[j, k] = cosine * W[i, k] - sine * W[j, k], sine * W[i, k] + cosine * W[j, k]
+                for k in range(6):
+                    V[i, k], V[j, k] = cosine * V[i, k] - sine * V[j, k], sine * V[i, k] + cosine * V[j, k]
+        if not turned:
+            break
+    inverse[:] = 0.0
+    for i in range(6):
+        square = 0.0
+        for k in range(n):
+            square += W[i, k] * W[i, k]
+        if square > LOST * LOST:
+            for k in range(n):
+                for m in range(6):
+                    inverse[k, m] += W[i, k] * V[i, m] / square
+
+
+@compiled
+def newton(
+    chain: Floats, rotation: Floats, position: Floats, inverse: Floats, steps: int, q: Floats, error: Floats
+) -> float:
+    """Bring a chain's end to a pose by Newton's method with the inverse of the Jacobian nearby, shape (n, 6).
+
+    Directions that this inverse lacks are left as they are, so that a singular posture lets no joint turn far.
+
+    Args:
+        chain: The links.
+        rotation: Rotation to reach, shape (3, 3).
+        position: Position to reach, shape (3,) [m].
+        inverse: The inverse.
+        steps: Largest number of steps.
+        q: Joint positions at the start, which become the result, shape (n,) [rad].
+        error: Result: what lacks to the pose, shape (6,) [m, rad].
+
+    Returns:
+        The largest entry of the error.
+    """
+    n = q.shape[0]
+    R, o, J = np.empty((3, 3)), np.empty(3), np.empty((6, n))
+    for step in range(steps + 1):
+        locate(chain, q, R, o, J)
+        pose_error(rotation, position, R, o, error)
+        off = np.max(np.abs(error))
+        if off <= ACCURATE or step == steps:
+            break
+        for i in range(n):
+            for m in range(6):
+                q[i] += inverse[i, m] * error[m]
+    return float(off)

@@ -1,0 +1,141 @@
+"""One tick of joints, or of a tool that goes straight: the joints' positions within their limits, compiled."""
+
+import math
+
+import numpy as np
+
+from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.kinematics.pose import locate, newton, pseudo_inverse
+from tvist_controller.kinematics.rotation import turn_into
+from tvist_plant.model import Floats
+
+FOUND, IMPOSSIBLE, SINGULAR = 0, 1, 2
+
+BENT_SHARE = 0.5
+"""Share of the joints' acceleration that the curvature of their way may use up at a constant speed [-]."""
+MORE = 1e-6
+"""Share by which rounding may exceed a limit [-]."""
+LOOK = 5.0
+"""Ticks over which that curvature is measured, ahead of the tool."""
+FARTHEST_LOOK = 0.05
+"""Largest angle of a joint over which it is measured [rad]."""
+SLOWEST = 0.01
+"""Share of the commanded speed below which the tool counts as stuck [-]."""
+CORRECTIONS = 4
+"""Largest number of Newton's steps."""
+OFF = 1e-7
+"""Error of the tool's pose that is not permitted [m or rad]."""
+FLAT = 1e-12
+"""Factor of a rate that counts as zero."""
+
+
+@compiled_for_ticks
+def fitting_rates(x: Floats, y: Floats, low: Floats, high: Floats) -> tuple[float, float]:
+    """Return the lowest and the highest r with low ≤ x + r y ≤ high everywhere; the first is larger if none fits."""
+    lowest, highest = -math.inf, math.inf
+    for i in range(len(x)):
+        if abs(y[i]) < FLAT:
+            if not low[i] <= x[i] <= high[i]:
+                return math.inf, -math.inf
+            continue
+        one, other = (low[i] - x[i]) / y[i], (high[i] - x[i]) / y[i]
+        lowest, highest = max(lowest, min(one, other)), min(highest, max(one, other))
+    return lowest, highest
+
+
+@compiled_for_ticks
+def rate_by_bend(
+    chain: Floats, q: Floats, slope: Floats, u: Floats, ahead: float, acceleration: float
+) -> float:
+    """Return the rate that the curvature of the joints' way permits; `slope` becomes the larger one now and ahead.
+
+    Near a singular posture the joints' way bends: its second derivative times the speed squared accelerates them.
+    """
+    n = len(q)
+    jacobian, inverse = np.empty((6, n)), np.empty((n, 6))
+    locate(chain, q + ahead * slope, np.empty((3, 3)), np.empty(3), jacobian)
+    pseudo_inverse(jacobian, inverse)
+    bend = 1e-9
+    for i in range(n):
+        later = 0.0
+        for m in range(6):
+            later += inverse[i, m] * u[m]
+        bend = max(bend, abs(later - slope[i]) / ahead)
+        slope[i] = max(abs(slope[i]), abs(later))
+    return math.sqrt(BENT_SHARE * acceleration / bend)
+
+
+@compiled_for_ticks
+def speed_step(  # noqa: C901  a kernel: its branches are loops
+    chain: Floats,
+    inverse: Floats,
+    joints: Floats,
+    velocities: Floats,
+    ranges: Floats,
+    change: Floats,
+    given: Floats,
+    place: Floats,
+    goal: Floats,
+    q: Floats,
+) -> tuple[int, float]:
+    """Follow the mean of two velocities for a tick, at the rate that the joints' limits and their way permit.
+
+    Args:
+        chain: The links, the tool centre point being their end; none if the velocities are those of the joints.
+        inverse: Pseudo-inverse of the Jacobian in the middle of the tick, shape (n, 6); else the unit matrix.
+        joints: Present positions [rad] and the step to them [rad], shape (2, n).
+        velocities: Velocity at the beginning and at the end, in the trajectory's own time, shape (2, 6) or (2, n).
+        ranges: Least and largest change of the joints' step, and largest step, shape (3, n) [rad].
+        change: Largest change of the velocity, shape (6,) or (n,).
+        given: Present and commanded rate of that time [-], velocity [rad/s] and acceleration limit [rad/s^2] of the
+            joints, what an acceleration is multiplied by in a change of their step [s^2], and the tick [s], shape (6,).
+        place: Present rotation and position of the tool, shape (4, 3).
+        goal: Result: those a tick later.
+        q: Result: positions of the joints a tick later, shape (n,) [rad].
+
+    Returns:
+        FOUND; IMPOSSIBLE if the limits do not permit it; or SINGULAR if the curvature permits next to no speed. And the
+        rate at the end.
+    """
+    rate, speed, slowest, acceleration, lag, h = given[0], given[1], given[2], given[3], given[4], given[5]
+    n, straight = len(q), chain.shape[0] > 0
+    present, u = velocities[0], velocities[1]
+    before, slope = np.zeros(n), np.zeros(n)
+    for i in range(n):
+        for m in range(len(u)):
+            before[i] += inverse[i, m] * (0.5 * h * rate * present[m])
+            slope[i] += inverse[i, m] * u[m]
+    after = 0.5 * h * slope
+    lowest, highest = fitting_rates(before - joints[1], after, ranges[0], ranges[1])
+    if not straight and np.max(change) == 0.0:
+        lowest = highest = rate  # joints may always keep their velocities
+    if lowest > min(highest, max(rate, speed)) or highest < 0.0:
+        return IMPOSSIBLE, rate
+    least, most = fitting_rates(-rate * present, u, -change, change)
+    fastest = np.max(np.abs(slope))
+    wanted = speed
+    if not straight and fastest > slowest:
+        wanted = min(speed, slowest / fastest)
+    if wanted != rate:  # the present rate is possible, but for rounding
+        wanted = min(max(wanted, least), most)
+    if straight and fastest > 0.0:
+        ahead = min(LOOK * h * max(wanted, SLOWEST), FARTHEST_LOOK / fastest)
+        permitted = rate_by_bend(chain, joints[0], slope, u, ahead, acceleration)
+        permitted = min(permitted, slowest / np.max(np.abs(slope)))
+        if permitted < SLOWEST:
+            return SINGULAR, rate
+        wanted = min(wanted, permitted)
+    new = max(min(wanted, highest), lowest, 0.0)
+    q[:] = joints[0] + before + new * after
+    if straight:
+        mean = 0.5 * h * (rate * present + new * u)
+        goal[3] = place[3] + mean[:3]
+        turn_into(mean[3:], place[:3], goal[:3])
+        if not newton(chain, goal[:3], goal[3], inverse, CORRECTIONS, q, np.empty(6)) <= OFF:
+            return IMPOSSIBLE, rate
+    for i in range(n):
+        step = q[i] - joints[0, i]
+        bent = abs(step - joints[1, i]) > (1.0 + MORE) * lag * acceleration
+        if bent or abs(step) > (1.0 + MORE) * ranges[2, i]:
+            return IMPOSSIBLE, rate
+    return FOUND, new
