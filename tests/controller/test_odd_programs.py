@@ -97,16 +97,14 @@ def test_a_plan_that_fails_ends_its_program_which_names_the_line_and_is_logged(m
     assert len(heard.errors) == 1
 
 
-@pytest.mark.parametrize(
-    ("part", "name"), [("motion", "step"), ("programs", "advance"), ("_commands", "carry_out")]
-)
+@pytest.mark.parametrize(("part", "name"), [("motion", "step"), ("programs", "advance"), ("motion", "stop")])
 def test_what_fails_stops_the_robot_which_goes_on_when_it_is_unlocked(part, name, monkeypatch):
     robot, heard = a_robot(), Heard()
     host, owner = Host(robot.controller, heard, survives=True), getattr(robot.controller, part)
     start(robot, "sleep(1)")
     with monkeypatch.context() as failing:
         failing.setattr(owner, name, lambda *_: (failing.undo(), fails()))
-        if name == "carry_out":
+        if name == "stop":
             assert host.request(encode(c.Stop())).code == "plant_failure"
         host.tick()
     assert [event.code for event in heard.events if event.kind == "protective_stop"] == ["plant_failure"]

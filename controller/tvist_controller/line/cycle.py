@@ -60,8 +60,7 @@ class ControlCycle:
         law: Floats | None = None,
     ) -> None:
         self.description = description
-        self.plant = arm_of(FlexibleArm(description, carried) if plant is None else plant)
-        """The arm."""
+        self._plant = arm_of(FlexibleArm(description, carried) if plant is None else plant)
         self.trajectory: Trajectory = Rest(q)
         """Trajectory generator."""
         self.filter = LineFilter(tvist, arm_limits(description))
@@ -71,7 +70,7 @@ class ControlCycle:
         self.dynamics = dynamics = InverseDynamics(description, declared)
         """Torques of the rigid arm with its declared payload."""
         self.drives = drives = DriveFeedForward(
-            description, PERIOD, compensate_sag=compensate_sag, positions=self.plant.supervised
+            description, PERIOD, compensate_sag=compensate_sag, positions=self._plant.supervised
         )
         """Joint controllers: what the drives are sent for a target."""
         self.drives.use(elastic)
@@ -86,7 +85,12 @@ class ControlCycle:
         """What checks the references and the stops of a guarded motion; None without one."""
         self.sample = self.reset(q, carried=carried, seed=seed)
         """Signals of the last tick, or of the arm where it was put at rest since."""
-        check_measurement(self.sample.measured, description.joints, self.plant)
+        check_measurement(self.sample.measured, description.joints, self._plant)
+
+    @property
+    def plant(self) -> Plant:
+        """The arm."""
+        return self._plant
 
     def step(self, external: Floats | None = None) -> Sample:
         """Compute one tick; takes what an external force sensor feels, see `Sample.external`."""
@@ -100,7 +104,7 @@ class ControlCycle:
             signals, self.dynamics.payload_parameters,
             may_begin=mode.shaped and not self.filter.fading, may_go_on=mode is not LineMode.BYPASSED,
         )  # fmt: skip
-        measured = self.plant.step(command)
+        measured = self._plant.step(command)
         self.sample = Sample(
             mode, reference, self.shaped.references, self.shaped.joints.window, signals, command, measured,
             self.drives.reference, refused, external,
@@ -277,7 +281,7 @@ class ControlCycle:
         Raises:
             ValueError: An arm that cannot be placed does not tell where it stands. Nothing has changed.
         """
-        plant = self.plant
+        plant = self._plant
         if measured is None and not isinstance(plant, SimulatedArm):
             measured = measured_standing(plant, len(q))
             q = measured.q.copy()
