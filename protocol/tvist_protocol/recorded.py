@@ -37,12 +37,13 @@ RING = "ring"
 """Entry of that metadata in a recording that forgets its beginning: how many ticks it keeps at least."""
 BEHAVIOUR = "behaviour"
 """Entry of that metadata: the number of the robot's behaviour, see `THIS_BEHAVIOUR`; 1 where it is missing."""
-THIS_BEHAVIOUR = 6
+THIS_BEHAVIOUR = 7
 """Number of the present behaviour. It rises with every deliberate change of the bits that a robot computes:
 
 1: recordings without this number.
 2: the arm, the line and the shapers are computed by compiled functions, which add in another order.
 5: `auto-target` uses zero-vibration shapers at a known end.
+7: all kinematics of the rigid arm come from one chain of links.
 """
 FROM_TICK = "from_tick"
 """Entry of that metadata in a recording that has forgotten its beginning: its first tick."""
