@@ -19,6 +19,7 @@ from tests.examples import share
 from tests.plant.arms import chain, changed
 
 from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.choice import closest
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
 from tvist_controller.kinematics.least_squares import descend
 from tvist_plant.description import load
@@ -199,3 +200,13 @@ def test_arrays_of_any_layout_are_taken_and_others_refused():
     np.testing.assert_array_equal(given, q)
     with pytest.raises(TypeError):
         ik.solve(rotation.astype(np.float32), position, q)
+
+
+def test_a_robot_compiles_for_no_other_layout_of_arrays_whatever_was_loaded_before():
+    """Else a program's first `get_inverse_kin` would hold up the tick for seconds."""
+    pose = [np.ascontiguousarray(part) for part in pose_of(UR5E, np.full(6, 0.5))]
+    InverseKinematics(UR5E).solve(*pose, np.full(6, 0.4))
+    closest.disable_compile(False)  # as after `load_all`, which loads what is on disk
+    known = set(closest.overloads)
+    InverseKinematics(UR5E).solve(*pose, np.full(6, 0.4))
+    assert set(closest.overloads) == known

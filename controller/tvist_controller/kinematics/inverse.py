@@ -178,4 +178,4 @@ NUMERICAL = search, (_TABLE, _TABLE, _TABLE, _MATRIX, _VECTOR, _VECTOR, _TABLE)
 def _compile(kernel: Any, signature: tuple[Any, ...]) -> None:
     if signature not in kernel.overloads:
         kernel.compile(signature)
-        kernel.disable_compile()  # arrays of another type are refused, not compiled for
+    kernel.disable_compile()  # arrays of another type are refused, not compiled for
