@@ -88,12 +88,7 @@ class Route(NamedTuple):
 
 
 def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None) -> Route:
-    """Divide a path into runs.
-
-    Args:
-        legs: The path.
-        tracker: Kinematics of the arm.
-        start: Where the path begins on its first leg; None for that leg's start.
+    """Divide a path into runs, from the start of its first leg or from a place on that.
 
     Raises:
         WayError: The joints cannot follow the path; beside a singular posture two ways lead on from it.

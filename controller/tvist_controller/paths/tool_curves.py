@@ -75,14 +75,10 @@ class ToolLine(ToolWay):
 
 
 class ToolArc(ToolWay):
-    """Arc of the circle through three points.
+    """Arc of the circle from one pose through a point to another pose.
 
-    Args:
-        start: Pose at the start.
-        via: A point on the arc, shape (3,) [m].
-        end: Pose at the end.
-        tangent: Whether the tool turns with the tangent, so that the orientation of `end` does not matter; otherwise
-            it turns evenly to that, by the shortest way.
+    The tool turns with the tangent, so that the orientation at the end does not matter, or evenly to that, by the
+    shortest way.
 
     Raises:
         ValueError: There is no such circle: the points are on a line, or two of them are the same.
@@ -147,11 +143,7 @@ class ToolPart(ToolCurve):
 class ToolBlend(ToolCurve):
     """Smooth way from one state of the tool to another: position and turn are polynomials of degree five.
 
-    Args:
-        start: State at the start.
-        end: State at the end.
-        corner: Orientation near both, from which the turn is counted, shape (3, 3).
-        length: Length that it counts as [m].
+    The turn is counted from the orientation of the corner, which is near both; the way counts as a given length.
     """
 
     def __init__(self, start: ToolState, end: ToolState, corner: Floats, length: float) -> None:
