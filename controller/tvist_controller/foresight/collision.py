@@ -56,7 +56,7 @@ class Meeting:
 
 
 class CollisionModel:
-    """The arm's bodies, its declared payload and the floor, if there is one; without bodies there are no collisions."""
+    """The arm's bodies with its declared payload and the floor; without bodies there are no collisions."""
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
         model, collision = rigid_model(description, Payload()), description.collision
@@ -94,7 +94,7 @@ class CollisionModel:
         return None if number is None or gaps[number] >= CLEARANCE else self._meeting_of(gaps, number)
 
     def misplaced(self, q: Floats, *payloads: Payload) -> str | None:
-        """Say which bodies would meet at a posture with one of these payloads on the arm; None if none would."""
+        """Say which bodies would meet at a posture with one of these payloads; None if none would."""
         before = self.declared
         for payload in payloads:
             self.declare(payload)
@@ -119,8 +119,8 @@ class CollisionModel:
     def on_way(self, way: Way, *, before: Floats | None = None) -> tuple[float, Meeting] | None:
         """Find the first meeting on a way, in long steps where everything is far apart and short ones elsewhere.
 
-        Bodies that are too close where the way begins, or at a posture before it, may move apart, but none of these
-        pairs may come closer again. What is found is the share of the way, and the pair.
+        Bodies that are too close where the way begins, or at a posture before it, may move apart, but none of
+        these pairs may come closer again. What is found is the share of the way, and the pair.
         """
         travel, share = self.travel(way.turned), 0.0
         least = np.minimum(self._gaps(way.at(0.0) if before is None else before), CLEARANCE)
@@ -143,11 +143,11 @@ class CollisionModel:
         return float(np.abs(turned) @ self._reach)
 
     def is_spacious(self, q: Floats, turned: Floats) -> bool:
-        """Return whether the joints can certainly turn by up to some angles around a posture without a meeting."""
+        """Return whether the joints can certainly turn by these angles around a posture without a meeting."""
         return rooms(*self._parts, q, turned, self._found) > CLEARANCE + SURE
 
     def stop_is_spacious(self, state: Target, acceleration: float, jerk: float) -> bool:
-        """Return whether the joints can certainly stop without a meeting, within limits of acceleration and jerk."""
+        """Return whether the joints can certainly stop without a meeting, within these limits."""
         least = CLEARANCE + SURE
         return stop_has_room(*self._parts, state.q, state.qd, state.qdd, acceleration, jerk, least)
 

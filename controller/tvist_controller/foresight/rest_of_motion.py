@@ -55,8 +55,8 @@ class WayAhead:
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
         """Time until the shaped reference rests [s], and the angle that the joint that turns most still turns [rad].
 
-        They are those of the plan of a stop that has begun, or else of the present motion; None and None if rest is too
-        far ahead to tell.
+        They are those of the plan of a stop that has begun, or else of the present motion; None and None if
+        rest is too far ahead to tell.
         """
         if plan is not None:
             return plan.duration, plan.way

@@ -21,8 +21,9 @@ class LookAhead(Guard):
     As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the
     previous state is made. It was checked a tick earlier, so there is always a clear stop.
 
-    If bounds prove the stop to be clear, which takes microseconds, it is made only when it is needed. Stops keep the
-    joints within their reach, unless the references keep clear of it by themselves, as those of streams do.
+    If bounds prove the stop to be clear, which takes microseconds, it is made only when it is needed. Stops
+    keep the joints within their reach, unless the references keep clear of it by themselves, as those of
+    streams do.
     """
 
     def __init__(
@@ -126,7 +127,7 @@ class LookAhead(Guard):
         return f"joint {joint} would pass the end of its range, ±{self._reach[joint]:g} rad"
 
     def turned(self, qd: Floats, qdd: Floats, acceleration: float, jerk: float | None = None) -> Floats:
-        """Upper bound of the angle that each joint turns in a stop, by default with the joints' jerk [rad]."""
+        """Upper bound of each joint's turn in a stop, by default with the joints' jerk, shape (n,) [rad]."""
         jerk = self._stops.jerk if jerk is None else jerk
         fastest = _fastest(qd, qdd, jerk)
         ramps = (acceleration + np.abs(qdd)) / jerk

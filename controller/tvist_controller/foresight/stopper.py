@@ -35,10 +35,11 @@ class Outlook:
         self._wanted = math.inf
 
     def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
-        """Simulate what follows if no command comes, or after a change to a filter or a trajectory that is given.
+        """Simulate what follows without a command, or after a change to a filter or a trajectory.
 
-        The shaped references, shape (k, n) [rad], begin with the last two that were played, and end at rest. The result
-        is None if that takes more than `MAX_AHEAD` ticks, or the trajectory cannot go on. Stops bypass every filter.
+        The shaped references, shape (k, n) [rad], begin with the last two that were played, and end at rest.
+        The result is None if that takes more than `MAX_AHEAD` ticks, or the trajectory cannot go on. Stops
+        bypass every filter.
         """
         ahead = Ahead(*self._cycle.fork(tvist, trajectory))
         with suppress(StuckError):
@@ -46,7 +47,7 @@ class Outlook:
         return np.array(ahead.references) if ahead.rests else None
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
-        """Come to rest as quickly as permitted, with a requested deceleration [rad/s^2] or what the torque permits.
+        """Come to rest as quickly as permitted, by default with the deceleration that torque permits.
 
         A motion stays on its path, is at no time ahead of the uninterrupted motion, and comes to rest no later than
         it. If no stop within the torque limits does that, the motion runs out through the filter. A stream, whose

@@ -89,10 +89,10 @@ class StopPlanner:
     ) -> PathStop | None:
         """Return the quickest stop along a motion's path that is certain to be permitted, if there is one.
 
-        Two kinds of stops are never ahead of the motion and never come to rest later: those that brake harder than
-        the motion ever will, with more jerk; and gentler ones that end before the motion could, even if it braked as
-        hard as possible. There is none for a motion that is about to come to rest by itself. For one that will not
-        rest for long, a stop within the torque limits is enough, and need not be `certain`.
+        Two kinds of stops are never ahead of the motion and never come to rest later: those that brake harder
+        than the motion ever will, with more jerk; and gentler ones that end before the motion could, even if
+        it braked as hard as possible. There is none for a motion that is about to come to rest by itself. For
+        one that will not rest for long, a stop within the torque limits is enough, and need not be `certain`.
         """
         speed, rise = forecast.path.forwards(state.qd), forecast.path.forwards(state.qdd)
         hardest = self._keeping(state, forecast, self.highest)
@@ -120,9 +120,10 @@ class StopPlanner:
         wanted: float | None,
         asked: Floats | None = None,  # largest torques of the uninterrupted motion, shape (n,) [N m]
     ) -> PathStop | None:
-        """Return the quickest stop along the path of a motion that is simulated ahead; None if that has to run out.
+        """Return the quickest stop along the path of a motion that is simulated ahead, if there is one.
 
         If the torques of the uninterrupted motion are not known, a stop may only use its share.
+        Without a stop, the motion has to run out.
         """
         newest = ahead.samples[1]
         along: list[float] = []  # distance of the motion at each known tick
@@ -175,13 +176,13 @@ class StopPlanner:
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def asked(self, ahead: Floats) -> Floats:
-        """Largest torques that a motion needs for its future references, shape (k, n) [rad]: shape (n,) [N m]."""
+        """Largest torques that a motion needs for its future references, shape (k, n): shape (n,) [N m]."""
         return torque_along(self._dynamics, ahead, self.period)
 
     def by_joints(
         self, state: Target, wanted: float | None, clear: Callable[[JointStop], bool]
     ) -> JointStop | None:
-        """Return the quickest stop with independent joints that is clear and within the torque limits all the way.
+        """Return the quickest stop with independent joints that is clear and within the torque limits.
 
         `wanted` is the requested deceleration [rad/s^2], None for the largest possible.
         """

@@ -45,7 +45,7 @@ def all_postures(
     near: Floats,  # joint positions, shape (6,) [rad]
     table: Floats,  # result, shape (8, 6) at least [rad]; rows without posture begin with NaN
 ) -> int:
-    """Compute all postures in closed form; of a curve of them, the ones nearest to `near`; return as `postures`."""
+    """Do what `postures` does; of a curve of postures, compute the ones nearest to `near`."""
     freedom = postures(arm, rotation, position, 0.0, table)
     if freedom == FREE:
         _sample_curves(arm, chain, rotation, position, near, table)
@@ -113,7 +113,8 @@ def _start_from_near(
 def closest(arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, q: Floats) -> int:
     """Find the nearest posture in closed form; return FOUND, NO_SOLUTION or OUT_OF_RANGE, plus ON_CURVE if it applies.
 
-    For the arguments see `all_postures`. If every posture is outside the range of a joint, q is the nearest of them.
+    For the arguments see `all_postures`. If every posture is outside the range of a joint, q is the nearest
+    of them.
     """
     table = np.empty((9, 6))
     table[8, 0] = math.nan
@@ -160,9 +161,9 @@ def search(
 ) -> int:
     """Find postures of any arm by least squares, from `near` and from given starts.
 
-    `found` has what was found from each start, and the nearest to `near` that can be reached from there without leaving
-    the pose, in the representation nearest to `near`; rows without result begin with NaN. Return the index of the
-    nearest posture within the joints' ranges; -1 if there is none.
+    `found` has what was found from each start, and the nearest to `near` that can be reached from there
+    without leaving the pose, in the representation nearest to `near`; rows without result begin with NaN.
+    Return the index of the nearest posture within the joints' ranges; -1 if there is none.
     """
     best, least = -1, math.inf
     for start in range(len(starts) + 1):

@@ -20,7 +20,7 @@ NO_PIVOT = 1e-30
 
 @compiled
 def solve_in_place(A: Floats, b: Floats) -> float:
-    """Solve A x = b for a symmetric positive definite A by Cholesky's method; return the root of A's determinant.
+    """Solve A x = b, A symmetric positive definite, by Cholesky's method; return √(det A).
 
     b becomes x, and A is used up. numba's own linear algebra needs scipy, which a served robot does without.
     """

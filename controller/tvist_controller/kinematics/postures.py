@@ -49,8 +49,9 @@ def elbow(
 ) -> tuple[Triangles, int]:
     """Solve the triangle of upper arm and forearm for its far end at (x, y).
 
-    Return (θ₂, δ, θ₂', δ'), the angle of the upper arm and the angle from it to the forearm, for the two forms [rad],
-    all of them NaN where there is none; and DEFINITE, LOOSE, or FREE if θ₂ is free and therefore has the value `free`.
+    Return (θ₂, δ, θ₂', δ'), the angle of the upper arm and the angle from it to the forearm, for the two
+    forms [rad], all of them NaN where there is none; and DEFINITE, LOOSE, or FREE if θ₂ is free and therefore
+    has the value `free`.
     """
     square = x * x + y * y
     radius = math.sqrt(square)
@@ -78,7 +79,7 @@ def postures(
     free: float,  # value of an angle that is free, if there is one [rad]
     table: Floats,  # result [rad], shape (8, 6) at least, in any representation
 ) -> int:
-    """Compute all postures at a pose, and return the largest of DEFINITE, LOOSE and FREE that applies to any of them.
+    """Compute all postures at a pose; return the largest of DEFINITE, LOOSE and FREE that applies.
 
     The row 4 shoulder + 2 wrist + elbow has a posture, or begins with NaN if there is none.
     """

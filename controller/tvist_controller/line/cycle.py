@@ -155,8 +155,8 @@ class ControlCycle:
     def begin(self, trajectory: T, mode: LineMode = LineMode.SHAPED, guard: Guard | None = None) -> T:
         """Follow a trajectory from now on, and keep the present guard unless another one is given.
 
-        In a shaped mode, the trajectory continues the reference x; in another one it continues the shaped reference x*,
-        and the delay line is discarded. A new path may begin only at rest.
+        In a shaped mode, the trajectory continues the reference x; in another one it continues the shaped
+        reference x*, and the delay line is discarded. A new path may begin only at rest.
 
         Raises:
             ValueError: The mode cannot follow the present one, or it is guarded, and there is no guard.

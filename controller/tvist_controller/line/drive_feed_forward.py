@@ -93,10 +93,11 @@ class DriveFeedForward:
         may_begin: bool = True,
         may_go_on: bool = True,
     ) -> DriveCommand:
-        """Drive command for a target, with elastic feed-forward where the reference is smooth enough to begin or go on.
+        """Drive command for a target.
 
-        A stop is smooth enough to go on. A guided motion that is not shaped may jump in acceleration, which motors
-        cannot lead.
+        `may_begin` and `may_go_on` say whether the reference is smooth enough for elastic feed-forward. A stop is
+        smooth enough to go on; a guided motion that is not shaped may jump in acceleration, which motors cannot
+        lead.
         """
         if self._elastic is not None or self.wanted is not None:
             self._fade(may_begin if self._share == 0 else may_go_on)

@@ -70,8 +70,8 @@ def joint_rows(
 ) -> Floats:
     """Return the parameters of each joint, in the order of `ROTOR` and so on, shape (13, n).
 
-    The motors lead by the twist of the gears under gravity to compensate sag. With `positions`, the command is the
-    reference, without wind-up and sag, since the arm's own controller adds these.
+    The motors lead by the twist of the gears under gravity to compensate sag. With `positions`, the command
+    is the reference, without wind-up and sag, since the arm's own controller adds these.
     """
     drives = description.drives
     friction, stiffness = np.array(drives.coulomb_friction), np.array(drives.gear_stiffness)

@@ -40,7 +40,7 @@ def arm_limits(description: RobotDescription) -> MotionLimits:
 
 
 def rate_of(speed: float, velocity: float, slowest: float | None) -> float:
-    """Rate of a motion's time [-]; `slowest` is the velocity limit of reduced speed, None where it is not reduced."""
+    """Rate of a motion's time [-]; `slowest` is the velocity limit of reduced speed, if that applies."""
     return speed if slowest is None else min(speed, slowest / velocity)
 
 
@@ -150,11 +150,13 @@ class StopTorque:
         """Number of the moment at which the last stop that does not hold needed too much."""
 
     def holds(self, stop: AnyStop, *, rebound: bool = True) -> bool:
-        """Return whether a stop keeps within these torques; with `rebound`, the arm's overshoot within the limits, too.
+        """Return whether a stop keeps within these torques; with `rebound`, also the overshoot at its ends.
 
-        Thirty-two moments are checked, since torque peaks where a joint's acceleration ramp ends. Nine in ten of the
-        stops that need too much do so where the whole stop's ramp ends, so that moment is checked first, after the one
-        at which the stop before failed: the next one on the ladder mostly fails there, too.
+        That of the flexible arm may reach the limits themselves.
+
+        Thirty-two moments are checked, since torque peaks where a joint's acceleration ramp ends. Nine in ten of
+        the stops that need too much do so where the whole stop's ramp ends, so that moment is checked first,
+        after the one at which the stop before failed: the next one on the ladder mostly fails there, too.
         """
         ramp = stop.acceleration / stop.jerk
         ends = min(math.ceil(ramp / stop.duration * MOMENTS), MOMENTS) if stop.duration > 0.0 else MOMENTS

@@ -51,7 +51,7 @@ class LineFilter:
         return self.tvist.peak if fade is None else max(self.tvist.peak, fade.old.peak, fade.new.peak)
 
     def spared(self, limits: MotionLimits | None = None) -> MotionLimits:
-        """Return the limits of a reference whose shaped one keeps the arm's limits, and these if they are given."""
+        """Return limits of a reference whose shaped one keeps the arm's limits, and these if given."""
         arm, (faster, harder) = self._arm, (1.0 + more for more in self.tvist.surplus)
         limits = arm if limits is None else limits
         return MotionLimits(
@@ -92,7 +92,7 @@ class LineFilter:
         self._fade = None
 
     def begin(self, tvist: Filter, sample: Floats, posture_of: Posture | None = None) -> None:
-        """Use a filter from a reference at rest: joint positions, or a path's parameter, converted by `posture_of`."""
+        """Use a filter from rest; samples are joint positions, or a path's parameter with `posture_of`."""
         self.tvist, self._fade = tvist, None
         tvist.reset(sample, posture_of)
 

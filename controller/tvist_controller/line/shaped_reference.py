@@ -27,7 +27,7 @@ class ShapedReference:
         self.enter(None, q)
 
     def enter(self, posture_of: Posture | None, sample: Floats) -> None:
-        """Accept samples of another kind, of which one rests now; the joints continue from their present position."""
+        """Accept samples of another kind, at rest now; the joints continue from their present position."""
         self.posture_of = posture_of
         """Converts samples to joint positions; None if they are joint positions."""
         self.along = self.joints if posture_of is None else Differentiator(sample, self._period)
@@ -44,7 +44,7 @@ class ShapedReference:
         return self.joints.newest
 
     def take(self, x: Floats, x_star: Floats) -> Floats:
-        """Take this tick's samples before and after shaping, and return the joint positions before it, shape (n,).
+        """Take the samples of this tick, and return the joint positions before shaping, shape (n,) [rad].
 
         Where nothing is shaped, the two samples are the same object.
         """

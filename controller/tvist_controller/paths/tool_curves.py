@@ -84,8 +84,8 @@ class ToolLine(ToolWay):
 class ToolArc(ToolWay):
     """Arc of the circle from one pose through a point to another pose.
 
-    The tool turns with the tangent, so that the orientation at the end does not matter, or evenly to that, by the
-    shortest way.
+    The tool turns with the tangent, so that the orientation at the end does not matter, or evenly to that, by
+    the shortest way.
 
     Raises:
         ValueError: There is no such circle: the points are on a line, or two of them are the same.
@@ -150,7 +150,8 @@ class ToolPart(ToolCurve):
 class ToolBlend(ToolCurve):
     """Smooth way from one state of the tool to another: position and turn are polynomials of degree five.
 
-    The turn is counted from the orientation of the corner, which is near both; the way counts as a given length.
+    The turn is counted from the orientation of the corner, which is near both; the way counts as a given
+    length.
     """
 
     def __init__(self, start: ToolState, end: ToolState, corner: Floats, length: float) -> None:
