@@ -28,15 +28,13 @@ LOOKS = 16
 
 
 @compiled_for_ticks
-def place(chain: Floats, q: Floats, bodies: Floats, ends: Floats) -> None:
-    """Compute where the axes of bodies end.
-
-    Args:
-        chain: Parameters of the links, see `tvist_plant.chain`, shape (n+1, 22).
-        q: Joint positions, shape (n,) [rad].
-        bodies: See `BODY`, shape (b, 8).
-        ends: Result: both ends of each axis in the base frame, shape (b, 6) [m].
-    """
+def place(
+    chain: Floats,  # parameters of the links, see `tvist_plant.chain`, shape (n+1, 22)
+    q: Floats,
+    bodies: Floats,  # see `BODY`, shape (b, 8)
+    ends: Floats,  # result: both ends of each axis in the base frame, shape (b, 6) [m]
+) -> None:
+    """Compute where the axes of bodies end."""
     R, o = np.empty((3, 3)), np.empty(3)
     start(R, o)
     for link in range(q.shape[0] + 1):
@@ -75,19 +73,15 @@ def gap(bodies: Floats, ends: Floats, one: int, other: int) -> float:
 
 @compiled_for_ticks
 def rooms(
-    chain: Floats, bodies: Floats, pairs: Floats, ends: Floats, q: Floats, turned: Floats, found: Floats
+    chain: Floats,  # for this and bodies see `place`
+    bodies: Floats,
+    pairs: Floats,  # see `ARMS`, shape (k, 2+n)
+    ends: Floats,  # scratch, see `place`
+    q: Floats,
+    turned: Floats,  # largest angle of each joint; with zeros, the distances at q are computed [rad]
+    found: Floats,  # result of each pair, shape (k,) [m]
 ) -> float:
-    """Compute how far the bodies of each pair certainly stay apart while joints turn, and return the least [m].
-
-    Args:
-        chain: See `place`; also for bodies and q.
-        bodies: Bodies.
-        pairs: See `ARMS`, shape (k, 2+n).
-        ends: Scratch; see `place`.
-        q: Joint positions around which they turn.
-        turned: Largest angle of each joint, shape (n,); with zeros, the distances at q are computed [rad].
-        found: Result of each pair, shape (k,) [m].
-    """
+    """Compute how far the bodies of each pair certainly stay apart while joints turn, and return the least [m]."""
     place(chain, q, bodies, ends)
     least = math.inf
     for p in range(pairs.shape[0]):
@@ -102,32 +96,20 @@ def rooms(
 
 @compiled_for_ticks
 def stop_has_room(
-    chain: Floats,
+    chain: Floats,  # for this and the next three see `rooms`
     bodies: Floats,
     pairs: Floats,
     ends: Floats,
-    q: Floats,
+    q: Floats,  # state at its start
     qd: Floats,
     qdd: Floats,
-    limit: float,
-    jerk: float,
+    limit: float,  # acceleration of every joint [rad/s^2]
+    jerk: float,  # likewise [rad/s^3]
     least: float,
 ) -> bool:
     """Return whether all bodies certainly stay farther apart than `least` [m] on the way of a stop.
 
     From each posture that is looked at, time goes on by as much as the bodies then certainly need to meet.
-
-    Args:
-        chain: See `rooms`; also for bodies, pairs and ends.
-        bodies: Bodies.
-        pairs: Pairs.
-        ends: Scratch.
-        q: Joint positions at its start, shape (n,) [rad].
-        qd: Velocities, shape (n,) [rad/s].
-        qdd: Accelerations, shape (n,) [rad/s^2].
-        limit: Acceleration limit of every joint [rad/s^2].
-        jerk: Jerk limit [rad/s^3].
-        least: Distance [m].
     """
     n, time = q.shape[0], 0.0
     now, fastest, left = np.empty(n), np.empty(n), np.empty(n)

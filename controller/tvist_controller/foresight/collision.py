@@ -56,12 +56,7 @@ class Meeting:
 
 
 class CollisionModel:
-    """The arm's bodies, its declared payload and the floor, if there is one.
-
-    Args:
-        description: The robot; if it has no bodies, there are no collisions.
-        payload: Declared payload.
-    """
+    """The arm's bodies with its declared payload and the floor; without bodies there are no collisions."""
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
         model, collision = rigid_model(description, Payload()), description.collision
@@ -93,22 +88,13 @@ class CollisionModel:
         self.declare(payload)
 
     def meeting(self, q: Floats) -> Meeting | None:
-        """Return the nearest pair of bodies at a posture, if it is closer than the clearance.
-
-        Args:
-            q: Joint positions, shape (n,) [rad].
-        """
+        """Return the nearest pair of bodies at a posture, if it is closer than the clearance."""
         gaps = self._gaps(q)
         number = int(np.argmin(gaps)) if len(gaps) else None
         return None if number is None or gaps[number] >= CLEARANCE else self._meeting_of(gaps, number)
 
     def misplaced(self, q: Floats, *payloads: Payload) -> str | None:
-        """Say which bodies would meet if the arm were put at a posture with one of these payloads; None if none would.
-
-        Args:
-            q: Joint positions, shape (n,) [rad].
-            payloads: The declared payload, and others that the arm might carry there.
-        """
+        """Say which bodies would meet at a posture with one of these payloads; None if none would."""
         before = self.declared
         for payload in payloads:
             self.declare(payload)
@@ -122,13 +108,8 @@ class CollisionModel:
     def check_place(self, q: Floats, payloads: Sequence[Payload], field: str) -> None:
         """Refuse to put the arm, or another payload on it, where two bodies would be nearer than permitted.
 
-        Args:
-            q: Joint positions, shape (n,) [rad].
-            payloads: See `misplaced`.
-            field: Field of the command that is to blame.
-
         Raises:
-            RefusalError: They would be.
+            RefusalError: They would be; the field of the command is to blame.
         """
         met = self.misplaced(q, *payloads)
         if met is not None:
@@ -138,13 +119,8 @@ class CollisionModel:
     def on_way(self, way: Way, *, before: Floats | None = None) -> tuple[float, Meeting] | None:
         """Find the first meeting on a way, in long steps where everything is far apart and short ones elsewhere.
 
-        Args:
-            way: Joint positions along the path, as `Path.whole` and `Path.way` return them.
-            before: Posture from which the way begins, shape (n,) [rad]. Bodies that are too close there may move apart,
-                but none of these pairs may come closer again. None: the beginning of the way itself.
-
-        Returns:
-            Share of the way, and the pair; None if the way is clear.
+        Bodies that are too close where the way begins, or at a posture before it, may move apart, but none of
+        these pairs may come closer again. What is found is the share of the way, and the pair.
         """
         travel, share = self.travel(way.turned), 0.0
         least = np.minimum(self._gaps(way.at(0.0) if before is None else before), CLEARANCE)
@@ -167,22 +143,11 @@ class CollisionModel:
         return float(np.abs(turned) @ self._reach)
 
     def is_spacious(self, q: Floats, turned: Floats) -> bool:
-        """Return whether the joints can certainly turn by some angles without a meeting.
-
-        Args:
-            q: Joint positions around which they turn, shape (n,) [rad].
-            turned: Largest angle of each joint, shape (n,) [rad].
-        """
+        """Return whether the joints can certainly turn by these angles around a posture without a meeting."""
         return rooms(*self._parts, q, turned, self._found) > CLEARANCE + SURE
 
     def stop_is_spacious(self, state: Target, acceleration: float, jerk: float) -> bool:
-        """Return whether the joints can certainly stop without a meeting.
-
-        Args:
-            state: State of motion at the start.
-            acceleration: Acceleration limit [rad/s^2].
-            jerk: Jerk limit [rad/s^3].
-        """
+        """Return whether the joints can certainly stop without a meeting, within these limits."""
         least = CLEARANCE + SURE
         return stop_has_room(*self._parts, state.q, state.qd, state.qdd, acceleration, jerk, least)
 

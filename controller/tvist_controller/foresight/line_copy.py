@@ -15,12 +15,9 @@ MAX_AHEAD = 4000
 
 
 class Ahead:
-    """A control line without its arm, simulated ahead of time.
+    """A control line without its arm, simulated ahead of time; what it is made of is consumed.
 
-    Args:
-        trajectory: Trajectory that is followed; it is consumed.
-        line_filter: Filter that shapes it, consumed in the same way; None for a stop, which bypasses the filter.
-        shaped: Shaped reference, consumed in the same way.
+    A stop has no filter, since it bypasses that.
     """
 
     def __init__(

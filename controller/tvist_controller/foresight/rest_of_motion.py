@@ -20,13 +20,7 @@ from tvist_shaping.base import Filter
 
 
 class WayAhead:
-    """Examines the future motion of the control line.
-
-    Args:
-        cycle: The control line.
-        outlook: Forecast of the control line.
-        collisions: Collision model of the arm.
-    """
+    """Examines the future motion of the control line."""
 
     def __init__(self, cycle: ControlCycle, outlook: Outlook, collisions: CollisionModel) -> None:
         self._cycle, self._collisions = cycle, collisions
@@ -61,11 +55,8 @@ class WayAhead:
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
         """Time until the shaped reference rests [s], and the angle that the joint that turns most still turns [rad].
 
-        Args:
-            plan: A stop that has begun; None for the present motion.
-
-        Returns:
-            None and None if rest is too far ahead to tell.
+        They are those of the plan of a stop that has begun, or else of the present motion; None and None if
+        rest is too far ahead to tell.
         """
         if plan is not None:
             return plan.duration, plan.way
@@ -76,11 +67,7 @@ class WayAhead:
         return max(last - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
 
     def after_stream(self, end: JointStop) -> Meeting | None:
-        """Return the meeting that would occur while a stream comes to rest through the filter, if any.
-
-        Args:
-            end: Reference of the end of the stream.
-        """
+        """Return the meeting that would occur while the end of a stream runs through the filter, if any."""
         if self._tail_is_spacious(end):
             return None
         return self._on(self._outlook.foresee(trajectory=end))
@@ -88,9 +75,7 @@ class WayAhead:
     def rest_of_way(self, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> Meeting | None:
         """Return the meeting that would occur on the rest of the motion, if any; if that is unknown, in a stop.
 
-        Args:
-            tvist: A new filter; None for the present one.
-            parts: The parts of the present motion that have not begun.
+        The rest has a new filter, if there is one, and the parts of the motion that have not begun.
         """
         cycle = self._cycle
         coming = [part.path.whole for part in parts]
@@ -113,12 +98,7 @@ class WayAhead:
         return next((found[1] for way in ways if (found := self._collisions.on_way(way))), None)
 
     def check_payload(self, payload: Payload, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> None:
-        """Check the rest of the motion with another payload, and put the payload into the collision model.
-
-        Args:
-            payload: New declared payload.
-            tvist: New filter for it; None for the present one.
-            parts: See `rest_of_way`.
+        """Check the rest of the motion with another payload, and put that into the collision model; see `rest_of_way`.
 
         Raises:
             RefusalError: There would be a collision; nothing has changed.

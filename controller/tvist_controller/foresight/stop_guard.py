@@ -21,14 +21,9 @@ class LookAhead(Guard):
     As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the
     previous state is made. It was checked a tick earlier, so there is always a clear stop.
 
-    If bounds prove the stop to be clear, which takes microseconds, it is made only when it is needed.
-
-    Args:
-        collisions: Collision model of the arm.
-        stops: Planner of stops.
-        room: Acceleration that the torque permits.
-        reach: Largest position of each joint in either direction, shape (n,) [rad], which stops must keep; None if
-            the references keep clear of it by themselves, as those of streams do.
+    If bounds prove the stop to be clear, which takes microseconds, it is made only when it is needed. Stops
+    keep the joints within their reach, unless the references keep clear of it by themselves, as those of
+    streams do.
     """
 
     def __init__(
@@ -37,7 +32,7 @@ class LookAhead(Guard):
         stops: StopPlanner,
         room: StreamTorqueRoom,
         *,
-        reach: Floats | None = None,
+        reach: Floats | None = None,  # shape (n,) [rad]
     ) -> None:
         self._reach = reach
         self._collisions, self._stops, self._torque = collisions, stops, room
@@ -132,14 +127,7 @@ class LookAhead(Guard):
         return f"joint {joint} would pass the end of its range, ±{self._reach[joint]:g} rad"
 
     def turned(self, qd: Floats, qdd: Floats, acceleration: float, jerk: float | None = None) -> Floats:
-        """Upper bound of the angle that each joint turns in a stop, shape (n,) [rad].
-
-        Args:
-            qd: Velocities at its start, shape (n,) [rad/s].
-            qdd: Accelerations at its start, shape (n,) [rad/s^2].
-            acceleration: Acceleration limit [rad/s^2].
-            jerk: Jerk limit [rad/s^3]; None for that of the joints.
-        """
+        """Upper bound of each joint's turn in a stop, by default with the joints' jerk, shape (n,) [rad]."""
         jerk = self._stops.jerk if jerk is None else jerk
         fastest = _fastest(qd, qdd, jerk)
         ramps = (acceleration + np.abs(qdd)) / jerk

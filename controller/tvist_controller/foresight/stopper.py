@@ -26,11 +26,7 @@ def _anywhere(_: JointStop) -> bool:
 
 
 class Outlook:
-    """Looks ahead on a control line, and stops it.
-
-    Args:
-        cycle: The control line.
-    """
+    """Looks ahead on a control line, and stops it."""
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
@@ -39,15 +35,11 @@ class Outlook:
         self._wanted = math.inf
 
     def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
-        """Simulate the future references that follow if no command comes.
+        """Simulate what follows without a command, or after a change to a filter or a trajectory.
 
-        Args:
-            tvist: A filter to change to now; None for no change. Stops bypass every filter.
-            trajectory: A trajectory to follow from now on; None for the present one.
-
-        Returns:
-            The last two shaped references played and the future ones until they come to rest, one for each tick,
-            shape (k, n) [rad]; None if that takes more than `MAX_AHEAD` ticks, or the trajectory cannot go on.
+        The shaped references, shape (k, n) [rad], begin with the last two that were played, and end at rest.
+        The result is None if that takes more than `MAX_AHEAD` ticks, or the trajectory cannot go on. Stops
+        bypass every filter.
         """
         ahead = Ahead(*self._cycle.fork(tvist, trajectory))
         with suppress(StuckError):
@@ -55,17 +47,11 @@ class Outlook:
         return np.array(ahead.references) if ahead.rests else None
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
-        """Come to rest as quickly as permitted.
+        """Come to rest as quickly as permitted, by default with the deceleration that torque permits.
 
         A motion stays on its path, is at no time ahead of the uninterrupted motion, and comes to rest no later than
         it. If no stop within the torque limits does that, the motion runs out through the filter. A stream, whose
-        path is its client's, stops clear of all bodies.
-
-        Args:
-            deceleration: Requested limit [rad/s^2]; None for what the torque permits.
-
-        Returns:
-            The stop; None if a stop that is already in progress is as quick, and continues.
+        path is its client's, stops clear of all bodies. A stop in progress that is as quick continues: None.
         """
         cycle, wanted = self._cycle, math.inf if deceleration is None else deceleration
         if cycle.mode in {LineMode.STOPPING, LineMode.RUNNING_OUT} and wanted <= self._wanted:

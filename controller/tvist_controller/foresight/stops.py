@@ -67,13 +67,7 @@ class StopPlan:
 
 
 class StopPlanner:
-    """Finds the quickest permitted stop.
-
-    Args:
-        description: The robot.
-        dynamics: Its inverse dynamics with the declared payload.
-        period: Tick [s].
-    """
+    """Finds the quickest permitted stop."""
 
     def __init__(self, description: RobotDescription, dynamics: InverseDynamics, period: float) -> None:
         limits = description.limits
@@ -85,24 +79,20 @@ class StopPlanner:
         """Tick [s]."""
 
     def on_path(
-        self, state: Target, newest: Floats, forecast: Forecast, wanted: float | None, *, certain: bool = True
+        self,
+        state: Target,  # of the path's parameter, a tick before `newest`
+        newest: Floats,  # parameter of the newest shaped reference, shape (m,) [rad]
+        forecast: Forecast,
+        wanted: float | None,  # requested deceleration [rad/s^2]; None for the largest possible
+        *,
+        certain: bool = True,
     ) -> PathStop | None:
-        """Return the quickest stop along a motion's path that is certain to be permitted.
+        """Return the quickest stop along a motion's path that is certain to be permitted, if there is one.
 
-        Two kinds of stops are never ahead of the motion and never come to rest later: those that brake harder than
-        the motion ever will, with more jerk; and gentler ones that end before the motion could, even if it braked as
-        hard as possible.
-
-        Args:
-            state: State of the path's parameter, a tick before the newest shaped reference.
-            newest: Parameter of the newest shaped reference, shape (m,) [rad].
-            forecast: Forecast of the motion.
-            wanted: Requested deceleration [rad/s^2]; None for the largest possible.
-            certain: False to return the quickest stop within the torque limits, for a motion that will not rest for
-                long.
-
-        Returns:
-            None if no stop is certain to be permitted, or the motion is about to come to rest by itself.
+        Two kinds of stops are never ahead of the motion and never come to rest later: those that brake harder
+        than the motion ever will, with more jerk; and gentler ones that end before the motion could, even if
+        it braked as hard as possible. There is none for a motion that is about to come to rest by itself. For
+        one that will not rest for long, a stop within the torque limits is enough, and need not be `certain`.
         """
         speed, rise = forecast.path.forwards(state.qd), forecast.path.forwards(state.qdd)
         hardest = self._keeping(state, forecast, self.highest)
@@ -124,25 +114,16 @@ class StopPlanner:
 
     def under(
         self,
-        ahead: References,
-        state: Target,
+        ahead: References,  # simulated for as long as a stop lasts; until rest if the motion may turn back
+        state: Target,  # for this and the next two see `on_path`
         forecast: Forecast,
         wanted: float | None,
-        asked: Floats | None = None,
+        asked: Floats | None = None,  # largest torques of the uninterrupted motion, shape (n,) [N m]
     ) -> PathStop | None:
-        """Return the quickest stop along the path of a motion that is simulated ahead.
+        """Return the quickest stop along the path of a motion that is simulated ahead, if there is one.
 
-        Args:
-            ahead: The motion, which is simulated for as long as a stop lasts. If it may turn back, it is known until
-                it rests.
-            state: State, see `on_path`.
-            forecast: Forecast, see `on_path`.
-            wanted: Requested deceleration, see `on_path`.
-            asked: Largest torques that the uninterrupted motion would need, shape (n,) [N m]; None if they are not
-                known, so that a stop may only use its share.
-
-        Returns:
-            None if no stop is permitted, so that the motion has to run out.
+        If the torques of the uninterrupted motion are not known, a stop may only use its share.
+        Without a stop, the motion has to run out.
         """
         newest = ahead.samples[1]
         along: list[float] = []  # distance of the motion at each known tick
@@ -164,8 +145,7 @@ class StopPlanner:
     ) -> SlowedStop | None:
         """Return the quickest stop that plays a motion more and more slowly, see `SlowedStop`; arguments as of `under`.
 
-        Returns:
-            None if none keeps the torques and the acceleration of stops.
+        It is None if none keeps the torques and the acceleration of stops.
         """
         samples, path = np.array(ahead.samples), forecast.path
         joints = Target(*path.states(state.q, state.qd, state.qdd))
@@ -196,25 +176,15 @@ class StopPlanner:
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def asked(self, ahead: Floats) -> Floats:
-        """Largest torques that a motion needs from now on, shape (n,) [N m].
-
-        Args:
-            ahead: Its future references, shape (k, n) [rad].
-        """
+        """Largest torques that a motion needs for its future references, shape (k, n): shape (n,) [N m]."""
         return torque_along(self._dynamics, ahead, self.period)
 
     def by_joints(
         self, state: Target, wanted: float | None, clear: Callable[[JointStop], bool]
     ) -> JointStop | None:
-        """Return the quickest stop with independent joints that is clear all the way and within the torque limits.
+        """Return the quickest stop with independent joints that is clear and within the torque limits.
 
-        Args:
-            state: State of the newest shaped reference.
-            wanted: Requested deceleration [rad/s^2]; None for the largest possible.
-            clear: Returns whether the whole way of a stop is clear.
-
-        Returns:
-            None if there is no such stop.
+        `wanted` is the requested deceleration [rad/s^2], None for the largest possible.
         """
         torque = StopTorque(self._dynamics, state, self._torque)
         stops = (self.stop(state, acceleration) for acceleration in self._ladder(wanted))

@@ -80,9 +80,7 @@ def torques_of(chain: Floats, q: Floats, qd: Floats, qdd: Floats, bodies: Floats
 class Arm:
     """Kinematics and dynamics of the rigid arm.
 
-    Args:
-        description: The robot.
-        tcp: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
+    The tool centre point is in the flange frame: x y z [m] and rotation vector [rad].
     """
 
     def __init__(self, description: RobotDescription, tcp: Sequence[float] = AT_FLANGE) -> None:

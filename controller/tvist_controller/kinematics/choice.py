@@ -26,8 +26,7 @@ OUTSIDE = 1e6
 def represent(arm: Floats, near: Floats, q: Floats) -> tuple[float, bool]:
     """Choose the nearest representation of each joint's position within its range, in place.
 
-    Returns:
-        Squared distance from `near` [rad^2], and whether all joints are within their ranges.
+    Return the squared distance from `near` [rad^2], and whether all joints are within their ranges.
     """
     square, inside = 0.0, True
     for i in range(len(q)):
@@ -39,21 +38,14 @@ def represent(arm: Floats, near: Floats, q: Floats) -> tuple[float, bool]:
 
 @compiled
 def all_postures(
-    arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats
+    arm: Floats,  # see `arm_table`, shape (7, 5)
+    chain: Floats,  # the links to the flange, see `tvist_plant.chain`, shape (7, 22)
+    rotation: Floats,  # of the flange, like its position
+    position: Floats,
+    near: Floats,  # joint positions, shape (6,) [rad]
+    table: Floats,  # result, shape (8, 6) at least [rad]; rows without posture begin with NaN
 ) -> int:
-    """Compute all postures in closed form; of a curve of them, the ones nearest to `near`.
-
-    Args:
-        arm: Table of `arm_table`, shape (7, 5).
-        chain: The links to the flange, see `tvist_plant.chain`, shape (7, 22).
-        rotation: Rotation of the flange, shape (3, 3).
-        position: Position of the flange, shape (3,) [m].
-        near: Joint positions, shape (6,) [rad].
-        table: Result, shape (8, 6) at least [rad]; rows without posture begin with NaN.
-
-    Returns:
-        What `postures` returns.
-    """
+    """Do what `postures` does; of a curve of postures, compute the ones nearest to `near`."""
     freedom = postures(arm, rotation, position, 0.0, table)
     if freedom == FREE:
         _sample_curves(arm, chain, rotation, position, near, table)
@@ -119,18 +111,10 @@ def _start_from_near(
 
 @compiled
 def closest(arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, q: Floats) -> int:
-    """Find the nearest posture in closed form.
+    """Find the nearest posture in closed form; return FOUND, NO_SOLUTION or OUT_OF_RANGE, plus ON_CURVE if it applies.
 
-    Args:
-        arm: Table of `arm_table`, shape (7, 5).
-        chain: The links to the flange, see `tvist_plant.chain`, shape (7, 22).
-        rotation: Rotation of the flange, shape (3, 3).
-        position: Position of the flange, shape (3,) [m].
-        near: Joint positions, shape (6,) [rad].
-        q: Result, shape (6,) [rad]; if it is outside the range of a joint, the nearest of those that are.
-
-    Returns:
-        FOUND, NO_SOLUTION or OUT_OF_RANGE, and ON_CURVE if it applies.
+    For the arguments see `all_postures`. If every posture is outside the range of a joint, q is the nearest
+    of them.
     """
     table = np.empty((9, 6))
     table[8, 0] = math.nan
@@ -167,29 +151,19 @@ def closest(arm: Floats, chain: Floats, rotation: Floats, position: Floats, near
 
 @compiled
 def search(
-    arm: Floats,
+    arm: Floats,  # for this and the other arguments see `all_postures`, with n joints
     chain: Floats,
-    starts: Floats,
+    starts: Floats,  # further starts, shape (k, n) [rad]
     rotation: Floats,
     position: Floats,
     near: Floats,
-    found: Floats,
+    found: Floats,  # result, shape (2 k + 2, n) [rad]
 ) -> int:
     """Find postures of any arm by least squares, from `near` and from given starts.
 
-    Args:
-        arm: Table of `arm_table`, shape (n + 1, 5).
-        chain: The links to the flange, see `tvist_plant.chain`, shape (n+1, 22).
-        starts: Further starts, shape (k, n) [rad].
-        rotation: Rotation of the flange, shape (3, 3).
-        position: Position of the flange, shape (3,) [m].
-        near: Joint positions, shape (n,) [rad].
-        found: Result, shape (2 k + 2, n) [rad]: what was found from each start, and the nearest to `near` that can be
-            reached from there without leaving the pose, in the representation nearest to `near`. Rows without result
-            begin with NaN.
-
-    Returns:
-        Index of the nearest posture within the joints' ranges; -1 if there is none.
+    `found` has what was found from each start, and the nearest to `near` that can be reached from there
+    without leaving the pose, in the representation nearest to `near`; rows without result begin with NaN.
+    Return the index of the nearest posture within the joints' ranges; -1 if there is none.
     """
     best, least = -1, math.inf
     for start in range(len(starts) + 1):

@@ -78,19 +78,12 @@ class InverseKinematics:
         self._prepared = True
 
     def solve(self, rotation: Floats, position: Floats, near: Floats) -> Floats:
-        """Return the posture nearest to another one, of all that have a pose.
+        """Return the posture nearest to another one, of all that have a pose of the flange.
 
-        Nearest means the smallest Euclidean distance in joint space. Each joint has the representation, of those that
-        differ by whole turns and are in its range, that is nearest. If sin q₅ = 0, or if another joint is free at the
-        pose, the nearest posture of the curve of them is returned.
-
-        Args:
-            rotation: Rotation of the flange in the base frame, orthonormal, shape (3, 3).
-            position: Position of the flange in the base frame, shape (3,) [m].
-            near: Joint positions, shape (n,) [rad].
-
-        Returns:
-            Joint positions, shape (n,) [rad], whose pose differs by at most 1e-9 m and 1e-9 rad.
+        Nearest means the smallest Euclidean distance in joint space. Each joint has the representation, of
+        those that differ by whole turns and are in its range, that is nearest. If sin q₅ = 0, or if another
+        joint is free at the pose, the nearest posture of the curve of them is returned. Its pose differs by
+        at most 1e-9 m and 1e-9 rad.
 
         Raises:
             InverseKinematicsError: No posture within the joints' ranges has this pose.
@@ -109,18 +102,11 @@ class InverseKinematics:
         return q
 
     def all(self, rotation: Floats, position: Floats) -> Floats:
-        """Return the postures that have a pose, whatever the joints' ranges.
+        """Return the distinct postures that have a pose, whatever the joints' ranges, shape (k, n).
 
-        Where a joint is free, the postures next to zero stand for the curves of postures. For a redundant arm, the
-        postures are examples.
-
-        Args:
-            rotation: Rotation of the flange in the base frame, orthonormal, shape (3, 3).
-            position: Position of the flange in the base frame, shape (3,) [m].
-
-        Returns:
-            Distinct postures, shape (k, n), each angle within ±π [rad]. Postures that differ by less than 1e-6 rad are
-            one.
+        Each angle is within ±π [rad]; postures that differ by less than 1e-6 rad are one. Where a joint is
+        free, the postures next to zero stand for the curves of postures. For a redundant arm, the postures
+        are examples.
         """
         zero = np.zeros(len(self._limits))
         unlimited = self._arm.copy()

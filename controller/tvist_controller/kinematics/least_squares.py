@@ -20,12 +20,9 @@ NO_PIVOT = 1e-30
 
 @compiled
 def solve_in_place(A: Floats, b: Floats) -> float:
-    """Solve A x = b for a symmetric positive definite A by Cholesky's method; b becomes x, and A is used up.
+    """Solve A x = b, A symmetric positive definite, by Cholesky's method; return √(det A).
 
-    numba's own linear algebra needs scipy, which a served robot does without.
-
-    Returns:
-        Root of A's determinant.
+    b becomes x, and A is used up. numba's own linear algebra needs scipy, which a served robot does without.
     """
     n, root = len(b), 1.0
     for j in range(n):
@@ -71,24 +68,19 @@ def _normal_matrix(J: Floats, added: float, A: Floats) -> None:
 
 @compiled
 def descend(
-    chain: Floats, rotation: Floats, position: Floats, near: Floats, pull: float, iterations: int, q: Floats
+    chain: Floats,  # the links, see `tvist_plant.chain`, shape (n+1, 22)
+    rotation: Floats,  # to reach, like the position
+    position: Floats,
+    near: Floats,
+    pull: float,  # 0 for any solution [-]
+    iterations: int,
+    q: Floats,  # start, which becomes the result
 ) -> float:
     """Minimize |error of the pose|² + pull |q - near|² from a start, by the method of Levenberg and Marquardt.
 
     The damping is proportional to the squared error, with which convergence is quadratic also to a solution at which
     the Jacobian is singular because the solution is one of many (Yamashita and Fukushima, 2001).
-
-    Args:
-        chain: The links, see `tvist_plant.chain`, shape (n+1, 22).
-        rotation: Rotation to reach, shape (3, 3).
-        position: Position to reach, shape (3,) [m].
-        near: Joint positions to stay near to, shape (n,) [rad].
-        pull: Weight of the distance from them [-]; 0 for any solution.
-        iterations: Largest number of steps.
-        q: Start, which becomes the result, shape (n,) [rad].
-
-    Returns:
-        Root of the summed squares of the errors of position [m] and rotation [rad].
+    Return the root of the summed squares of the errors of position [m] and rotation [rad].
     """
     n = q.shape[0]
     J, error = np.empty((6, n)), np.empty(6)

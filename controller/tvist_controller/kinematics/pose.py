@@ -49,8 +49,7 @@ def pose_error(
 ) -> tuple[float, float]:
     """Compute the way from one pose (`now`, `place`) to another: translation [m] and rotation vector [rad], (6,).
 
-    Returns:
-        Length of the translation [m], and angle of the rotation [rad].
+    Return the length of the translation and the angle of the rotation.
     """
     D = np.empty((3, 3))
     for i in range(3):
@@ -103,23 +102,18 @@ def pseudo_inverse(jacobian: Floats, inverse: Floats) -> None:  # noqa: C901, PL
 
 @compiled
 def newton(
-    chain: Floats, rotation: Floats, position: Floats, inverse: Floats, steps: int, q: Floats, error: Floats
+    chain: Floats,
+    rotation: Floats,  # to reach, like the position
+    position: Floats,
+    inverse: Floats,
+    steps: int,
+    q: Floats,  # start, which becomes the result
+    error: Floats,  # result: what lacks to the pose, shape (6,) [m, rad]
 ) -> float:
     """Bring a chain's end to a pose by Newton's method with the inverse of the Jacobian nearby, shape (n, 6).
 
     Directions that this inverse lacks are left as they are, so that a singular posture lets no joint turn far.
-
-    Args:
-        chain: The links.
-        rotation: Rotation to reach, shape (3, 3).
-        position: Position to reach, shape (3,) [m].
-        inverse: The inverse.
-        steps: Largest number of steps.
-        q: Joint positions at the start, which become the result, shape (n,) [rad].
-        error: Result: what lacks to the pose, shape (6,) [m, rad].
-
-    Returns:
-        The largest entry of the error.
+    Return the largest entry of the error.
     """
     n = q.shape[0]
     R, o, J = np.empty((3, 3)), np.empty(3), np.empty((6, n))

@@ -49,9 +49,9 @@ def elbow(
 ) -> tuple[Triangles, int]:
     """Solve the triangle of upper arm and forearm for its far end at (x, y).
 
-    Returns:
-        (θ₂, δ, θ₂', δ'), the angle of the upper arm and the angle from it to the forearm, for the two forms [rad], all
-        of them NaN where there is none; and DEFINITE, LOOSE, or FREE if θ₂ is free and therefore has the value `free`.
+    Return (θ₂, δ, θ₂', δ'), the angle of the upper arm and the angle from it to the forearm, for the two
+    forms [rad], all of them NaN where there is none; and DEFINITE, LOOSE, or FREE if θ₂ is free and therefore
+    has the value `free`.
     """
     square = x * x + y * y
     radius = math.sqrt(square)
@@ -72,19 +72,16 @@ def elbow(
 
 
 @compiled
-def postures(arm: Floats, rotation: Floats, position: Floats, free: float, table: Floats) -> int:
-    """Compute all postures at a pose.
+def postures(
+    arm: Floats,  # see `arm_table`, of one of the two forms
+    rotation: Floats,  # of the flange, like its position
+    position: Floats,
+    free: float,  # value of an angle that is free, if there is one [rad]
+    table: Floats,  # result [rad], shape (8, 6) at least, in any representation
+) -> int:
+    """Compute all postures at a pose; return the largest of DEFINITE, LOOSE and FREE that applies.
 
-    Args:
-        arm: Table of `arm_table`, shape (7, 5), of one of the two forms.
-        rotation: Rotation of the flange, shape (3, 3).
-        position: Position of the flange, shape (3,) [m].
-        free: Value of an angle that is free, if there is one [rad].
-        table: Result, shape (8, 6) at least: the row 4 shoulder + 2 wrist + elbow has a posture [rad], each angle in
-            any representation, or begins with NaN if there is none.
-
-    Returns:
-        The largest of DEFINITE, LOOSE and FREE that applies to any of them.
+    The row 4 shoulder + 2 wrist + elbow has a posture, or begins with NaN if there is none.
     """
     for row in range(8):
         table[row, 0] = math.nan

@@ -122,9 +122,7 @@ class ControlCycle:
     def follow(self, target: Floats, measured: Measurement) -> Sample:
         """Take what another controller asked of the arm in a tick, and what that measured; the arm gets no command.
 
-        Args:
-            target: Position, velocity, acceleration and torque, shape (4, n).
-            measured: Measurements of the same tick.
+        The target has position, velocity, acceleration and torque, shape (4, n).
         """
         q, qd, qdd, torque = target
         signals = np.array([q, q, qd, qdd, torque, np.zeros_like(q), q, qd, torque])
@@ -155,13 +153,10 @@ class ControlCycle:
         return x, x, guard.obstacle
 
     def begin(self, trajectory: T, mode: LineMode = LineMode.SHAPED, guard: Guard | None = None) -> T:
-        """Follow a trajectory from now on.
+        """Follow a trajectory from now on, and keep the present guard unless another one is given.
 
-        Args:
-            trajectory: In a shaped mode it continues the reference x; in another one it continues the shaped reference
-                x*, and the delay line is discarded. A new path may begin only at rest.
-            mode: Mode of the line.
-            guard: Check of each shaped reference in a guarded mode; None to keep the present one.
+        In a shaped mode, the trajectory continues the reference x; in another one it continues the shaped
+        reference x*, and the delay line is discarded. A new path may begin only at rest.
 
         Raises:
             ValueError: The mode cannot follow the present one, or it is guarded, and there is no guard.
@@ -189,10 +184,7 @@ class ControlCycle:
         """Change the filter: at once if the arm is at rest, else within the limits of the motion.
 
         If a change is under way, the new filter waits until that is complete; only the latest waiting filter is kept.
-
-        Args:
-            tvist: New filter, with the joints and the period of the present one.
-            elastic: Elastic feed-forward to use with it; None for that of the paper's controller.
+        Without elastic feed-forward, that of the paper's controller is used.
         """
         self.drives.use(elastic)
         if self.mode.at_rest:  # both kinds of feed-forward are equal there, so that none has to fade
@@ -214,9 +206,7 @@ class ControlCycle:
     ) -> tuple[Trajectory, LineFilter | None, ShapedReference]:
         """Return independent copies of all that shapes the reference: generator, filter if it is in use, and output.
 
-        Args:
-            tvist: A filter to change to now; None for no change.
-            trajectory: A trajectory to follow from now on; None for the present one.
+        They change to a filter, and follow a trajectory, if these are given.
         """
         line_filter = self.filter.fork() if self.mode.shaped else None
         if tvist is not None and line_filter is not None:

@@ -26,12 +26,7 @@ class Target(Struct, frozen=True, eq=False, gc=False):
     """q̈*, shape (n,) [rad/s^2]."""
 
     def rests_at(self, reference: Floats, period: float) -> bool:
-        """Return whether the shaped reference of the next tick has come to rest at a reference.
-
-        Args:
-            reference: Reference before shaping, shape (n,) [rad].
-            period: Tick [s].
-        """
+        """Return whether the shaped reference of the next tick has come to rest at an unshaped reference."""
         # The central differences' equivalent of q*ᵢ - q*ᵢ₋₁.
         step = period * (self.qd - 0.5 * period * self.qdd)
         return bool(max(np.abs(step).max(), np.abs(reference - self.q).max()) <= STILL)
@@ -54,15 +49,7 @@ def central_differences(references: Floats, period: float) -> tuple[Floats, Floa
 
 @compiled_for_ticks
 def extrapolate(before: Floats, middle: Floats, last: Floats, period: float, rates: Floats) -> None:
-    """Velocity and acceleration at the last one of three references, as of a parabola through them.
-
-    Args:
-        before: First reference, shape (n,) [rad].
-        middle: Second reference.
-        last: Third reference.
-        period: Tick [s].
-        rates: Velocity [rad/s] and acceleration [rad/s^2], shape (2, n).
-    """
+    """Velocity and acceleration at the last one of three references, as of a parabola through them, (2, n)."""
     for j in range(middle.shape[0]):
         rise, fall = last[j] - middle[j], middle[j] - before[j]
         rates[1, j] = (rise - fall) / (period * period)
@@ -71,15 +58,7 @@ def extrapolate(before: Floats, middle: Floats, last: Floats, period: float, rat
 
 @compiled_for_ticks
 def differentiate(before: Floats, middle: Floats, last: Floats, period: float, rates: Floats) -> None:
-    """Central differences at the middle one of three references, each of shape (n,) [rad].
-
-    Args:
-        before: First reference.
-        middle: Second reference.
-        last: Third reference.
-        period: Tick [s].
-        rates: Velocity [rad/s] and acceleration [rad/s^2], shape (2, n).
-    """
+    """Velocity and acceleration at the middle one of three references, by central differences, (2, n)."""
     for j in range(middle.shape[0]):
         # Take differences of neighbours first, so that rounding does not grow with the position.
         rise, fall = last[j] - middle[j], middle[j] - before[j]
@@ -97,11 +76,8 @@ def middle_of(window: tuple[Floats, Floats, Floats], period: float) -> Target:
 class Differentiator:
     """Central differences: q̇ᵢ = (qᵢ₊₁ - qᵢ₋₁)/2h and q̈ᵢ = (qᵢ₊₁ - 2qᵢ + qᵢ₋₁)/h².
 
-    All three refer to the same tick, without a phase shift between them; this costs one tick of delay.
-
-    Args:
-        q: Position at rest to start from, shape (n,) [rad].
-        period: Tick h [s].
+    All three refer to the same tick, without a phase shift between them; this costs one tick of delay. They
+    start at rest.
     """
 
     def __init__(self, q: Floats, period: float) -> None:

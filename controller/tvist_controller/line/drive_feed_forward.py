@@ -27,13 +27,7 @@ class DriveFeedForward:
     """Feed-forward of the paper's controller, or of an elastic arm's while a shaper wants that.
 
     Commands of the two kinds belong to different ticks, and they lead by different shares of the wind-up, so in motion
-    one fades into the other; at rest they are equal.
-
-    Args:
-        description: The robot.
-        period: Tick [s].
-        compensate_sag: Whether the motors lead by the twist of the gears under gravity.
-        positions: See `joint_rows`.
+    one fades into the other; at rest they are equal. For `compensate_sag` and `positions` see `joint_rows`.
     """
 
     def __init__(
@@ -68,8 +62,7 @@ class DriveFeedForward:
     def compensate(self, law: Floats | None) -> None:
         """Feed identified friction forward from the next rest on, since its torque may be another one.
 
-        Args:
-            law: See `friction_at`, shape (5, n); None for a share of the friction in the description.
+        Without a law, see `friction_at`, it is a share of the friction in the description.
         """
         self._law = law
 
@@ -94,21 +87,17 @@ class DriveFeedForward:
 
     def command(
         self,
-        signals: Floats,
-        carried: Floats,
+        signals: Floats,  # the target, its torques and the paper's command, see `line_tick`
+        carried: Floats,  # inertial parameters of the payload, see `InverseDynamics.payload_parameters`
         *,
         may_begin: bool = True,
         may_go_on: bool = True,
     ) -> DriveCommand:
         """Drive command for a target.
 
-        Args:
-            signals: The target, the torques of the rigid arm for it and the command of the paper's joint controllers,
-                see `line_tick`.
-            carried: Inertial parameters of the payload, see `InverseDynamics.payload_parameters`.
-            may_begin: Whether the reference is smooth enough to begin with elastic feed-forward.
-            may_go_on: Whether it is smooth enough to go on with it, as a stop is. A guided motion that is not shaped
-                may jump in acceleration, which motors cannot lead.
+        `may_begin` and `may_go_on` say whether the reference is smooth enough for elastic feed-forward. A stop is
+        smooth enough to go on; a guided motion that is not shaped may jump in acceleration, which motors cannot
+        lead.
         """
         if self._elastic is not None or self.wanted is not None:
             self._fade(may_begin if self._share == 0 else may_go_on)

@@ -116,16 +116,14 @@ class ElasticFeedForward:
             self.lead.chain[-2, BODY:] = self._bare + _moved(added, self._placement)
 
     def command(
-        self, target: Floats, carried: Floats, sag: Floats | None = None, *, smooth: bool = True
+        self,
+        target: Floats,  # shaped reference, its derivatives, and τ* of the rigid arm, shape (4, n)
+        carried: Floats,  # inertial parameters of the payload, see `InverseDynamics.payload_parameters`
+        sag: Floats | None = None,  # further lead by the twist of the gears under gravity, shape (n,) [rad]
+        *,
+        smooth: bool = True,  # so that the reference's sixth derivative says how bending links accelerate
     ) -> DriveCommand:
-        """Take a target, and return the command for the target of the tick before.
-
-        Args:
-            target: Shaped reference, its derivatives, and τ* of the rigid arm, shape (4, n).
-            carried: Inertial parameters of the payload, see `InverseDynamics.payload_parameters`.
-            sag: A further lead, by the twist of the gears under gravity, shape (n,) [rad].
-            smooth: Whether the reference is, so that its sixth derivative says how bending links accelerate.
-        """
+        """Take a target, and return the command for the target of the tick before."""
         self.carry(carried)
         motors = np.empty_like(target)
         self.limited = command_motors(self._memory, target, self._ticks, smooth, motors)
@@ -138,11 +136,9 @@ class ElasticFeedForward:
 
 
 def _moved(parameters: Floats, placement: pin.SE3) -> Floats:
-    """Express a body's ten inertial parameters in another frame; unlike with `pin.Inertia`, its mass may be zero.
+    """Express inertial parameters, shape (10,), in the frame in which `placement` is the pose of their own.
 
-    Args:
-        parameters: Mass, mass times centre, and inertia about the origin (xx xy yy xz yz zz), shape (10,).
-        placement: Pose of the present frame in the other one.
+    Unlike with `pin.Inertia`, the mass may be zero.
     """
     mass, p = parameters[0], placement.translation
     h = placement.rotation @ parameters[1:4]

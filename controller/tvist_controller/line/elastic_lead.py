@@ -188,17 +188,15 @@ def wanted_lead(lead: Lead, load: Floats, found: Floats) -> None:
 
 
 @compiled_for_ticks
-def lead_of(lead: Lead, target: Floats, first: bool, smooth: bool, memory: Floats, needed: Floats) -> None:
-    """Compute w for a target, and the torque that arm and rotors need for it.
-
-    Args:
-        lead: The arm, whose wanted leads are moved on by one.
-        target: q, q̇ and q̈, and τ* of the rigid arm, shape (4, n).
-        first: Whether there was no tick before.
-        smooth: Whether the reference is, so that second differences say how bending links accelerate.
-        memory: The memory of the arm.
-        needed: Result, shape (n,) [N m].
-    """
+def lead_of(
+    lead: Lead,  # its wanted leads are moved on by one
+    target: Floats,  # q, q̇ and q̈, and τ* of the rigid arm, shape (4, n)
+    first: bool,  # whether there was no tick before
+    smooth: bool,  # so that second differences say how bending links accelerate
+    memory: Floats,
+    needed: Floats,  # result, shape (n,) [N m]
+) -> None:
+    """Compute w for a target, and the torque that arm and rotors need for it."""
     n, m, motion, loads, wanted = (
         target.shape[1],
         lead.flexes.shape[0],
@@ -234,19 +232,15 @@ def lead_of(lead: Lead, target: Floats, first: bool, smooth: bool, memory: Float
 
 
 @compiled_for_ticks
-def follow(wanted: Floats, led: Floats, room: Floats, period: float) -> bool:
-    """Advance the lead by one tick: to what is wanted, with at most a given acceleration.
+def follow(
+    wanted: Floats,  # at this tick and the two before, the newest first, shape (3, n) [rad]
+    led: Floats,  # leads of the last three ticks likewise, which are moved on by one
+    room: Floats,  # largest acceleration of each joint's lead, shape (n,) [rad/s^2]
+    period: float,
+) -> bool:
+    """Advance the lead by one tick to what is wanted, and return whether its acceleration was limited.
 
-    Where the acceleration was limited, the lead returns to what is wanted like a critically damped oscillator.
-
-    Args:
-        wanted: What is wanted at this tick and the two before, the newest first, shape (3, n) [rad].
-        led: Leads of the last three ticks, the newest first; moved on by one, shape (3, n) [rad].
-        room: Largest acceleration of each joint's lead, shape (n,) [rad/s^2].
-        period: Tick [s].
-
-    Returns:
-        Whether an acceleration was limited.
+    Where that was limited, the lead returns to what is wanted like a critically damped oscillator.
     """
     limited = False
     for j in range(led.shape[1]):
@@ -264,20 +258,14 @@ def follow(wanted: Floats, led: Floats, room: Floats, period: float) -> bool:
 
 
 @compiled_for_ticks
-def command_motors(memory: Floats, target: Floats, ticks: int, smooth: bool, motors: Floats) -> bool:
-    """Compute the lead for a target, then what the motors get for the target of the tick before.
-
-    Args:
-        memory: Memory of the arm, see `parts`.
-        target: See `lead_of`, as for `smooth`.
-        ticks: Number of targets before this one; the first three leads are as wanted.
-        smooth: Whether the reference is smooth.
-        motors: Result: positions [rad], velocities [rad/s], accelerations [rad/s^2] and torques [N m] of the motors,
-            shape (4, n).
-
-    Returns:
-        Whether the lead was limited.
-    """
+def command_motors(
+    memory: Floats,  # see `parts`
+    target: Floats,  # see `lead_of`
+    ticks: int,  # number of targets before this one; the first three leads are as wanted
+    smooth: bool,
+    motors: Floats,  # result: positions, velocities, accelerations and torques of the motors, shape (4, n)
+) -> bool:
+    """Compute the lead for a target, then what the motors get for the target before; return whether it was limited."""
     lead, period, with_torques = parts(memory), memory[PERIOD], memory[WITH_TORQUES] > 0.0
     n, late, drives, wanted, led = target.shape[1], lead.late, lead.drives, lead.leads[0], lead.leads[1]
     needed, limited = np.empty(n), False

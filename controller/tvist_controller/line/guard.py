@@ -20,11 +20,7 @@ class Guard(Protocol):
     """Decides whether a shaped reference may be played, and knows a stop that may be made instead."""
 
     def __call__(self, state: Target) -> JointStop | None:
-        """Decide whether a reference may be played.
-
-        Returns:
-            None if it may be played; otherwise the stop from the previous state, to be made instead.
-        """
+        """Return the stop from the previous state to make instead of a reference that must not be played."""
 
     def give_up(self, why: str) -> JointStop:
         """Return the stop from the previous state, since no reference follows for this reason."""

@@ -22,12 +22,9 @@ ROWS = LAW + LAWS
 
 @compiled_for_ticks
 def friction_at(law: Floats, j: int, speed: float) -> float:
-    """Return identified friction at a speed v: [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v [N m] (Stribeck).
+    """Return identified friction at a motor's speed: [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v [N m].
 
-    Args:
-        law: Parameters of each joint in the order of `LAWS`, shape (5, n).
-        j: The joint.
-        speed: v, that of the motor [rad/s].
+    Source: Stribeck. A law has the parameters of each joint in the order of `LAWS`, shape (5, n).
     """
     slow = speed / law[2, j]
     coulomb = law[0, j] * (1.0 + (law[1, j] - 1.0) * math.exp(-slow * slow))
@@ -37,7 +34,12 @@ def friction_at(law: Floats, j: int, speed: float) -> float:
 
 @compiled_for_ticks
 def command_drives(
-    q: Floats, rates: Floats, torque: Floats, gravity: Floats, joints: Floats, command: Floats
+    q: Floats,  # q*, shape (n,) [rad]
+    rates: Floats,  # q̇* and q̈*, shape (2, n)
+    torque: Floats,  # τ* of the rigid arm, shape (n,) [N m]
+    gravity: Floats,  # g(q*), shape (n,) [N m]
+    joints: Floats,  # parameters of each joint, shape (13, n); one row, the wind-up, is changed
+    command: Floats,  # result: position [rad], velocity [rad/s] and feed-forward torque [N m], shape (3, n)
 ) -> None:
     """Compute the drive command for a target.
 
@@ -47,14 +49,6 @@ def command_drives(
       link is closer to its reference.
     - Sag: the twist by gravity itself, g/K_g, is left, as on the paper's robot, or the motor leads by all of it, so
       that the link rests on its reference. g(q*) has neither feedback nor a delay, and is as smooth as q*.
-
-    Args:
-        q: q*, shape (n,) [rad].
-        rates: q̇* [rad/s] and q̈* [rad/s^2], shape (2, n).
-        torque: τ* of the rigid arm, shape (n,) [N m].
-        gravity: The part of the torque that balances gravity, shape (n,) [N m].
-        joints: Parameters of each joint, shape (13, n); one row, the wind-up, is changed.
-        command: Position [rad], velocity [rad/s] and feed-forward torque [N m], shape (3, n).
     """
     for j in range(q.shape[0]):
         windup = joints[COMPLIANCE, j] * (torque[j] - gravity[j]) + joints[YIELDING, j] * gravity[j]
@@ -76,12 +70,8 @@ def joint_rows(
 ) -> Floats:
     """Return the parameters of each joint, in the order of `ROTOR` and so on, shape (13, n).
 
-    Args:
-        description: The robot.
-        period: Tick [s].
-        compensate_sag: Whether the motors lead by the twist of the gears under gravity.
-        positions: Whether the command is the reference, without wind-up and sag, since the arm's own controller adds
-            these.
+    The motors lead by the twist of the gears under gravity to compensate sag. With `positions`, the command
+    is the reference, without wind-up and sag, since the arm's own controller adds these.
     """
     drives = description.drives
     friction, stiffness = np.array(drives.coulomb_friction), np.array(drives.gear_stiffness)

@@ -40,13 +40,7 @@ def arm_limits(description: RobotDescription) -> MotionLimits:
 
 
 def rate_of(speed: float, velocity: float, slowest: float | None) -> float:
-    """Rate of a motion's time [-].
-
-    Args:
-        speed: Programmed speed fraction [-].
-        velocity: The motion's velocity limit [rad/s].
-        slowest: Velocity limit of reduced speed [rad/s]; None if the speed is not reduced.
-    """
+    """Rate of a motion's time [-]; `slowest` is the velocity limit of reduced speed, if that applies."""
     return speed if slowest is None else min(speed, slowest / velocity)
 
 
@@ -65,13 +59,8 @@ def keeps_torque(chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Flo
 def torque_room(chain: Floats, q: Floats, qd: Floats, scratch: Floats, most: Floats, share: float) -> float:
     """Return the largest acceleration of all joints at once, in any direction, that keeps torques, shape (n,) [N m].
 
-    Args:
-        chain: As in `tvist_plant.chain.torques`; also q, qd and scratch.
-        q: Joint positions.
-        qd: Velocities.
-        scratch: Scratch.
-        most: The torques.
-        share: Factor of the torque that belongs to the acceleration [-].
+    The torque of the acceleration counts by the factor `share`. For the other arguments see
+    `tvist_plant.chain.torques`.
     """
     n, least = q.shape[0], math.inf
     found, M = np.zeros(n), np.empty((n, n))
@@ -143,17 +132,10 @@ class GuidedTorqueRoom(StreamTorqueRoom):
 
 
 class StopTorque:
-    """The joint torques that a stop may use.
+    """The joint torques that a stop may use, which begins at a state.
 
     All torques of the rigid arm along the stop stay within their share of the limits. If the uninterrupted motion
-    would need more, the stop may use as much.
-
-    Args:
-        dynamics: Inverse dynamics with the declared payload.
-        state: State at which the stop begins.
-        limits: Torque limits of the joints, shape (n,) [N m].
-        asked: Largest torques that the uninterrupted motion would need, shape (n,) [N m]; None for those at the
-            start.
+    would need more (`asked`, else the torque at the start), the stop may use as much.
     """
 
     def __init__(
@@ -168,17 +150,13 @@ class StopTorque:
         """Number of the moment at which the last stop that does not hold needed too much."""
 
     def holds(self, stop: AnyStop, *, rebound: bool = True) -> bool:
-        """Return whether a stop keeps within these torques.
+        """Return whether a stop keeps within these torques; with `rebound`, also the overshoot at its ends.
 
-        The torque at the very start belongs to the motion; only what follows is caused by the stop. Thirty-two
-        moments are checked, since torque peaks where a joint's acceleration ramp ends. Nine in ten of the stops that
-        need too much do so where the whole stop's ramp ends, so that moment is checked first, after the one at which
-        the stop before failed: the next one on the ladder mostly fails there, too.
+        That of the flexible arm may reach the limits themselves.
 
-        Args:
-            stop: The stop.
-            rebound: Whether the overshoot of the flexible arm, at both ends of the stop, must stay within the limits
-                themselves.
+        Thirty-two moments are checked, since torque peaks where a joint's acceleration ramp ends. Nine in ten of
+        the stops that need too much do so where the whole stop's ramp ends, so that moment is checked first,
+        after the one at which the stop before failed: the next one on the ladder mostly fails there, too.
         """
         ramp = stop.acceleration / stop.jerk
         ends = min(math.ceil(ramp / stop.duration * MOMENTS), MOMENTS) if stop.duration > 0.0 else MOMENTS
@@ -254,14 +232,9 @@ def _on_way(
 
 
 def torque_along(dynamics: InverseDynamics, references: Floats, period: float) -> Floats:
-    """Largest torques along known references, by central differences, shape (n,) [N m].
+    """Largest torques along known references, shape (k >= 3, n) [rad], by central differences, shape (n,) [N m].
 
     Every `LOOK_EVERY`th reference is checked, and the last one.
-
-    Args:
-        dynamics: Inverse dynamics with the declared payload.
-        references: References, one for each tick, shape (k, n) [rad], k >= 3.
-        period: Tick [s].
     """
     q, qd, qdd = central_differences(references, period)
     looked = np.append(np.arange(0, len(q) - 1, LOOK_EVERY), len(q) - 1)

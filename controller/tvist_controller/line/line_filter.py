@@ -12,12 +12,7 @@ from tvist_shaping.fade import Fade
 
 
 class LineFilter:
-    """Shapes with the latest chosen filter; during motion, the previous one fades into it.
-
-    Args:
-        tvist: The first filter.
-        arm: Limits that suit every joint of the arm.
-    """
+    """Shapes with the latest chosen filter; during motion, the previous one fades into it."""
 
     def __init__(self, tvist: Filter, arm: MotionLimits) -> None:
         self.tvist = tvist
@@ -56,11 +51,7 @@ class LineFilter:
         return self.tvist.peak if fade is None else max(self.tvist.peak, fade.old.peak, fade.new.peak)
 
     def spared(self, limits: MotionLimits | None = None) -> MotionLimits:
-        """Return the limits of a reference whose shaped reference keeps these limits and those of the arm.
-
-        Args:
-            limits: The limits; None for those of the arm.
-        """
+        """Return limits of a reference whose shaped one keeps the arm's limits, and these if given."""
         arm, (faster, harder) = self._arm, (1.0 + more for more in self.tvist.surplus)
         limits = arm if limits is None else limits
         return MotionLimits(
@@ -84,13 +75,10 @@ class LineFilter:
         return shaped
 
     def use(self, tvist: Filter) -> None:
-        """Change the filter within the limits of the motion.
+        """Change the filter within the limits of the motion; the new one continues on the present path.
 
         If a transition is under way, the new filter waits until that is complete; only the latest waiting filter is
         kept.
-
-        Args:
-            tvist: New filter, with the joints and the period of the present one. It continues on the present path.
         """
         fade = self._fade
         if fade is None or fade.share == 0.0:
@@ -104,13 +92,7 @@ class LineFilter:
         self._fade = None
 
     def begin(self, tvist: Filter, sample: Floats, posture_of: Posture | None = None) -> None:
-        """Use a filter from rest.
-
-        Args:
-            tvist: The filter.
-            sample: Reference at rest: joint positions, shape (n,), or a path's parameter, shape (m,) [rad].
-            posture_of: Converts a path's parameter to joint positions; None if samples are joint positions.
-        """
+        """Use a filter from rest; samples are joint positions, or a path's parameter with `posture_of`."""
         self.tvist, self._fade = tvist, None
         tvist.reset(sample, posture_of)
 

@@ -36,11 +36,6 @@ class LineMode(Enum):
 def check_change(before: LineMode, after: LineMode, *, guarded: bool) -> None:
     """Check that a mode may follow another one.
 
-    Args:
-        before: Present mode.
-        after: Next mode.
-        guarded: Whether there is a guard.
-
     Raises:
         ValueError: The table does not have this change, or the mode needs a guard.
     """

@@ -19,29 +19,17 @@ that balances gravity, and the command q_r, q̇_r and τ_ff; their number.
 
 @compiled_for_ticks
 def to_drives(
-    before: Floats,
-    middle: Floats,
-    last: Floats,
-    reference: Floats,
+    before: Floats,  # the three shaped references, shape (n,) [rad]
+    middle: Floats,  # q*
+    last: Floats,  # that of this tick
+    reference: Floats,  # of this tick before shaping
     period: float,
-    chain: Floats,
-    bodies: Floats,
-    joints: Floats,
-    signals: Floats,
+    chain: Floats,  # links of the rigid arm with its declared payload, shape (n+1, 22)
+    bodies: Floats,  # scratch, shape (n+1, 28)
+    joints: Floats,  # parameters of the joint controllers, shape (13, n); their wind-up is changed
+    signals: Floats,  # result, shape (9, n), see `SIGNALS`
 ) -> None:
-    """Compute the drives' commands for the middle one of three shaped references.
-
-    Args:
-        before: First reference, shape (n,) [rad].
-        middle: Second reference q*.
-        last: Third reference, which is that of this tick.
-        reference: Reference of this tick before shaping, shape (n,) [rad].
-        period: Tick [s].
-        chain: Links of the rigid arm with its declared payload, shape (n+1, 22).
-        bodies: Scratch, shape (n+1, 28).
-        joints: Parameters of the joint controllers, shape (13, n); their wind-up is changed.
-        signals: Result, shape (9, n), see `SIGNALS`.
-    """
+    """Compute the drives' commands for the middle one of three shaped references."""
     rates, torque, static = signals[QD:TORQUE], signals[TORQUE], signals[STATIC]
     for j in range(middle.shape[0]):
         signals[REFERENCE, j], signals[Q, j] = reference[j], middle[j]
@@ -53,27 +41,16 @@ def to_drives(
 
 @compiled_for_ticks
 def all_to_drives(
-    start: Floats,
-    shaped: Floats,
+    start: Floats,  # shaped reference at rest before them, shape (n,) [rad]
+    shaped: Floats,  # of each tick, shape (T, n) [rad]
     period: float,
-    chain: Floats,
+    chain: Floats,  # for this and the next two see `to_drives`
     bodies: Floats,
     joints: Floats,
-    targets: Floats,
-    commands: Floats,
+    targets: Floats,  # result: q*, q̇* and q̈*, shape (T, 3, n)
+    commands: Floats,  # result: q_r, q̇_r and τ_ff, shape (T, 3, n)
 ) -> None:
-    """Compute the drives' commands for many ticks, one by one as `to_drives` does, from rest.
-
-    Args:
-        start: Shaped reference at rest before them, shape (n,) [rad].
-        shaped: Shaped reference of each tick, shape (T, n) [rad].
-        period: See `to_drives`, as for the next two.
-        chain: Links.
-        bodies: Scratch.
-        joints: Parameters of the joint controllers.
-        targets: Result: q*, q̇* and q̈*, shape (T, 3, n).
-        commands: Result: q_r, q̇_r and τ_ff, shape (T, 3, n).
-    """
+    """Compute the drives' commands for many ticks, one by one as `to_drives` does, from rest."""
     n = start.shape[0]
     signals = np.empty((SIGNALS, n))
     before, middle = start, start

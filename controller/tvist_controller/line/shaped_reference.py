@@ -8,13 +8,9 @@ from tvist_shaping.base import Posture
 
 
 class ShapedReference:
-    """Converts samples of the filter into targets.
+    """Converts samples of the filter into targets, from rest at joint positions.
 
     Samples are joint positions, or the parameter of a path on which the joints have to stay.
-
-    Args:
-        q: Joint positions at rest to start from, shape (n,) [rad].
-        period: Tick [s].
     """
 
     def __init__(self, q: Floats, period: float) -> None:
@@ -31,12 +27,7 @@ class ShapedReference:
         self.enter(None, q)
 
     def enter(self, posture_of: Posture | None, sample: Floats) -> None:
-        """Accept samples of another kind from now on; the joints continue from their present position.
-
-        Args:
-            posture_of: Converts samples to joint positions; None if they are joint positions.
-            sample: Initial value of the samples, at rest, shape (m,) [rad].
-        """
+        """Accept samples of another kind, at rest now; the joints continue from their present position."""
         self.posture_of = posture_of
         """Converts samples to joint positions; None if they are joint positions."""
         self.along = self.joints if posture_of is None else Differentiator(sample, self._period)
@@ -53,14 +44,9 @@ class ShapedReference:
         return self.joints.newest
 
     def take(self, x: Floats, x_star: Floats) -> Floats:
-        """Take the samples of this tick, shape (m,) or (n,) [rad].
+        """Take the samples of this tick, and return the joint positions before shaping, shape (n,) [rad].
 
-        Args:
-            x: Sample before shaping.
-            x_star: Shaped sample, which is x itself where nothing is shaped.
-
-        Returns:
-            Joint positions before shaping, shape (n,) [rad].
+        Where nothing is shaped, the two samples are the same object.
         """
         q, q_star, posture_of = x, x_star, self.posture_of
         if posture_of is not None:

@@ -34,12 +34,9 @@ class JointWay:
         return self.start + s * slope, slope, np.zeros_like(slope)
 
     def within(self, radius: float, position_at: Callable[[Floats], Floats], *, from_end: bool) -> float:
-        """Return the length from one end within which the tool is no farther from that end than this [m].
+        """Return the length from one end within which the tool is no farther from that end than a radius [m].
 
-        Args:
-            radius: The distance [m].
-            position_at: Position of the tool centre point at joint positions.
-            from_end: Whether that end is the last one.
+        `position_at` returns the position of the tool centre point at joint positions.
         """
 
         def at(s: float) -> Floats:

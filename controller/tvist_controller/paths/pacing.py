@@ -57,25 +57,15 @@ def joined(run: Run, before: Knots | None = None) -> Knots:
 
 def law_of(
     run: Run,
-    curve: SplineCurve,
+    curve: SplineCurve,  # the joints' way along it
     ground: "Ground",
     limits: JointLimits,
-    jerk: float,
-    window: float,
+    jerk: float,  # largest along the path [m/s^3]
+    window: float,  # time over which the shaper mixes moments of the motion [s]
     *,
-    goes_on: bool = False,
+    goes_on: bool = False,  # whether others may continue it
 ) -> RetimedLaw:
-    """Return the quickest time law of a run, or the one of the duration that was asked for.
-
-    Args:
-        run: The run.
-        curve: The joints' way along it.
-        ground: What limits it.
-        limits: Limits of the joints.
-        jerk: Largest jerk along the path [m/s^3].
-        window: Time over which the shaper mixes moments of the motion [s].
-        goes_on: Whether others may continue it.
-    """
+    """Return the quickest time law of a run, or the one of the duration that was asked for."""
     asked = [piece.pacing.duration for piece in run]
     if all(asked):
         jerk = FASTEST * limits.jerk  # durations leave the jerk to the joints
@@ -91,26 +81,15 @@ def law_of(
 
 def going_on(
     before: RetimedLaw,
-    edges: tuple[int, int],
-    ground: "Ground",
+    edges: tuple[int, int],  # number of its edge with which the law begins, and of equal ones behind that
+    ground: "Ground",  # from that edge on
     curve: SplineCurve,
     limits: JointLimits,
     jerk: float,
     window: float,
-    slower: float,
+    slower: float,  # factor of its speed, at most 1 [-]
 ) -> RetimedLaw | None:
-    """Return the quickest law that goes on from another one; see `longer_law`, and `law_of` for the other arguments.
-
-    Args:
-        before: The law before.
-        edges: Number of its edge with which the law begins, and how many edges behind that they are equal.
-        ground: What limits it from that edge on.
-        curve: The joints' way.
-        limits: Limits of the joints.
-        jerk: Largest jerk along the path [m/s^3].
-        window: Time over which the shaper mixes moments of the motion [s].
-        slower: Factor of its speed, at most 1 [-].
-    """
+    """Return the quickest law that goes on from another one; see `longer_law`, and `law_of` for the other arguments."""
     first, known = edges
     for _ in range(TRIES):
         slowed = JointLimits(

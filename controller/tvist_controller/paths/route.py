@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.paths.by_length import EvenBlend, evenly
 from tvist_controller.paths.fairing import Meeting, meetings
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
-from tvist_controller.paths.tool_curves import ToolBlend, ToolCurve, ToolPart, ToolState
+from tvist_controller.paths.tool_curves import EvenBlend, ToolBlend, ToolCurve, ToolPart, ToolState, evenly
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import Knots, SplineCurve
@@ -88,12 +87,7 @@ class Route(NamedTuple):
 
 
 def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None) -> Route:
-    """Divide a path into runs.
-
-    Args:
-        legs: The path.
-        tracker: Kinematics of the arm.
-        start: Where the path begins on its first leg; None for that leg's start.
+    """Divide a path into runs, from the start of its first leg or from a place on that.
 
     Raises:
         WayError: The joints cannot follow the path; beside a singular posture two ways lead on from it.

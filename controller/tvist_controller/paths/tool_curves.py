@@ -1,4 +1,4 @@
-"""Lines and arcs of the tool centre point."""
+"""Lines, arcs and blends of the tool centre point."""
 
 from abc import ABC, abstractmethod
 from typing import NamedTuple
@@ -9,7 +9,7 @@ import pinocchio as pin
 from tvist_controller.kinematics.rotation import turn, turned
 from tvist_controller.paths.poses import Placement
 from tvist_controller.trajectory.limits import Floats
-from tvist_controller.trajectory.spline import hermite
+from tvist_controller.trajectory.spline import evaluate, hermite
 
 PER_RADIAN = 0.25
 """Length that a turn by one radian counts as [m]."""
@@ -19,6 +19,13 @@ STRAIGHT = 1e-6
 """Sine of an angle below which three points count as points on a line [-]."""
 STEP = 1e-5
 """Step of numerical differences, as a share of a blend's length [-]."""
+SLOWEST = 0.25
+"""Speed of the tool relative to the parameter, below which a blend turns back too sharply to be converted [-]."""
+PIECES = 64
+"""Number of pieces of the conversion of a blend to the length of its way."""
+EVEN = 1e-9
+"""Difference from an even speed at the ends that is rounding [-]."""
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
 class ToolState(NamedTuple):
@@ -75,14 +82,10 @@ class ToolLine(ToolWay):
 
 
 class ToolArc(ToolWay):
-    """Arc of the circle through three points.
+    """Arc of the circle from one pose through a point to another pose.
 
-    Args:
-        start: Pose at the start.
-        via: A point on the arc, shape (3,) [m].
-        end: Pose at the end.
-        tangent: Whether the tool turns with the tangent, so that the orientation of `end` does not matter; otherwise
-            it turns evenly to that, by the shortest way.
+    The tool turns with the tangent, so that the orientation at the end does not matter, or evenly to that, by
+    the shortest way.
 
     Raises:
         ValueError: There is no such circle: the points are on a line, or two of them are the same.
@@ -147,11 +150,8 @@ class ToolPart(ToolCurve):
 class ToolBlend(ToolCurve):
     """Smooth way from one state of the tool to another: position and turn are polynomials of degree five.
 
-    Args:
-        start: State at the start.
-        end: State at the end.
-        corner: Orientation near both, from which the turn is counted, shape (3, 3).
-        length: Length that it counts as [m].
+    The turn is counted from the orientation of the corner, which is near both; the way counts as a given
+    length.
     """
 
     def __init__(self, start: ToolState, end: ToolState, corner: Floats, length: float) -> None:
@@ -208,3 +208,48 @@ def _at_corner(state: ToolState, corner: Floats) -> tuple[Floats, Floats, Floats
         angular = np.linalg.solve(np.asarray(pin.Jexp3(-turned_by)), angular)
     value = np.concatenate((state.pose.position, turned_by))
     return value, state.first, np.concatenate((state.second[:3], angular))
+
+
+def evenly(blend: ToolBlend) -> "ToolBlend | EvenBlend":
+    """Return the blend with an even speed of the tool; unchanged if it nearly stops on its way."""
+    speeds, _ = blend.shape(np.linspace(0.0, blend.length, PIECES + 1))
+    ends = abs(float(speeds[0]) - 1.0) + abs(float(speeds[-1]) - 1.0)
+    return blend if float(speeds.min()) < SLOWEST or ends > EVEN else EvenBlend(blend)
+
+
+class EvenBlend(ToolCurve):
+    """A blend whose parameter is the length of its way, so that an even parameter is an even speed."""
+
+    def __init__(self, blend: ToolBlend) -> None:
+        self._blend = blend
+        places = np.linspace(0.0, blend.length, PIECES + 1)
+        half = 0.5 * np.diff(places)
+        inside = (places[:-1] + half)[:, None] + half[:, None] * _NODES
+        speeds = blend.shape(inside.reshape(-1))[0].reshape(inside.shape)
+        self._lengths = np.concatenate(([0.0], np.cumsum(half * (speeds @ _WEIGHTS))))
+        self.length = float(self._lengths[-1])
+        first, second = blend.moved(places)
+        speed = np.linalg.norm(first, axis=1)
+        place, rate, change = places, 1.0 / speed, -(first * second).sum(axis=1) / speed**4
+        starts = (place[:-1, None], rate[:-1, None], change[:-1, None])
+        ends = (place[1:, None], rate[1:, None], change[1:, None])
+        coefficients = hermite(np.diff(self._lengths)[:, None], starts, ends)
+        self._coefficients = np.ascontiguousarray(np.moveaxis(coefficients, 0, 1))
+
+    def at(self, s: float) -> ToolState:
+        """Return the state at a length from the start [m]."""
+        place, rate, change = (float(values[0]) for values in self._places(np.array([s])))
+        pose, first, second = self._blend.at(place)
+        return ToolState(pose, first * rate, second * rate**2 + first * change)
+
+    def shape(self, s: Floats) -> tuple[Floats, Floats]:
+        """Return the sizes of dp/ds and d²p/ds² at k lengths, each of shape (k,) [-, 1/m]."""
+        places, rates, changes = self._places(s)
+        first, second = self._blend.moved(places)
+        bent = second * rates[:, None] ** 2 + first * changes[:, None]
+        return np.linalg.norm(first, axis=1) * rates, np.linalg.norm(bent, axis=1)
+
+    def _places(self, s: Floats) -> tuple[Floats, Floats, Floats]:
+        out = np.empty((4, len(s), 1))
+        evaluate(self._lengths, self._coefficients, s, out)
+        return out[0, :, 0], out[1, :, 0], out[2, :, 0]

@@ -44,12 +44,7 @@ class WayError(Exception):
 
 
 class Tracker:
-    """Kinematics of an arm and its tool.
-
-    Args:
-        description: The robot.
-        tcp: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
-    """
+    """Kinematics of an arm and its tool; for its tool centre point see `Arm`."""
 
     def __init__(self, description: RobotDescription, tcp: Sequence[float]) -> None:
         self._tool = Arm(description, tcp)
