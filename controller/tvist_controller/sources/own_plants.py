@@ -54,12 +54,9 @@ class OwnPlant:
         return RecordedPlant(self.place, self.sha256)
 
     def make(self, description: RobotDescription, carried: Payload, seed: int = 0) -> Plant:
-        """Make the plant for one robot.
+        """Make the plant for one robot with the payload that it carries, as far as the server knows.
 
-        Args:
-            description: The robot.
-            carried: Payload that the arm carries, as far as the server knows.
-            seed: Seed of what a plant of `VARIANTS` draws; others are not told.
+        The seed is that of what a plant of `VARIANTS` draws; others are not told.
 
         Raises:
             OwnPlantError: Making it fails, or what is made is not a plant.
