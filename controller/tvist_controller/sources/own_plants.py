@@ -120,10 +120,7 @@ def load_plant(place: str) -> OwnPlant:
 
 
 def load_world(scene: str) -> OwnPlant:
-    """Find the arm in a scene.
-
-    Args:
-        scene: Name of a scene that comes with the package, or path of a file in MuJoCo's format.
+    """Find the arm in a scene, by its name in the package or the path of a file in MuJoCo's format.
 
     Raises:
         SceneError: There is none.
