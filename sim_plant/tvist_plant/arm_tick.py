@@ -30,10 +30,10 @@ def evaluate(
     memory: Floats,  # its `pushed` contains the external torques at this state
     out: Floats,
 ) -> bool:
-    """Compute mass matrix, bias, accelerations and measurements at the present state; return whether it is finite.
+    """Compute dynamics, accelerations and measurements at the present state; return whether it is finite.
 
-    The result has shape (3n+3,): joint angles read by the encoders [rad], joint velocities [rad/s], motor torques
-    [N m], and the specific force in the flange frame without noise [m/s^2].
+    The result has shape (3n+3,): joint angles read by the encoders [rad], joint velocities [rad/s], motor
+    torques [N m], and the specific force in the flange frame without noise [m/s^2].
     """
     arm = parts(memory)
     links, n = arm.qdd.shape[0], arm.joints.shape[1]

@@ -168,9 +168,9 @@ def momentum(I: Floats, V: Floats) -> tuple[float, float, float, float, float, f
 def sweep(chain: Floats, q: Floats, qd: Floats, qdd: Floats, gravity: float, scratch: Floats) -> None:
     """Compute twist, inertia, velocity and force of each body, from the base to the end.
 
-    The result is in the scratch, shape (N+1, 28): in each row the twist S (6), inertia (10), velocity V (6) and force F
-    (6); in the last row, the acceleration of the last body instead of a force. The angles and their rates have shape
-    (N,).
+    The result is in the scratch, shape (N+1, 28): in each row the twist S (6), inertia (10), velocity V (6)
+    and force F (6); in the last row, the acceleration of the last body instead of a force. The angles and
+    their rates have shape (N,).
     """
     R, o, A = np.empty((3, 3)), np.empty(3), np.empty(6)
     start(R, o)

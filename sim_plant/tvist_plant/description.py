@@ -127,7 +127,7 @@ _RELATIONS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less th
 
 
 def _in_words(error: msgspec.ValidationError, content: Any) -> str:
-    """Return the message of msgspec's error about a content, with the key, the value and the permitted values."""
+    """Return msgspec's message about a content, with the key, the value and the permitted values."""
     said, _, path = str(error).partition(" - at `$")
     key = path.rstrip("`").removeprefix(".")
     value = content

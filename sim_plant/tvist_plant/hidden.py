@@ -30,9 +30,10 @@ CENTRE: Final = 0.015
 
 
 def hidden(description: RobotDescription, seed: int) -> RobotDescription:
-    """Draw the robot that stands behind a robot file, which is all that a controller knows, by a seed of at least 0.
+    """Draw the robot behind a robot file, which is all that a controller knows, by a seed of at least 0.
 
-    Its springs, dampers, loops, rotors and friction differ; kinematics, masses, limits and sensors are the file's.
+    Its springs, dampers, loops, rotors and friction differ; kinematics, masses, limits and sensors are the
+    file's.
     """
     random = np.random.default_rng([seed, 53])
 

@@ -77,7 +77,8 @@ def packed(
 ) -> Floats:
     """Return one array of all parameters, one row each in the order of `JointParameters`, shape (19, n).
 
-    The joints are given by their indices among the links, each gear's error by its phase [rad], both of shape (n,).
+    The joints are given by their indices among the links, each gear's error by its phase [rad], both of shape
+    (n,).
     """
     rows = {
         "rotor_inertia": linear.rotor_inertia,

@@ -72,8 +72,8 @@ def flexible_model(
 ) -> FlexibleModel:
     """Create the model of the arm with links that bend.
 
-    They also twist about the line along x through their centre of mass, with the stiffness `torsion` [N m/rad]; None:
-    they do not.
+    They also twist about the line along x through their centre of mass, with the stiffness `torsion`
+    [N m/rad]; None: they do not.
     """
     flexibility = description.link_flexibility
     stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))

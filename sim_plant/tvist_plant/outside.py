@@ -82,7 +82,7 @@ class Outside:
         return self._torque is None and not self._wrenches
 
     def generalized_force(self, q: Floats) -> Floats:
-        """Return the sum of all torques and wrenches as torques on all N links at q, both of shape (N,) [rad, N m]."""
+        """Return the sum of all torques and wrenches as torques on all N links, shape (N,) [N m]."""
         sum_ = np.zeros(self._flexible.model.nv)
         if self._torque is not None:
             sum_[self._flexible.joints] = self._torque

@@ -28,7 +28,7 @@ Content = TypeVar("Content")
 
 
 def named(error: BaseException, said: str | None = None) -> str:
-    """Return an exception in one line: its type, and its message, or what is said instead, if there is one."""
+    """Return an exception in one line: its type, and its message or what is said instead."""
     words = one_line(str(error) if said is None else said)
     return f"{type(error).__name__}: {words}" if words else type(error).__name__
 

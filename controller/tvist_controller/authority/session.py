@@ -66,8 +66,8 @@ def check_free(lease: Lease | None, client: str) -> None:
 class Session:
     """One lease at a time; it ends by itself, but in lockstep nothing times out.
 
-    The instance is part of every token, different after each restart, so that no token of before is valid again; empty
-    where equal runs have to give equal tokens.
+    The instance is part of every token, different after each restart, so that no token of before is valid
+    again; empty where equal runs have to give equal tokens.
     """
 
     def __init__(self, *, timeouts: bool, instance: str = "") -> None:
@@ -100,7 +100,7 @@ class Session:
         return lease
 
     def hand_over(self, client: str, now: float, session: str | None = None) -> None:
-        """Reserve the lease for another client from now on, which only has to take it; the session as in `take`."""
+        """Reserve the lease for another client, which only has to take it; the session is as in `take`."""
         if self.lease is not None:
             self.lease = self._grant(client, self.lease.seconds, now, session)
 

@@ -19,7 +19,7 @@ def available() -> tuple[str, ...]:
 
 @cache
 def default_for(model: str) -> str | None:
-    """Name of the calibration that a robot uses unless another one is named; None if the package has none for it.
+    """Name of the calibration that a robot uses unless another one is named; None if there is none.
 
     It is the first, by name, of those that come with the package, are for this model and have the paper's polynomials;
     if none has them, the first for this model.

@@ -27,7 +27,7 @@ MODES = 4
 def modal_estimator(
     calibration: Calibration, description: RobotDescription, payload: Payload, modes: int = MODES
 ) -> Modal:
-    """Return an estimator of the arm's lowest modes; of the robot file it uses masses and geometry, never springs.
+    """Return an estimator of the arm's lowest modes; it uses no springs or drives of the robot file.
 
     This takes less than a millisecond, so a payload can be declared between two ticks.
 

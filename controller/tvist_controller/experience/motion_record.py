@@ -87,8 +87,8 @@ class MotionRecorder:
     def take(self, sample: Sample, beliefs: Beliefs | None = None) -> Recorded | None:
         """Take a tick in which the drives hold or move the arm; return the motion that is complete with it.
 
-        That may be one that the next one has cut short; None if there is none. What the controller takes the arm for is
-        used at the beginning of a motion only.
+        That may be one that the next one has cut short; None if there is none. What the controller takes the
+        arm for is used at the beginning of a motion only.
         """
         resting, done = sample.mode.at_rest, None
         if not resting and self.begins:

@@ -31,7 +31,7 @@ def runtime_of(activity: Activity, *, slowing: bool) -> RuntimeState:
 
 
 def at_rest(activity: Activity, *, emergency: bool) -> Activity:
-    """Return the activity of a robot whose arm was placed somewhere else at rest, in an emergency stop or not."""
+    """Return the activity of a robot whose arm was placed at rest, in an emergency stop or not."""
     if activity.protective:
         return Activity.PROTECTIVE_STOP
     if activity is Activity.BRAKING or (emergency and activity.moving):

@@ -224,8 +224,8 @@ class MotionControl:
     def stop(self, deceleration: float | None, why: str, code: Code | None = None) -> None:
         """Stop without the filter, and report how the present motion ended.
 
-        The reason is given for people and as a code for programs. The deceleration is a limit [rad/s^2]; None for
-        what the torque permits.
+        The reason is given for people and as a code for programs. The deceleration is a limit [rad/s^2]; None
+        for what the torque permits.
         """
         self.end("stop", why, code, deceleration)
 

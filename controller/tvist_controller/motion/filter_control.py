@@ -57,7 +57,8 @@ class Filters:
     def declare(self, payload: Payload, tvist: Filter | None, *, found: bool = False) -> None:
         """Take another payload into account, which may change the arm's modes.
 
-        The filter is None if its modes are not known to differ. The robot has `found` the payload, or it is declared.
+        The filter is None if its modes are not known to differ. The robot has `found` the payload, or it is
+        declared.
         """
         self._declared = payload
         self._given = self._given if found else payload

@@ -60,7 +60,7 @@ class Forces(Protocol):
 
 
 class ForceControl(Monitor):
-    """Begins and ends force mode, and watches the limits that go with it; `timeouts` as in `ExternalSensor`."""
+    """Begins and ends force mode, and watches its limits; `timeouts` as in `ExternalSensor`."""
 
     def __init__(self, guidance: Guidance, forces: Forces, *, timeouts: bool) -> None:
         self.guidance = self._guidance = guidance
@@ -95,8 +95,8 @@ class ForceControl(Monitor):
     def begin(self, task: ForceTask, feature: Feature, kind: int, trigger: str = "force_mode") -> int:
         """Control the force at the tool from now on, and return the motion's number; what moves goes on in other axes.
 
-        The feature is the frame of the task; the kind is 1 to 3, see `frame_of`. The trigger is `force_mode`, or
-        `freedrive`, in which the arm is moved by hand.
+        The feature is the frame of the task; the kind is 1 to 3, see `frame_of`. The trigger is `force_mode`,
+        or `freedrive`, in which the arm is moved by hand.
 
         Raises:
             RefusalError: The present activity does not allow it, or its motion cannot be taken over.

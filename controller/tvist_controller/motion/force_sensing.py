@@ -41,8 +41,8 @@ class ContactWatch:
     def steps(self, direction: Sequence[float], threshold: float, sure: int) -> int:
         """Return the number of ticks since just before a contact began; 0 if there is none.
 
-        The tool meets what it touches in a direction of the base frame, zeros for any. The mean force of `sure` ticks
-        must exceed the threshold [N].
+        The tool meets what it touches in a direction of the base frame, zeros for any. The mean force of
+        `sure` ticks must exceed the threshold [N].
         """
         self._asked = REMEMBERED
         if self._usual is None:
@@ -56,7 +56,7 @@ class ContactWatch:
 
 
 class ExternalSensor:
-    """Takes the place of the arm's own sensor while it is used and not silent; in lockstep nothing times out."""
+    """Takes the place of the arm's own sensor while it is used and not silent; in lockstep it never is."""
 
     def __init__(self, *, timeouts: bool) -> None:
         self._most = round(SILENT / PERIOD) if timeouts else np.inf

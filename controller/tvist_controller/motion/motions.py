@@ -29,7 +29,7 @@ class RunningMotion(Protocol):
         """Rate of its time [-]."""
 
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Change its speed, a fraction [-]; `slowest` is the velocity limit of reduced speed [rad/s], None without."""
+        """Change its speed [-]; `slowest` is the velocity limit of reduced speed [rad/s], None without."""
 
 
 class RunningMove:

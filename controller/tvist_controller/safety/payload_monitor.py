@@ -140,8 +140,8 @@ class PayloadMonitor(Monitor):
     def declare(self, payload: Payload, *, found: bool = False, told: bool = False) -> None:
         """Set another payload: discard past measurements, and wait until it is fully phased in.
 
-        If the robot has `found` it, it is assumed, not declared; `told` says whether a warning has told already that
-        the arm carries something else.
+        If the robot has `found` it, it is assumed, not declared; `told` says whether a warning has told
+        already that the arm carries something else.
         """
         self.payload = payload
         self._called = "assumed" if found else "declared"

@@ -23,7 +23,7 @@ def linear(
 
 
 def cubic(points: Sequence[Floats], u: float, rate: float) -> tuple[Floats, Floats, float]:
-    """Evaluate the uniform cubic B-spline between the middle two of four points; arguments and result as in `linear`.
+    """Evaluate the uniform cubic B-spline between the middle two of four points; see `linear`.
 
     Its second derivative varies linearly from one second difference of the points to the next, and its third
     derivative is their third difference, so it keeps the points' limits of velocity, acceleration and jerk. The curve

@@ -55,8 +55,8 @@ class Trajectory(ABC):
     def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:  # noqa: B027  most need not
         """Leave room for a filter that comes into use now; only references without a plan have to.
 
-        `spared` returns the limits of a reference whose shaped reference keeps the given limits and those of the arm;
-        for None, only the latter.
+        `spared` returns the limits of a reference whose shaped reference keeps the given limits and those of
+        the arm; for None, only the latter.
         """
 
     @property
@@ -91,7 +91,7 @@ class Rest(Trajectory):
 
 
 class Known(Trajectory):
-    """A sequence of at least one position, shape (n,) [rad], one a tick of `period` seconds; the last is kept."""
+    """At least one position, shape (n,) [rad], one a tick of `period` seconds; the last is kept."""
 
     def __init__(self, positions: Sequence[Floats], period: float) -> None:
         self._positions, self._period = positions, period

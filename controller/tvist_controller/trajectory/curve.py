@@ -36,8 +36,9 @@ class Curve(Path):
 
         q̇ = q' ṡ,    q̈ = q' s̈ + q'' ṡ²,    q⃛ = q' s⃛ + 3 q'' ṡ s̈ + q''' ṡ³,
 
-    so bounds of the derivatives convert limits of the joints into limits of s. `most` limits the acceleration of each
-    joint while the motion's rate changes, shape (n,) [rad/s^2]; None if the limit of the parameter suffices.
+    so bounds of the derivatives convert limits of the joints into limits of s. `most` limits the acceleration
+    of each joint while the motion's rate changes, shape (n,) [rad/s^2]; None if the limit of the parameter
+    suffices.
 
     Raises:
         ValueError: An argument is out of range.

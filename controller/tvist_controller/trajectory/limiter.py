@@ -126,7 +126,7 @@ class Limiter:
         return not self._now[STEP].any()
 
     def follow(self, q: Floats, qd: Floats) -> Floats:
-        """Advance by one tick towards a moving position; return the reference's position, shape (n,) [rad]."""
+        """Advance by one tick towards a moving position; return the reference, shape (n,) [rad]."""
         now, fits = np.empty((DIFFERENCES, len(q))), np.empty(len(q), dtype=np.bool_)
         found = judge(q, self.q, self._now, self._most, now, fits)
         if self._behind is not None:

@@ -47,8 +47,8 @@ class TimeLaw(Protocol):
 class PlannedMotion(Trajectory):
     """A planned motion from rest to rest.
 
-    Its samples are the path's parameter; for a straight line in joint space these are the joint positions. The limits
-    of a change of its rate are at least those of the law, which may be slow.
+    Its samples are the path's parameter; for a straight line in joint space these are the joint positions.
+    The limits of a change of its rate are at least those of the law, which may be slow.
     """
 
     path: Path
@@ -170,8 +170,9 @@ class PlannedMotion(Trajectory):
     def hold(self, acceleration: float) -> bool:
         """Pause the motion, if it then stands noticeably sooner than by continuing; return whether it pauses.
 
-        Near the end hardly any acceleration is left for a pause, which would only draw the end out. While slowing down,
-        `acceleration` is the limit for every entry of the parameter, at most that of its agility.
+        Near the end hardly any acceleration is left for a pause, which would only draw the end out. While
+        slowing down, `acceleration` is the limit for every entry of the parameter, at most that of its
+        agility.
         """
         paused = self.fork()
         paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind
@@ -215,7 +216,7 @@ class PlannedMotion(Trajectory):
 def quickest_motion(
     path: Path, limits: MotionLimits, period: float, speed: float = 1.0, agility: MotionLimits | None = None
 ) -> PlannedMotion:
-    """Return the double-S motion along a path from rest to rest within limits; arguments as in `PlannedMotion`.
+    """Return the double-S motion along a path from rest to rest within limits; see `PlannedMotion`.
 
     Raises:
         ValueError: There is no such motion within these limits, or it would last for hours.

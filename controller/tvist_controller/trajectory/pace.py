@@ -46,10 +46,10 @@ class Pace:
         return self.rate == target and self._slope == 0.0
 
     def advance(self, target: float, curve: Sequence[Floats]) -> float:
-        """Advance by one tick towards a target of the rate [-] and return the time that passes on the path [s].
+        """Advance by one tick towards a target rate [-] and return the time that passes on the path [s].
 
-        `curve` has q' [rad/s] and q'' [rad/s^2], each of shape (2, n), at the present point of the path and just
-        ahead: the rate must suit all of them, since a tick has a finite length.
+        `curve` has q' [rad/s] and q'' [rad/s^2], each of shape (2, n), at the present point of the path and
+        just ahead: the rate must suit all of them, since a tick has a finite length.
         """
         rooms = [self._room(qd, qdd) for qd, qdd in curve]
         # ruckig requires limits on both sides of zero, so leave a little room in both directions.

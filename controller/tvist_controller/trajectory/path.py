@@ -44,14 +44,14 @@ class Path(ABC):
 
     @abstractmethod
     def states(self, x: Floats, xd: Floats, xdd: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return q [rad], q̇ [rad/s] and q̈ [rad/s^2], shape (n,) or (k, n), for one or k states of the parameter.
+        """Return q, q̇ and q̈, shape (n,) or (k, n) [rad, s], for one or k states of the parameter.
 
         Those are x, its velocity [1/s] and its acceleration [1/s^2], each of shape (m,) or (k, m).
         """
 
     @abstractmethod
     def paced(self, x: Floats, xd: Floats, xdd: Floats, acceleration: float) -> Floats:
-        """Return the velocities and accelerations that a change of the motion's rate has to consider, shape (2, k).
+        """Return velocities and accelerations for a change of the motion's rate, shape (2, k).
 
         They are scaled so that `acceleration`, the limit of the parameter's [1/s^2], is that of every column.
         Velocity and acceleration of the parameter x are those at full rate, each of shape (m,) [1/s, 1/s^2].
@@ -63,15 +63,15 @@ class Path(ABC):
 
     @abstractmethod
     def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits | None:
-        """Return limits for the parameter's acceleration and jerk in a stop; None if the curve alone uses those up.
+        """Return the parameter's limits in a stop; None if the curve alone uses up those of the joints.
 
-        The stop begins at x, shape (m,), and is never faster than `velocity` [1/s]; that of the joints' limits is
-        ignored.
+        The stop begins at x, shape (m,), and is never faster than `velocity` [1/s]; that of the joints'
+        limits is ignored.
         """
 
     @abstractmethod
     def way(self, start: Floats, end: Floats) -> Way:
-        """Return the part of the path between two parameters, each of shape (m,), to be checked for collisions."""
+        """Return the part of the path between two parameters, shape (m,), to be checked for collisions."""
 
     @property
     def whole(self) -> Way:

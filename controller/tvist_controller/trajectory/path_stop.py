@@ -77,7 +77,7 @@ class PathStop(Trajectory):
         return float(self._trajectory.at_time(min(time, self.duration))[0][0])
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the joints at k times after the start, each of shape (k, n)."""
+        """Position, velocity and acceleration of the joints at k times after the start, shape (k, n)."""
         duration, at_time, along = self.duration, self._trajectory.at_time, self.path.direction
         states = [at_time(min(time, duration)) for time in times.tolist()]
         x, xd, xdd = (np.array([state[order][0] for state in states])[:, None] * along for order in range(3))

@@ -66,10 +66,10 @@ class Way:
 def passes(
     edges: Floats, highest: Floats, p: Floats, q: Floats, known: Floats
 ) -> Floats:  # pragma: no cover  compiled
-    """Return the largest b = ṡ² at the edges, shape (c + 1,), zero at the last one; `p` and `q` as in `Cells`.
+    """Return the largest b = ṡ² at the c + 1 edges, zero at the last one; `p` and `q` as in `Cells`.
 
-    `highest` is the largest b in each of the c cells. The first edges keep their `known` values, shape (k,): only a 0
-    for a motion from rest.
+    `highest` is the largest b in each of the c cells. The first edges keep their `known` values, shape (k,):
+    only a 0 for a motion from rest.
     """
     count, rows = p.shape
     begun = len(known)
@@ -98,8 +98,8 @@ def widened(
 ) -> Floats:  # pragma: no cover  compiled
     """Return for each cell the largest value, or the lowest, of all cells that are passed within a window of time.
 
-    The window is to either side [s]; `times` are those at the edges, shape (c + 1,) [s], and `values` has a row for
-    each cell, shape (c, r).
+    The window is to either side [s]; `times` are those at the edges, shape (c + 1,) [s], and `values` has a
+    row for each cell, shape (c, r).
     """
     count, rows = values.shape
     out = values.copy()
@@ -120,8 +120,8 @@ def widened(
 def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragma: no cover  compiled
     """Let a motion go on evenly for a ramp between speeding up and braking, so that its jerk is not twice that of both.
 
-    It stays as it is up to the edge of number `known`; if it brakes there, it first goes on evenly. The ramp is in
-    seconds; `b` is ṡ² at the edges, both of shape (c + 1,).
+    It stays as it is up to the edge of number `known`; if it brakes there, it first goes on evenly. The ramp
+    is in seconds; `b` is ṡ² at the edges, both of shape (c + 1,).
     """
     out, last = b.copy(), len(b) - 1
     number = known + 1
@@ -153,9 +153,10 @@ def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragm
 class RetimedLaw:
     """The time law of a curve's parameter: the mean over `ramp` seconds of a motion with constant accelerations.
 
-    Its acceleration changes at most at the edges, shape (c + 1,), where ṡ² is `b`: 0 at the last one, and nowhere else
-    but at the first one. `rate` is that of its time relative to the clock's, above 0. `start` is the time at the first
-    edge, before the mean and at a rate of 1 [s]; if `b` is not 0 there, the motion is known only from a ramp later on.
+    Its acceleration changes at most at the edges, shape (c + 1,), where ṡ² is `b`: 0 at the last one, and
+    nowhere else but at the first one. `rate` is that of its time relative to the clock's, above 0. `start` is
+    the time at the first edge, before the mean and at a rate of 1 [s]; if `b` is not 0 there, the motion is
+    known only from a ramp later on.
     """
 
     def __init__(self, edges: Floats, b: Floats, ramp: float, rate: float = 1.0, start: float = 0.0) -> None:
@@ -248,8 +249,8 @@ def arrivals(edges: Floats, b: Floats) -> Floats:
 def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False) -> RetimedLaw:
     """Return the quickest law within the limits along a curve.
 
-    The jerk limit is that of s [1/s^3]; within the window of time a shaper mixes moments of the motion [s]. Others may
-    continue a law that `goes_on`, with its ramp.
+    The jerk limit is that of s [1/s^3]; within the window of time a shaper mixes moments of the motion [s].
+    Others may continue a law that `goes_on`, with its ramp.
     """
     lengths = np.diff(way.edges)
     b = _passed(way.edges, way.joints, way.tool, AT_REST)
@@ -268,8 +269,9 @@ def longer_law(
 ) -> RetimedLaw | None:
     """Return the quickest law that is equal to another one up to an edge, and goes on behind the end of that.
 
-    The way begins with edge `first` of the law `before`, which gives the ramp, too; up to edge `known` of the way, both
-    laws are equal. Jerk and window as in `quickest_law`. None if it cannot keep the limits from there on.
+    The way begins with edge `first` of the law `before`, which gives the ramp, too; up to edge `known` of the
+    way, both laws are equal. Jerk and window as in `quickest_law`. None if it cannot keep the limits from
+    there on.
     """
     fixed, ramp, start = before.b[first : first + known + 1], before.ramp, float(before.times[first])
     # The ramp being given, it is the acceleration that has to keep the jerk.

@@ -76,10 +76,10 @@ class Speed(Guided):
         self._most: tuple[float, ...] = (np.inf,)
 
     def aim(self, goal: Floats, *accelerations: float) -> None:
-        """Approach other velocities of the joints, shape (n,) [rad/s], or of the tool in the base frame [m/s, rad/s].
+        """Approach other velocities of the joints [rad/s], or of the tool in the base frame [m/s, rad/s].
 
-        The acceleration is that of the joint whose velocity changes most [rad/s^2]; or there are two, the tool's linear
-        [m/s^2] and angular one [rad/s^2].
+        The acceleration is that of the joint whose velocity changes most [rad/s^2]; or there are two, the
+        tool's linear [m/s^2] and angular one [rad/s^2].
         """
         self._goal, self._most = np.array(goal, dtype=float), accelerations
 

@@ -68,7 +68,7 @@ def rate_by_bend(
 @compiled_for_ticks
 def speed_step(  # noqa: C901  a kernel: its branches are loops
     chain: Floats,  # to the tool centre point; no links if the velocities are those of the joints
-    inverse: Floats,  # pseudo-inverse of the Jacobian in the middle of the tick, shape (n, 6); else the unit matrix
+    inverse: Floats,  # pseudo-inverse of the Jacobian in mid-tick, shape (n, 6); else the unit matrix
     joints: Floats,  # present positions [rad] and the step to them [rad], shape (2, n)
     velocities: Floats,  # at the beginning and the end, in the trajectory's own time, shape (2, 6) or (2, n)
     ranges: Floats,  # least and largest change of the joints' step, and largest step, shape (3, n) [rad]
@@ -80,8 +80,8 @@ def speed_step(  # noqa: C901  a kernel: its branches are loops
 ) -> tuple[int, float]:
     """Follow the mean of two velocities for a tick, at the rate that the joints' limits and their way permit.
 
-    Returns that rate at the end, and FOUND; IMPOSSIBLE if the limits do not permit it; or SINGULAR if the curvature
-    permits next to no speed.
+    Returns that rate at the end, and FOUND; IMPOSSIBLE if the limits do not permit it; or SINGULAR if the
+    curvature permits next to no speed.
     """
     rate, speed, slowest, acceleration, lag, h = given[0], given[1], given[2], given[3], given[4], given[5]
     n, straight = len(q), chain.shape[0] > 0

@@ -32,8 +32,8 @@ def hermite(
 ) -> Floats:
     """Coefficients of the polynomial of degree five with given values and first two derivatives at both ends.
 
-    The ends have the distance `length`, an array for several polynomials at once; values and derivatives have shape
-    (..., m). The coefficients are of rising powers of the distance from the start, shape (6, ..., m).
+    The ends have the distance `length`, an array for several polynomials at once; values and derivatives have
+    shape (..., m). The coefficients are of rising powers of the distance from the start, shape (6, ..., m).
     """
     h = length
     p0, v0, a0 = start
@@ -52,8 +52,8 @@ def evaluate(
 ) -> None:  # pragma: no cover  compiled
     """Evaluate a spline and its first three derivatives, shape (4, p, n), at p parameters.
 
-    The k intervals end at the knots, shape (k + 1,); beyond them the outermost polynomial continues. The coefficients
-    are of rising powers, shape (k, 6, n).
+    The k intervals end at the knots, shape (k + 1,); beyond them the outermost polynomial continues. The
+    coefficients are of rising powers, shape (k, 6, n).
     """
     last = len(knots) - 2
     joints = coefficients.shape[2]

@@ -28,7 +28,7 @@ def judge(
     now: Floats,  # result: differences, shape (4, n)
     fits: Bools,  # result: which joints fit, shape (n,)
 ) -> int:
-    """Find which joints' differences are within the limits and can stay there; return the sum of `FIT` and `FAR`."""
+    """Find which joints' differences are and can stay within limits; return the sum of `FIT` and `FAR`."""
     fastest, jerk, h = most[FASTEST], most[JERK], most[PERIOD]
     far, free = True, True
     for j in range(q.shape[0]):

@@ -87,7 +87,7 @@ def add_pairs(spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names) -> Con
 
 
 def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
-    """Give each pair of a world its spring and damper, if `add_pairs` gave it, for the masses that it has now."""
+    """Give each pair of `add_pairs` its spring and damper, for the masses that the world has now."""
     _count_turning(model)
     for number, (stiffness, damping) in enumerate(given):
         if model.pair_solimp[number][0] != IMPEDANCE:

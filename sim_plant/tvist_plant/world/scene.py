@@ -46,7 +46,7 @@ class World:
 def build(
     description: RobotDescription, payload: Payload, scene: SceneFile, timestep: float, hand: Hand | None
 ) -> World:
-    """Put an arm with its payload into a scene, whose origin is the base of the arm; with or without a gripper.
+    """Put an arm with its payload, and maybe a gripper, into a scene, whose origin is the arm's base.
 
     The time step is that of MuJoCo's integrator [s].
 
@@ -95,8 +95,8 @@ def build(
 def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody", alone: "mujoco.MjModel") -> None:
     """Mount the shapes of the scene's tool on the flange; their weight is the payload's.
 
-    The load is the body beyond the flange. In `alone`, the scene compiled, poses and sizes are numbers however the file
-    gives them.
+    The load is the body beyond the flange. In `alone`, the scene compiled, poses and sizes are numbers
+    however the file gives them.
 
     Raises:
         SceneError: It is more than shapes of primitive kinds.
