@@ -11,15 +11,13 @@ from tvist_plant.model import Floats
 
 
 @compiled
-def move(memory: Floats, q: Floats, qd: Floats, torque: Floats) -> None:
-    """Move the arm by one period, while its drives go linearly from the previous command to this one.
-
-    Args:
-        memory: Memory of the arm, see `arm_memory`.
-        q: Position q_r at the end of the period, shape (n,) [rad].
-        qd: Velocity q̇_r, shape (n,) [rad/s].
-        torque: Feed-forward torque, shape (n,) [N m].
-    """
+def move(
+    memory: Floats,  # see `arm_memory`
+    q: Floats,  # q_r at the end of the period, shape (n,) [rad]
+    qd: Floats,  # q̇_r
+    torque: Floats,  # feed-forward, shape (n,) [N m]
+) -> None:
+    """Move the arm by one period, while its drives go linearly from the previous command to this one."""
     arm = parts(memory)
     now = arm.commands[NOW]
     for j in range(q.shape[0]):
@@ -28,16 +26,14 @@ def move(memory: Floats, q: Floats, qd: Floats, torque: Floats) -> None:
 
 
 @compiled
-def evaluate(memory: Floats, out: Floats) -> bool:
-    """Compute mass matrix, bias, accelerations and measurements at the present state.
+def evaluate(
+    memory: Floats,  # its `pushed` contains the external torques at this state
+    out: Floats,
+) -> bool:
+    """Compute dynamics, accelerations and measurements at the present state; return whether it is finite.
 
-    Args:
-        memory: Memory of the arm; its `pushed` contains the external torques at this state.
-        out: Result, shape (3n+3,): joint angles read by the encoders [rad], joint velocities [rad/s], motor torques
-            [N m], and the specific force in the flange frame without noise [m/s^2].
-
-    Returns:
-        Whether the state is finite.
+    The result has shape (3n+3,): joint angles read by the encoders [rad], joint velocities [rad/s], motor
+    torques [N m], and the specific force in the flange frame without noise [m/s^2].
     """
     arm = parts(memory)
     links, n = arm.qdd.shape[0], arm.joints.shape[1]
@@ -97,17 +93,15 @@ def tick(memory: Floats, q: Floats, qd: Floats, torque: Floats, out: Floats) -> 
 
 
 @compiled_for_long
-def play(memory: Floats, commands: Floats, measured: Floats, flange: Floats) -> int:
+def play(
+    memory: Floats,
+    commands: Floats,  # rows q_r, q̇_r and τ_ff of each, shape (T, 3, n)
+    measured: Floats,  # result, as in `evaluate`, shape (T, 3n+3)
+    flange: Floats,  # result: its rotation and position after each period, shape (T, 12)
+) -> int:
     """Compute many periods of an arm on which nothing pushes, one by one as `tick` does.
 
-    Args:
-        memory: Memory of the arm.
-        commands: Rows q_r, q̇_r and τ_ff of each command, shape (T, 3, n).
-        measured: Result, as in `evaluate`, shape (T, 3n+3).
-        flange: Result: rotation and position of the flange after each period, shape (T, 12).
-
-    Returns:
-        Number of periods until the state was no longer finite; T if it always was.
+    Returns the number of periods until the state was no longer finite; T if it always was.
     """
     T: int = commands.shape[0]
     for k in range(T):

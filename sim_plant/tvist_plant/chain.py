@@ -31,18 +31,14 @@ SCRATCH = 28
 
 
 def chain_of(model: pin.Model, frame: int) -> Floats:
-    """Return the parameters of a chain as one array, shape (N+1, 22).
+    """Return the parameters of a serial chain up to a frame, by its index, as one array, shape (N+1, 22).
 
     A row has the rotation (9) and translation (3) of a joint's frame, whose z is its axis, in that of the joint before,
     and its body's ten inertial parameters in pinocchio's order [kg, kg m, kg m^2]. The last row places the frame at the
     end.
 
-    Args:
-        model: Serial chain of joints that turn about an axis of their frame.
-        frame: Index of the frame at the end.
-
     Raises:
-        ValueError: The model is no such chain.
+        ValueError: The model is no chain of joints that turn about an axis of their frame.
     """
     links = model.nv
     chain = np.zeros((links + 1, WIDTH))
@@ -172,14 +168,9 @@ def momentum(I: Floats, V: Floats) -> tuple[float, float, float, float, float, f
 def sweep(chain: Floats, q: Floats, qd: Floats, qdd: Floats, gravity: float, scratch: Floats) -> None:
     """Compute twist, inertia, velocity and force of each body, from the base to the end.
 
-    Args:
-        chain: Parameters, see `chain_of`.
-        q: Angles, shape (N,) [rad].
-        qd: Velocities, shape (N,) [rad/s].
-        qdd: Accelerations, shape (N,) [rad/s^2].
-        gravity: g [m/s^2].
-        scratch: Result: in each row the twist S (6), inertia (10), velocity V (6) and force F (6); in the last row, the
-            acceleration of the last body instead of a force, shape (N+1, 28).
+    The result is in the scratch, shape (N+1, 28): in each row the twist S (6), inertia (10), velocity V (6)
+    and force F (6); in the last row, the acceleration of the last body instead of a force. The angles and
+    their rates have shape (N,).
     """
     R, o, A = np.empty((3, 3)), np.empty(3), np.empty(6)
     start(R, o)

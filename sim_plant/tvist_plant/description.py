@@ -127,12 +127,7 @@ _RELATIONS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less th
 
 
 def _in_words(error: msgspec.ValidationError, content: Any) -> str:
-    """Return a message with the key, the value and the permitted values.
-
-    Args:
-        error: Error raised by msgspec.
-        content: Content that was checked.
-    """
+    """Return msgspec's message about a content, with the key, the value and the permitted values."""
     said, _, path = str(error).partition(" - at `$")
     key = path.rstrip("`").removeprefix(".")
     value = content

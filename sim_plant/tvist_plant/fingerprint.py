@@ -23,13 +23,7 @@ def fingerprint(description: RobotDescription) -> str:
     """Return a fingerprint of everything that affects vibration: geometry, masses, springs, dampers and drive gains.
 
     Names, limits, poses, collision bodies, sensors and the payload are left out; a calibration itself contains the
-    payload that it was measured with.
-
-    Args:
-        description: The robot.
-
-    Returns:
-        16 hexadecimal digits, equal for equal numbers on every machine.
+    payload that it was measured with. The 16 hexadecimal digits are equal for equal numbers on every machine.
     """
     drives = description.drives
     parts = (

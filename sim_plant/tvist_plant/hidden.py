@@ -30,14 +30,10 @@ CENTRE: Final = 0.015
 
 
 def hidden(description: RobotDescription, seed: int) -> RobotDescription:
-    """Draw the robot that stands behind a robot file; its kinematics, masses, limits and sensors are the file's.
+    """Draw the robot behind a robot file, which is all that a controller knows, by a seed of at least 0.
 
-    Args:
-        description: The robot file, which is all that a controller knows.
-        seed: Seed of the draw, at least 0.
-
-    Returns:
-        The same arm with other springs, dampers, loops, rotors and friction.
+    Its springs, dampers, loops, rotors and friction differ; kinematics, masses, limits and sensors are the
+    file's.
     """
     random = np.random.default_rng([seed, 53])
 
@@ -59,11 +55,9 @@ def hidden(description: RobotDescription, seed: int) -> RobotDescription:
 
 
 def hidden_payload(declared: Payload, seed: int) -> Payload:
-    """Return what a hidden robot carries when somebody says that it carries a payload.
+    """Return what a hidden robot carries when somebody says that it carries a payload; nothing stays nothing.
 
-    Args:
-        declared: The payload as it is told; nothing stays nothing.
-        seed: Seed of the draw, at least 0: the same seed gives the same error each time.
+    The same seed, at least 0, gives the same error each time.
     """
     if declared.mass == 0.0:
         return declared

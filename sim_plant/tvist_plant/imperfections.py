@@ -165,11 +165,7 @@ class GearLaw:
         )
 
     def twist(self, torque: Floats) -> Floats:
-        """Angle by which each gear is twisted under a steady torque, without hysteresis, shape (n,) [rad].
-
-        Args:
-            torque: Torque that the gears transmit, shape (n,) [N m].
-        """
+        """Angle by which each gear is twisted under a steady torque [N m], without hysteresis [rad]."""
         if not self.softness.any() and not self.backlash.any():
             return torque / self.stiffness
         soft = self.stiffness - self.softness

@@ -157,9 +157,7 @@ def factorise(arm: ArmMemory, h: float) -> None:
 def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0915 - one kernel: its branches are the loops over rows and joints
     """Advance the state in place by one period; afterwards the LAST entries contain those of the present tick.
 
-    Args:
-        arm: The arm; its state, and the LAST entries of commands and dynamics are changed.
-        head: Single numbers at the front of its memory.
+    Commands and dynamics have LAST entries; the head has the single numbers at the front of the arm's memory.
     """
     n, links = arm.joints.shape[1], arm.qdd.shape[0]
     size, period, substeps = links + n, head[PERIOD], int(head[SUBSTEPS])
@@ -229,9 +227,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0915 - one 
 def balance(arm: ArmMemory, moment: Floats) -> None:
     """Link accelerations and motor torques at a state, from the present commands and dynamics.
 
-    Args:
-        arm: The arm; its `qdd` is changed.
-        moment: Motor torques, shape (n,) [N m].
+    The former become the arm's `qdd`; the latter, `moment`, have shape (n,) [N m].
     """
     n, links, qdd = arm.joints.shape[1], arm.qdd.shape[0], arm.qdd
     y, v, _, s, z = rows(arm.state, n)

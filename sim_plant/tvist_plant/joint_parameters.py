@@ -77,12 +77,8 @@ def packed(
 ) -> Floats:
     """Return one array of all parameters, one row each in the order of `JointParameters`, shape (19, n).
 
-    Args:
-        joints: Indices of the joints among the links, shape (n,).
-        linear: Gains and rotors.
-        nonlinear: Friction and gear errors.
-        law: Imperfections of friction and gears.
-        gear_phase: Phase of each gear's error, shape (n,) [rad].
+    The joints are given by their indices among the links, each gear's error by its phase [rad], both of shape
+    (n,).
     """
     rows = {
         "rotor_inertia": linear.rotor_inertia,

@@ -72,11 +72,8 @@ def flexible_model(
 ) -> FlexibleModel:
     """Create the model of the arm with links that bend.
 
-    Args:
-        description: The robot.
-        payload: Carried payload.
-        torsion: Stiffness of each link that bends against twisting about the line along x through its centre
-            of mass; None if it does not [N m/rad].
+    They also twist about the line along x through their centre of mass, with the stiffness `torsion`
+    [N m/rad]; None: they do not.
     """
     flexibility = description.link_flexibility
     stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))

@@ -28,16 +28,10 @@ class Modes:
 
 
 def modes(flexible: FlexibleModel, linear: LinearPart, description: RobotDescription, q: Floats) -> Modes:
-    """Linearise the closed loop at rest and solve its eigenvalue problem.
+    """Linearise the closed loop at rest, at link angles of shape (N,) [rad], and solve its eigenvalue problem.
 
     With z = (y, ẏ, s), y = (q, θ): M_b ÿ = -(K + ∂g/∂q) y - D ẏ + K_d K_p K_i s and ṡ = -θ. A complex pair
-    λ = -σ ± iω gives f_d = ω/2π and ζ = σ/|λ|.
-
-    Args:
-        flexible: The arm.
-        linear: Stiffness, damping and gains.
-        description: The robot, for the feed-forward.
-        q: Link angles, shape (N,) [rad].
+    λ = -σ ± iω gives f_d = ω/2π and ζ = σ/|λ|. The description is that of the feed-forward.
     """
     links, n = flexible.model.nv, len(flexible.joints)
     size = links + n

@@ -27,11 +27,7 @@ class _Wrench:
 
 
 class Outside:
-    """Torques and wrenches that act on an arm until they are changed.
-
-    Args:
-        flexible: The arm.
-    """
+    """Torques and wrenches that act on an arm until they are changed."""
 
     def __init__(self, flexible: FlexibleModel) -> None:
         self._flexible = flexible
@@ -86,11 +82,7 @@ class Outside:
         return self._torque is None and not self._wrenches
 
     def generalized_force(self, q: Floats) -> Floats:
-        """Return the sum of all torques and wrenches, as torques on all N links, shape (N,) [N m].
-
-        Args:
-            q: Angles of the links, shape (N,) [rad].
-        """
+        """Return the sum of all torques and wrenches as torques on all N links, shape (N,) [N m]."""
         sum_ = np.zeros(self._flexible.model.nv)
         if self._torque is not None:
             sum_[self._flexible.joints] = self._torque

@@ -6,13 +6,9 @@ from tvist_plant.model import Floats
 
 
 class Accelerometer:
-    """Three-axis specific force in the flange frame with white noise.
+    """Three-axis specific force in the flange frame with white noise, rms per axis [m/s^2].
 
-    At rest it reads the reaction to gravity: 9.81 m/s² pointing up.
-
-    Args:
-        noise: Noise, rms per axis [m/s^2].
-        seed: Seed of the noise; equal seeds give equal noise.
+    Equal seeds give equal noise. At rest it reads the reaction to gravity: 9.81 m/s² pointing up.
     """
 
     def __init__(self, noise: float, seed: int) -> None:
@@ -47,12 +43,9 @@ class Accelerometer:
 
 
 class ForceSensor:
-    """Force and torque in the flange with white noise and a constant error, which the seed draws.
+    """Force and torque in the flange with white noise and a constant error; equal seeds give equal readings.
 
-    Args:
-        noise: rms of force [N] and torque [N m].
-        offset: Largest constant error of each.
-        seed: Seed of both; equal seeds give equal readings.
+    The noise is the rms of force [N] and torque [N m], the offset the largest constant error of each.
     """
 
     def __init__(self, noise: tuple[float, float], offset: tuple[float, float], seed: int) -> None:

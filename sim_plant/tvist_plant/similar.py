@@ -81,12 +81,7 @@ def counterpart(joint: int, joints: int) -> int:
 
 
 class Scale:
-    """Ratios of an arm to the UR5e.
-
-    Args:
-        kinematics: The arm's links.
-        torque: Largest torque of each joint, shape (n,) [N m].
-    """
+    """Ratios of an arm to the UR5e, by its links and the largest torque of each joint, shape (n,) [N m]."""
 
     def __init__(self, kinematics: Kinematics, torque: Sequence[float]) -> None:
         measured = _measured()
@@ -179,11 +174,9 @@ def completed(content: Mapping[str, Any]) -> dict[str, Any]:
 def with_limits(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the content of a robot file with what a URDF lacks: further limits, payload, sensors and poses.
 
-    The payload is the UR5e's, scaled as a weight at the arm's end that loads the second joint as much; accelerations
-    and repeatability scale with the length.
-
-    Args:
-        content: A robot file of an arm with at least one joint, whose `limits` has position, velocity and torque.
+    The payload is the UR5e's, scaled as a weight at the arm's end that loads the second joint as much;
+    accelerations and repeatability scale with the length. The arm has at least one joint, and `limits`
+    position, velocity and torque.
     """
     known, given = _measured(), content["limits"]
     scale = Scale(msgspec.convert(content["kinematics"], Kinematics), given["torque"])

@@ -302,9 +302,7 @@ def _meshes(number: int, link: Element, frame: pin.SE3, path: Path, here: str) -
 def mesh_file(name: str, urdf: Path) -> Path:
     """Return where a mesh's file is, as far as that can be known without ROS: beside its package's folder.
 
-    Args:
-        name: Name in the URDF: `package://PACKAGE/...`, `file://...` or a path from the URDF's folder.
-        urdf: The URDF file.
+    Its name in the URDF is `package://PACKAGE/...`, `file://...` or a path from the URDF's folder.
     """
     folder = urdf.resolve().parent
     if not name.startswith("package://"):

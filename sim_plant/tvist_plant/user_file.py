@@ -28,12 +28,7 @@ Content = TypeVar("Content")
 
 
 def named(error: BaseException, said: str | None = None) -> str:
-    """Return an exception in one line: its type, and its message if it has one.
-
-    Args:
-        error: The exception.
-        said: What to say instead of its message.
-    """
+    """Return an exception in one line: its type, and its message or what is said instead."""
     words = one_line(str(error) if said is None else said)
     return f"{type(error).__name__}: {words}" if words else type(error).__name__
 
@@ -49,11 +44,7 @@ class UserFileError(ValueError):
 
 
 def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
-    """Read a file that a user has named.
-
-    Args:
-        path: Path of the file.
-        what: Kind of file, for the message: "robot file".
+    """Read a file that a user has named; messages say what kind of file it is, "robot file".
 
     Raises:
         UserFileError: The file is not a regular file, or larger than `LARGEST`.
@@ -168,12 +159,7 @@ def check_is_file(path: str | os.PathLike[str], what: str) -> None:
 
 
 def parsed(path: str | os.PathLike[str], what: str, parse: Callable[[], Content]) -> Content:
-    """Parse a file with a parser that checks the depth itself.
-
-    Args:
-        path: Path of the file.
-        what: Kind of file, for the message.
-        parse: Function that parses it.
+    """Parse a file with a parser that checks the depth itself; messages say what kind of file it is.
 
     Raises:
         UserFileError: The content is nested more deeply than the parser supports.

@@ -242,11 +242,7 @@ def softer_and_stiffer(
 ) -> RobotDescription:
     """Return an arm with each gear, link and gain of the drives' loops changed by a share, up or down at random.
 
-    Args:
-        description: The arm.
-        share: The share [-].
-        seed: Seed of the signs.
-        names: What is changed of the drives.
+    The seed is that of the signs; the names say what is changed of the drives.
     """
     random = np.random.default_rng(seed)
 

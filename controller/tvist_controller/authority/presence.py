@@ -10,12 +10,7 @@ class Presence:
         self._sessions: dict[str, set[str]] = {}
 
     def seen(self, client: str, session: str) -> None:
-        """Note that a client's liveliness token has appeared.
-
-        Args:
-            client: Name of the client.
-            session: Session that declared the token; empty if the token does not name it.
-        """
+        """Note that a client's liveliness token has appeared; the session is empty if it names none."""
         self._sessions.setdefault(client, set()).add(session)
 
     def gone(self, client: str, session: str) -> None:

@@ -22,17 +22,15 @@ def _check_version(command: TakeControl | TakeClock, _: RobotDescription) -> Non
 
 
 class Authority(Session):
-    """The lease of a robot, with which motion ends, and the right to advance time.
-
-    Args:
-        interrupt: Ends motion; takes the reason.
-        emit: Emits events.
-        realtime: Whether time passes by itself, so that a lease times out and no client may advance time.
-        instance: See `Session`.
-    """
+    """The lease of a robot, with which motion ends, and the right to advance time."""
 
     def __init__(
-        self, interrupt: Callable[[str], None], emit: Emit, *, realtime: bool, instance: str = ""
+        self,
+        interrupt: Callable[[str], None],  # ends motion, for a reason
+        emit: Emit,
+        *,
+        realtime: bool,  # whether time passes by itself: leases time out, and no client may advance time
+        instance: str = "",  # see `Session`
     ) -> None:
         super().__init__(timeouts=realtime, instance=instance)
         self.stepping = ClockLease()

@@ -64,12 +64,10 @@ def check_free(lease: Lease | None, client: str) -> None:
 
 
 class Session:
-    """One lease at a time.
+    """One lease at a time; it ends by itself, but in lockstep nothing times out.
 
-    Args:
-        timeouts: Whether a lease ends by itself; in lockstep nothing times out.
-        instance: Part of every token, different after each restart, so that no token of before is valid again; empty
-            where equal runs have to give equal tokens.
+    The instance is part of every token, different after each restart, so that no token of before is valid
+    again; empty where equal runs have to give equal tokens.
     """
 
     def __init__(self, *, timeouts: bool, instance: str = "") -> None:
@@ -80,13 +78,9 @@ class Session:
         self._ends = math.inf
 
     def take(self, client: str, seconds: float, now: float, session: str | None = None) -> Lease:
-        """Give control to a client; one that already has it gets a new lease.
+        """Give control to a client for so many seconds; one that already has it gets a new lease.
 
-        Args:
-            client: Name of the client.
-            seconds: Duration of the lease without renewal [s].
-            now: Time [s].
-            session: Session whose end ends the lease; None if its end will not be reported.
+        The end of the session ends the lease; None if its end will not be reported.
 
         Raises:
             NoControlError: Another client has control.
@@ -106,13 +100,7 @@ class Session:
         return lease
 
     def hand_over(self, client: str, now: float, session: str | None = None) -> None:
-        """Reserve the lease for another client from now on, which only has to take it.
-
-        Args:
-            client: Name of the other client.
-            now: Time [s].
-            session: Session of the client, see `take`.
-        """
+        """Reserve the lease for another client, which only has to take it; the session is as in `take`."""
         if self.lease is not None:
             self.lease = self._grant(client, self.lease.seconds, now, session)
 

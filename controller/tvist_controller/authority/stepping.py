@@ -90,9 +90,7 @@ class ClockLease:
     def take(self, client: str, session: str | None = None) -> ClockHold:
         """Give the clock to a client; one that already holds it gets a new token.
 
-        Args:
-            client: Name of the client.
-            session: Session whose end ends the hold; None if its end will not be reported.
+        The end of the session ends the hold; None if its end will not be reported.
 
         Raises:
             NoControlError: Another client holds it.

@@ -19,16 +19,10 @@ def available() -> tuple[str, ...]:
 
 @cache
 def default_for(model: str) -> str | None:
-    """Name of the calibration that a robot uses unless another one is named.
+    """Name of the calibration that a robot uses unless another one is named; None if there is none.
 
     It is the first, by name, of those that come with the package, are for this model and have the paper's polynomials;
     if none has them, the first for this model.
-
-    Args:
-        model: The robot's model.
-
-    Returns:
-        The name; None if the package has no calibration for this model.
     """
     own = [name for name in available() if load(name).robot == model]
     return next((name for name in own if load(name).polynomial is not None), own[0] if own else None)

@@ -27,15 +27,9 @@ MODES = 4
 def modal_estimator(
     calibration: Calibration, description: RobotDescription, payload: Payload, modes: int = MODES
 ) -> Modal:
-    """Return an estimator of the arm's modes; of the robot file it uses masses and geometry, never springs or drives.
+    """Return an estimator of the arm's lowest modes; it uses no springs or drives of the robot file.
 
     This takes less than a millisecond, so a payload can be declared between two ticks.
-
-    Args:
-        calibration: Calibration of this arm, with a modal model.
-        description: The robot.
-        payload: Payload that the arm is assumed to carry.
-        modes: Number of modes, the lowest first.
 
     Raises:
         EstimatorError: The calibration has no modal model, belongs to another arm, or does not contain each parameter

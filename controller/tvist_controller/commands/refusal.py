@@ -30,12 +30,7 @@ class RefusalError(Exception):
 
 
 def out_of_turn(command: str, activity: Activity) -> RefusalError:
-    """Return the refusal of a command that is not allowed in the current activity.
-
-    Args:
-        command: `type` of the command.
-        activity: Current activity of the robot.
-    """
+    """Return the refusal of a command, by its `type`, that is not allowed in the current activity."""
     code: Code = "wrong_mode"
     if activity is Activity.PROTECTIVE_STOPPING:
         why = "safety_mode is PROTECTIVE_STOP: send unlock_protective_stop once the arm is at rest"

@@ -52,16 +52,13 @@ Planned = Callable[[PayloadLesson, Beliefs], Any]
 
 
 class Experience:
-    """What a robot makes of its motions.
-
-    Args:
-        students: Who studies each motion, in this order.
-        later: Has a study made beside the ticks.
-        plan: Plans what a lesson changes, next to its study; None if that is planned in the tick that takes it.
-    """
+    """What a robot makes of its motions, each of which the students study in their order."""
 
     def __init__(
-        self, students: Sequence[Student], later: Later = at_once, plan: Planned | None = None
+        self,
+        students: Sequence[Student],
+        later: Later = at_once,  # has a study made beside the ticks
+        plan: Planned | None = None,  # of what a lesson changes; None: in the tick that takes it
     ) -> None:
         self._recorder = MotionRecorder()
         self._students, self._later, self._plan = students, later, plan
@@ -73,19 +70,12 @@ class Experience:
     def watch(
         self,
         sample: Sample,
-        beliefs: Callable[[], Beliefs],
+        beliefs: Callable[[], Beliefs],  # what the controller takes the arm for
         *,
-        held: bool,
-        placements: int,
+        held: bool,  # whether the drives hold the arm
+        placements: int,  # number of times that the arm was put somewhere, see `ControlCycle`
     ) -> None:
-        """Take a tick.
-
-        Args:
-            sample: Its signals.
-            beliefs: Returns what the controller takes the arm for.
-            held: Whether the drives hold the arm.
-            placements: Number of times that the arm was put somewhere, see `ControlCycle`.
-        """
+        """Take a tick."""
         recorder = self._recorder
         if placements != self._placements:
             self._placements = placements
@@ -135,14 +125,7 @@ class Experience:
 def experience_of(
     setup: Setup, students: Sequence[Student] = (), later: Later = at_once, plan: Planned | None = None
 ) -> Experience | None:
-    """Return what a robot makes of its motions; None if nobody studies them.
-
-    Args:
-        setup: The robot's setup.
-        students: Who studies them besides those that the setup asks for.
-        later: Has a study made beside the ticks.
-        plan: Plans what a lesson changes, see `Experience`.
-    """
+    """Return what a robot makes of its motions, with further students; None if nobody studies them."""
     own = [PayloadStudent(setup.description)] if setup.adapt == "payload" else []
     everyone = [*own, *students]
     return Experience(everyone, later, plan) if everyone else None

@@ -85,14 +85,10 @@ class MotionRecorder:
         return not self._moves or self._stop > 0
 
     def take(self, sample: Sample, beliefs: Beliefs | None = None) -> Recorded | None:
-        """Take a tick.
+        """Take a tick in which the drives hold or move the arm; return the motion that is complete with it.
 
-        Args:
-            sample: Signals of the tick, in which the drives hold or move the arm.
-            beliefs: What the controller takes the arm for; used at the beginning of a motion only.
-
-        Returns:
-            The motion that is complete with this tick, or that the next one has cut short; None if there is none.
+        That may be one that the next one has cut short; None if there is none. What the controller takes the
+        arm for is used at the beginning of a motion only.
         """
         resting, done = sample.mode.at_rest, None
         if not resting and self.begins:

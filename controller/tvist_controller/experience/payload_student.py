@@ -170,8 +170,7 @@ class Equations:
     def solve(self, prior: Estimate) -> Estimate | None:
         """Return mass and centre of mass; None if something else pushed the arm, or a value is missing.
 
-        Args:
-            prior: What is known without the motion; its `x` is `at`.
+        The prior is what is known without the motion; its `x` is `at`.
         """
         if not (np.isfinite(self.rows).all() and np.isfinite(self.measured).all()):
             return None

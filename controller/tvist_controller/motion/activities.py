@@ -25,23 +25,13 @@ _RUNTIME = {
 
 
 def runtime_of(activity: Activity, *, slowing: bool) -> RuntimeState:
-    """Return the runtime state, which says whether something moves.
-
-    Args:
-        activity: What the robot is doing.
-        slowing: Whether a paused motion has not yet come to a standstill.
-    """
+    """Return the runtime state, which says whether something moves; a paused motion may still be slowing."""
     state = _RUNTIME.get(activity, RuntimeState.STOPPED)
     return RuntimeState.PAUSING if state is RuntimeState.PAUSED and slowing else state
 
 
 def at_rest(activity: Activity, *, emergency: bool) -> Activity:
-    """Return the activity of a robot whose arm was placed somewhere else at rest.
-
-    Args:
-        activity: Previous activity.
-        emergency: Whether an emergency stop is pressed.
-    """
+    """Return the activity of a robot whose arm was placed at rest, in an emergency stop or not."""
     if activity.protective:
         return Activity.PROTECTIVE_STOP
     if activity is Activity.BRAKING or (emergency and activity.moving):

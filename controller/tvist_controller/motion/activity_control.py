@@ -21,7 +21,7 @@ from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.activities import PUT, runtime_of
 from tvist_controller.motion.arm_power import ArmPower
-from tvist_controller.motion.motion_numbers import Motions
+from tvist_controller.motion.motions import Motions
 from tvist_controller.motion.safety_system import SafetySystem
 from tvist_controller.motion.streaming import Streaming
 from tvist_controller.planning.move_planner import PlannedMove
@@ -224,10 +224,8 @@ class MotionControl:
     def stop(self, deceleration: float | None, why: str, code: Code | None = None) -> None:
         """Stop without the filter, and report how the present motion ended.
 
-        Args:
-            deceleration: Requested limit [rad/s^2]; None for what the torque permits.
-            why: The reason, for people.
-            code: The reason, for programs.
+        The reason is given for people and as a code for programs. The deceleration is a limit [rad/s^2]; None
+        for what the torque permits.
         """
         self.end("stop", why, code, deceleration)
 
@@ -247,13 +245,7 @@ class MotionControl:
     ) -> None:
         """Carry out a trigger's transition, and stop any motion. Nothing happens if the trigger leads nowhere.
 
-        Args:
-            trigger: Trigger of the table of transitions.
-            why: The reason, for people.
-            code: The reason, for programs.
-            deceleration: Requested limit [rad/s^2]; None for what the torque permits.
-            kind: Kind of the event that reports the stop; None for no event.
-            category: Category of the stop.
+        An event of the kind reports the stop; None for no event. The other arguments are those of `stop`.
         """
         target = after(self.activity, trigger)
         if target is None:

@@ -16,14 +16,7 @@ from tvist_shaping.base import Filter
 
 
 class Filters:
-    """The control line's filter.
-
-    Args:
-        motion: The robot's motion, which a new filter must not spoil; it contains the control line.
-        source: Source of the modes of the line's first filter.
-        declared: Declared payload.
-        emit: Emits events.
-    """
+    """The control line's filter; a new one must not spoil the robot's motion."""
 
     def __init__(self, motion: MotionControl, source: ModeSource, declared: Payload, emit: Emit) -> None:
         self._motion, self._cycle, self._emit = motion, motion.cycle, emit
@@ -64,10 +57,8 @@ class Filters:
     def declare(self, payload: Payload, tvist: Filter | None, *, found: bool = False) -> None:
         """Take another payload into account, which may change the arm's modes.
 
-        Args:
-            payload: The payload.
-            tvist: Filter for it; None if its modes are not known to differ.
-            found: Whether the robot has found it; otherwise it is declared.
+        The filter is None if its modes are not known to differ. The robot has `found` the payload, or it is
+        declared.
         """
         self._declared = payload
         self._given = self._given if found else payload

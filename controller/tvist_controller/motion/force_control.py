@@ -60,13 +60,7 @@ class Forces(Protocol):
 
 
 class ForceControl(Monitor):
-    """Begins and ends force mode, and watches the limits that go with it.
-
-    Args:
-        guidance: Guided motions.
-        forces: The force at the tool.
-        timeouts: See `ExternalSensor`.
-    """
+    """Begins and ends force mode, and watches its limits; `timeouts` as in `ExternalSensor`."""
 
     def __init__(self, guidance: Guidance, forces: Forces, *, timeouts: bool) -> None:
         self.guidance = self._guidance = guidance
@@ -101,11 +95,8 @@ class ForceControl(Monitor):
     def begin(self, task: ForceTask, feature: Feature, kind: int, trigger: str = "force_mode") -> int:
         """Control the force at the tool from now on, and return the motion's number; what moves goes on in other axes.
 
-        Args:
-            task: What is to be reached.
-            feature: The frame of the task.
-            kind: 1 to 3, see `frame_of`.
-            trigger: `force_mode`, or `freedrive`, in which the arm is moved by hand.
+        The feature is the frame of the task; the kind is 1 to 3, see `frame_of`. The trigger is `force_mode`,
+        or `freedrive`, in which the arm is moved by hand.
 
         Raises:
             RefusalError: The present activity does not allow it, or its motion cannot be taken over.
@@ -150,8 +141,7 @@ class ForceControl(Monitor):
     def touched(self, direction: Sequence[float]) -> int:
         """Return the number of ticks since just before the tool touched something; 0 if it does not.
 
-        Args:
-            direction: Direction in which it meets that, base frame, shape (3,); zeros for any.
+        The direction is that in which it meets that, in the base frame, shape (3,); zeros for any.
         """
         estimated = self._cycle.sample.wrench is None
         if self._contact is None:

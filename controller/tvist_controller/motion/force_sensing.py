@@ -41,10 +41,8 @@ class ContactWatch:
     def steps(self, direction: Sequence[float], threshold: float, sure: int) -> int:
         """Return the number of ticks since just before a contact began; 0 if there is none.
 
-        Args:
-            direction: Direction in which the tool meets what it touches, base frame; zeros for any.
-            threshold: Force from which on something touches the tool [N].
-            sure: Ticks whose mean must exceed it.
+        The tool meets what it touches in a direction of the base frame, zeros for any. The mean force of
+        `sure` ticks must exceed the threshold [N].
         """
         self._asked = REMEMBERED
         if self._usual is None:
@@ -58,11 +56,7 @@ class ContactWatch:
 
 
 class ExternalSensor:
-    """Takes the place of the arm's own sensor while it is used and not silent.
-
-    Args:
-        timeouts: Whether it may fall silent; in lockstep nothing times out.
-    """
+    """Takes the place of the arm's own sensor while it is used and not silent; in lockstep it never is."""
 
     def __init__(self, *, timeouts: bool) -> None:
         self._most = round(SILENT / PERIOD) if timeouts else np.inf
@@ -72,10 +66,9 @@ class ExternalSensor:
         self._age = 0
 
     def use(self, offset: Sequence[float] | None) -> None:
-        """Use it from now on; None: no more, and what it told does not count any longer.
+        """Use it from now on, at an offset from the flange, in its frame, shape (3,) [m].
 
-        Args:
-            offset: Where it measures, in the flange frame, shape (3,) [m].
+        None: no more, and what it told does not count any longer.
         """
         self._offset, self.latest = offset, None if offset is None else self.latest
 

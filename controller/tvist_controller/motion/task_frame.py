@@ -19,10 +19,9 @@ def frame_of(feature: Feature, kind: int) -> Callable[[tuple[Floats, Floats], Fl
 
     Its arguments are the tool's pose, as rotation matrix and position, and its velocity, shape (3,) [m/s].
 
-    Args:
-        feature: The frame.
-        kind: 2 for axes that stay as the frame's. With 1, the frame is turned so that its y axis points from the tool
-            to the frame's origin; with 3, so that its x axis is the tool's velocity projected into its x-y plane.
+    With kind 2 the axes stay as the frame's. With 1, the frame is turned so that its y axis points from the
+    tool to the frame's origin; with 3, so that its x axis is the tool's velocity projected into its x-y
+    plane.
     """
     if feature == "tool":
         return lambda pose, _: pose[0]

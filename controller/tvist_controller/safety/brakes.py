@@ -15,7 +15,7 @@ LONGEST = 5.0
 
 
 def brake(description: RobotDescription, carried: Payload, state: Target, period: float) -> Known:
-    """Simulate the rigid arm under its brakes.
+    """Simulate the rigid arm under its brakes, from a state of motion, in ticks of `period` seconds.
 
     Each joint is slowed down by the torque of its brake, which is taken to be as large as its drive's; once at rest,
     it stays there. The rotors turn along:
@@ -23,12 +23,6 @@ def brake(description: RobotDescription, carried: Payload, state: Target, period
         (M(q) + B) q̈ + C(q, q̇) q̇ + g(q) = -τ_b sgn(q̇)    over the joints that still turn.
 
     Brakes do not follow a path, so the arm leaves the path that it was on.
-
-    Args:
-        description: The robot.
-        carried: Payload of the arm.
-        state: Initial state of motion.
-        period: Tick [s].
     """
     model = rigid_model(description, Payload())
     if carried.mass > 0.0:

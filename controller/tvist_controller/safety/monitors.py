@@ -28,12 +28,7 @@ def exceeds(values: Floats, limits: Floats) -> bool:
 
 
 class Overload(Monitor):
-    """Finds a joint whose drive has exceeded its torque limit for longer than `ALLOWED`.
-
-    Args:
-        joints: Names of the joints.
-        limits: Largest torque of each joint, shape (n,) [N m].
-    """
+    """Finds a joint whose drive has exceeded its torque limit [N m] for longer than `ALLOWED`."""
 
     needs: ClassVar = "drives"
 

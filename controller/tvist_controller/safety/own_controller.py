@@ -133,16 +133,7 @@ class Watching(RemoteStatus):
 
 
 class Supervision(RemoteStatus):
-    """Follows one such robot.
-
-    Args:
-        plant: The robot.
-        motion: The motion of our control line.
-        safety: Our safety system.
-        peripherals: See `RemoteStatus`.
-        set_tcp: See `RemoteStatus`.
-        emit: See `RemoteStatus`.
-    """
+    """Follows one such robot; motion and safety are those of our control line."""
 
     def __init__(
         self,

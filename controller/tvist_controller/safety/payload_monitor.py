@@ -43,29 +43,17 @@ def add(total: Floats, moment: Floats, expected: Floats) -> None:
 
 @compiled_for_ticks
 def correlate(
-    chain: Floats,
-    q: Floats,
+    chain: Floats,  # of which only the kilogram has mass, see `tvist_plant.chain`, shape (n+1, 22)
+    q: Floats,  # shape (n,) [rad]
     qd: Floats,
     qdd: Floats,
-    scratch: Floats,
-    friction: Floats,
-    feedback: Floats,
-    fade: Floats,
-    sums: Floats,
+    scratch: Floats,  # shape (n+1, 28)
+    friction: Floats,  # F of each joint, shape (n,) [N m]
+    feedback: Floats,  # sum of r over `EVERY` ticks, shape (n,) [N m]; set to zero
+    fade: Floats,  # what is left of each memory after these ticks, shape (2,) [-]
+    sums: Floats,  # yᵀ W y [1/kg²], yᵀ W r and φ Σ |y_j| W_j F_j [1/kg] in each memory, shape (3, 2); changed
 ) -> None:
-    """Compare the feedback of the drives with the torques that a kilogram needs, y.
-
-    Args:
-        chain: Links of which only the kilogram has mass, see `tvist_plant.chain`, shape (n+1, 22).
-        q: Angles, shape (n,) [rad].
-        qd: Velocities, shape (n,) [rad/s].
-        qdd: Accelerations, shape (n,) [rad/s^2].
-        scratch: Scratch, shape (n+1, 28).
-        friction: F of each joint, shape (n,) [N m].
-        feedback: Sum of r over `EVERY` ticks, shape (n,) [N m]; set to zero.
-        fade: What is left of each memory after these ticks, shape (2,) [-].
-        sums: yᵀ W y [1/kg²], yᵀ W r [1/kg] and φ Σ |y_j| W_j F_j [1/kg] in each memory, shape (3, 2); changed.
-    """
+    """Compare the feedback of the drives with the torques that a kilogram needs, y."""
     per_kg = np.empty(q.shape[0])
     torques(chain, q, qd, qdd, GRAVITY, scratch, per_kg)
     square = product = bound = 0.0
@@ -125,11 +113,6 @@ class PayloadMonitor(Monitor):
 
     A robot that follows its payload finds it after a motion by itself. There the warning waits as long as that may
     still come, see `Patience`, and is about the payload that is assumed. So there is one verdict at a time.
-
-    Args:
-        description: The robot.
-        declared: Declared payload.
-        follows: Whether the robot follows its payload.
     """
 
     needs: ClassVar = "drives alone"  # else what the tool touches would be taken for a payload
@@ -157,10 +140,8 @@ class PayloadMonitor(Monitor):
     def declare(self, payload: Payload, *, found: bool = False, told: bool = False) -> None:
         """Set another payload: discard past measurements, and wait until it is fully phased in.
 
-        Args:
-            payload: What is declared or, if the robot has found it, assumed.
-            found: Whether the robot has found it.
-            told: Whether a warning has told already that the arm carries something else.
+        If the robot has `found` it, it is assumed, not declared; `told` says whether a warning has told
+        already that the arm carries something else.
         """
         self.payload = payload
         self._called = "assumed" if found else "declared"

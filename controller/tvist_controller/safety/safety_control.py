@@ -46,11 +46,7 @@ class SafetyControl:
         self._emit("warning", why=f"safety_mode is {motion.safety_mode.name}: speed is {share}")
 
     def safeguard(self, *, stopped: bool) -> None:
-        """Stop with category 2, or allow motion again: a motion pauses and later resumes, a stream ends.
-
-        Args:
-            stopped: Whether the safeguard requests the stop.
-        """
+        """Stop with category 2, or allow motion again: a motion pauses and later resumes, a stream ends."""
         motion, system = self._motion, self._motion.safety
         if stopped == system.safeguard:
             return
@@ -98,10 +94,7 @@ class SafetyControl:
     # ------------------------------------------------------------------ power, brakes and protective stops
 
     def power_on(self, *, release_brakes: bool = True) -> None:
-        """Power the arm and release its brakes.
-
-        Args:
-            release_brakes: False to leave the brakes of an arm without power closed.
+        """Power the arm and release its brakes; those of an arm without power may stay closed.
 
         Raises:
             RefusalError: The arm is moving, is in a protective stop, or does not tell where it stands.
@@ -142,9 +135,7 @@ class SafetyControl:
     def cut_power(self, why: str, latched: Latched | None = None) -> None:
         """Stop with category 0: the power is off, and the brakes close at once.
 
-        Args:
-            why: The reason, for people.
-            latched: Violation or fault that the safety system latches until it is restarted; None if there is none.
+        The safety system latches a violation or fault until it is restarted.
         """
         motion, cycle, plan = self._motion, self._motion.cycle, None
         if latched is not None:

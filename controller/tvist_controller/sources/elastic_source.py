@@ -16,11 +16,6 @@ def elastic_feed_forward(
 ) -> ElasticFeedForward | None:
     """Create the elastic feed-forward that a filter needs; None if it does without.
 
-    Args:
-        tvist: The filter.
-        description: The robot.
-        calibration: Calibration of this arm, with a modal model.
-
     Raises:
         EstimatorError: The calibration has no modal model, belongs to another arm, or lacks a parameter.
     """

@@ -87,13 +87,8 @@ def first_source(description: RobotDescription, calibration: Calibration | None)
 def modal_source(description: RobotDescription, calibration: Calibration | None) -> ModeSource | None:
     """Return the source `modal` of a robot, from its own calibration or from one that comes with the package.
 
-    Args:
-        description: The robot.
-        calibration: Calibration of the robot; None if it is yet to be identified, when no calibration of the package
-            is used.
-
-    Returns:
-        None if there is no modal model.
+    Without a calibration, the robot is yet to be identified, and none of the package is used. None if there
+    is no modal model.
     """
     if calibration is None:
         return None

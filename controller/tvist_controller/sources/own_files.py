@@ -54,13 +54,7 @@ def ends(failure: BaseException) -> bool:
 
 
 def run_file(place: str, kind: str, error: type[OwnFileError], may_be_one: MayBeOne) -> OwnFile:
-    """Run a file, and return what it contains under a name.
-
-    Args:
-        place: FILE.py:NAME.
-        kind: What the file is to contain, for messages.
-        error: Class of the error.
-        may_be_one: Tells which values are of that kind.
+    """Run FILE.py of FILE.py:NAME, and return what it contains under the name, if it may be one of the kind.
 
     Raises:
         OwnFileError: The file or the name does not exist, or running the file raises an exception.

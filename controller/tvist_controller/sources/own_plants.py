@@ -54,12 +54,9 @@ class OwnPlant:
         return RecordedPlant(self.place, self.sha256)
 
     def make(self, description: RobotDescription, carried: Payload, seed: int = 0) -> Plant:
-        """Make the plant for one robot.
+        """Make the plant for one robot with the payload that it carries, as far as the server knows.
 
-        Args:
-            description: The robot.
-            carried: Payload that the arm carries, as far as the server knows.
-            seed: Seed of what a plant of `VARIANTS` draws; others are not told.
+        The seed is that of what a plant of `VARIANTS` draws; others are not told.
 
         Raises:
             OwnPlantError: Making it fails, or what is made is not a plant.
@@ -123,10 +120,7 @@ def load_plant(place: str) -> OwnPlant:
 
 
 def load_world(scene: str) -> OwnPlant:
-    """Find the arm in a scene.
-
-    Args:
-        scene: Name of a scene that comes with the package, or path of a file in MuJoCo's format.
+    """Find the arm in a scene, by its name in the package or the path of a file in MuJoCo's format.
 
     Raises:
         SceneError: There is none.

@@ -99,11 +99,6 @@ def load_own(place: str) -> OwnShaper:
 def check_for(own: OwnShaper, estimator: Estimator, joints: int) -> None:
     """Try a shaper with the modes that an arm has anywhere, and a tenth beyond.
 
-    Args:
-        own: The shaper.
-        estimator: The modes as functions of q.
-        joints: Number of joints of the arm.
-
     Raises:
         OwnShaperError: It fails for one of them.
     """

@@ -1,12 +1,11 @@
 """Sources of references: planned motions along paths, streams of set-points, stops."""
 
-from tvist_controller.trajectory.base import Forecast, Rest, Trajectory
+from tvist_controller.trajectory.base import Forecast, Known, Rest, Trajectory
 from tvist_controller.trajectory.compliant import Compliant
 from tvist_controller.trajectory.curve import Bends, Curve
 from tvist_controller.trajectory.double_s import DoubleS
 from tvist_controller.trajectory.force_law import ForceTask
 from tvist_controller.trajectory.guided import Guided, StuckError
-from tvist_controller.trajectory.known import Known
 from tvist_controller.trajectory.limits import MotionLimits
 from tvist_controller.trajectory.motion import PlannedMotion, at_least, quickest_motion
 from tvist_controller.trajectory.path import JointLine, Path, Way

@@ -8,16 +8,14 @@ from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.trajectory.limits import Floats
 
 
-def linear(points: Sequence[Floats], u: float, rate: float) -> tuple[Floats, Floats, float]:
+def linear(
+    points: Sequence[Floats],  # the last four, each of shape (n,)
+    u: float,  # place between the last two, 0 < u ≤ 1; at 1 the value is exactly the last point [-]
+    rate: float,  # of u [1/s]
+) -> tuple[Floats, Floats, float]:
     """Interpolate linearly between the last two points; the slope is that of the parabola through the last three.
 
-    Args:
-        points: The last four points, each of shape (n,).
-        u: Position between the last two points, 0 < u ≤ 1; at 1 the value is exactly the last point [-].
-        rate: How fast u grows [1/s].
-
-    Returns:
-        Value; its derivative with respect to time; the largest absolute value of that.
+    Returns the value, its derivative with respect to time, and the largest absolute value of that.
     """
     found = np.empty((2, len(points[0])))
     fastest = on_parabola(points[1], points[2], points[3], u, rate, found)
@@ -25,19 +23,11 @@ def linear(points: Sequence[Floats], u: float, rate: float) -> tuple[Floats, Flo
 
 
 def cubic(points: Sequence[Floats], u: float, rate: float) -> tuple[Floats, Floats, float]:
-    """Evaluate the uniform cubic B-spline between the middle two of four points.
+    """Evaluate the uniform cubic B-spline between the middle two of four points; see `linear`.
 
     Its second derivative varies linearly from one second difference of the points to the next, and its third
     derivative is their third difference, so it keeps the points' limits of velocity, acceleration and jerk. The curve
     passes the points at a distance of q''/6, on the inside of the bend (de Boor 1978, ch. IX to XI).
-
-    Args:
-        points: Four points, each of shape (n,).
-        u: Position between the second and the third point, 0 < u ≤ 1 [-].
-        rate: See `linear`.
-
-    Returns:
-        As `linear`.
     """
     v = 1.0 - u
     found = np.empty((2, len(points[0])))

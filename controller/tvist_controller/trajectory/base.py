@@ -1,8 +1,8 @@
-"""Base of all sources of references."""
+"""Base of all sources of references, and those that do not compute anything."""
 
 import copy
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -55,9 +55,8 @@ class Trajectory(ABC):
     def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:  # noqa: B027  most need not
         """Leave room for a filter that comes into use now; only references without a plan have to.
 
-        Args:
-            spared: Returns the limits of a reference whose shaped reference keeps the limits that it is given and
-                those of the arm; for None, only the latter.
+        `spared` returns the limits of a reference whose shaped reference keeps the given limits and those of
+        the arm; for None, only the latter.
         """
 
     @property
@@ -89,3 +88,31 @@ class Rest(Trajectory):
     def finished(self) -> bool:
         """Always True."""
         return True
+
+
+class Known(Trajectory):
+    """At least one position, shape (n,) [rad], one a tick of `period` seconds; the last is kept."""
+
+    def __init__(self, positions: Sequence[Floats], period: float) -> None:
+        self._positions, self._period = positions, period
+        self._ticks = -1
+
+    @property
+    def duration(self) -> float:
+        """Time until the last position [s]."""
+        return len(self._positions) * self._period
+
+    @property
+    def end(self) -> Floats:
+        """The last position, shape (n,) [rad]."""
+        return self._positions[-1]
+
+    def next(self) -> Floats:
+        """Return the next position."""
+        self._ticks = min(self._ticks + 1, len(self._positions) - 1)
+        return self._positions[self._ticks]
+
+    @property
+    def finished(self) -> bool:
+        """Whether it has reached the last position."""
+        return self._ticks == len(self._positions) - 1

@@ -34,13 +34,6 @@ class Compliant(Following):
     compliant, and the velocity of the inner reference's tool elsewhere. The joints follow P by Newton's method through
     a `Limiter`. Whatever giving way is kept from, by the joints' limits or near a singular posture, is dropped from P,
     so that nothing is caught up with later.
-
-    The arguments are those of `Following`, and:
-
-    Args:
-        tool: Returns the kinematics of the tool centre point, which another one may replace at any time.
-        inner: The reference that moves the tool otherwise, which continues from the same state.
-        felt: Returns force and torque on the tool centre point in the last tick, base frame, shape (6,) [N, N m].
     """
 
     def __init__(
@@ -51,9 +44,9 @@ class Compliant(Following):
         torque: TorqueRoom,
         period: float,
         *,
-        tool: Callable[[], Arm],
-        inner: Guided | Rest,
-        felt: Callable[[], Floats],
+        tool: Callable[[], Arm],  # of the tool centre point, which another one may replace at any time
+        inner: Guided | Rest,  # moves the tool otherwise, and continues from the same state
+        felt: Callable[[], Floats],  # on the tool centre point in the last tick, base frame [N, N m]
     ) -> None:
         super().__init__(state, abrupt(limits, period), reach, torque, period)
         self._tool, self.inner = tool, inner

@@ -27,7 +27,7 @@ class Bends:
 
 
 class Curve(Path):
-    """A path with one parameter s, from 0 or another start to an end, in any unit.
+    """A path with one parameter s, from 0 or another start to an end above that, in any unit.
 
     Interpolation may pass either end by a thousandth of a tick's step, so the curve has to continue smoothly beyond
     them.
@@ -36,14 +36,9 @@ class Curve(Path):
 
         q̇ = q' ṡ,    q̈ = q' s̈ + q'' ṡ²,    q⃛ = q' s⃛ + 3 q'' ṡ s̈ + q''' ṡ³,
 
-    so bounds of the derivatives convert limits of the joints into limits of s.
-
-    Args:
-        start: Value of s at the start.
-        end: Value of s at the end, above that.
-        bends: Bounds of the derivatives on the whole curve.
-        most: Largest acceleration of each joint while the motion's rate changes, shape (n,) [rad/s^2]; None if the
-            limit of the parameter suffices.
+    so bounds of the derivatives convert limits of the joints into limits of s. `most` limits the acceleration
+    of each joint while the motion's rate changes, shape (n,) [rad/s^2]; None if the limit of the parameter
+    suffices.
 
     Raises:
         ValueError: An argument is out of range.
@@ -64,11 +59,7 @@ class Curve(Path):
 
     @abstractmethod
     def derivatives(self, s: Floats) -> tuple[Floats, Floats, Floats]:
-        """Evaluate the curve at k points.
-
-        Returns:
-            q [rad], dq/ds and d²q/ds², each of shape (k, n).
-        """
+        """Evaluate the curve at k points: q [rad], dq/ds and d²q/ds², each of shape (k, n)."""
 
     def bends_within(self, start: float, end: float) -> Bends:  # noqa: ARG002  the same everywhere unless overridden
         """Bounds of the derivatives between two parameters; by default those of the whole curve."""

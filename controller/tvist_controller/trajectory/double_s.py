@@ -7,15 +7,10 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 
 class DoubleS:
-    """Time-optimal motion from rest to rest within velocity, acceleration and jerk limits, all entries in phase.
+    """Time-optimal motion from rest to rest within limits, shape (m,) [rad], all entries in phase.
 
     The entry with the longest way determines the duration (Biagiotti and Melchiorri 2008, ch. 3.4). With the paper's
     limits of 1.5 rad/s, 2.0 rad/s² and 100 rad/s³, the acceleration ramps last 20 ms.
-
-    Args:
-        start: Parameter at the start, shape (m,) [rad].
-        end: Parameter at the end, shape (m,) [rad].
-        limits: Limits for every entry.
 
     Raises:
         ValueError: There is no such motion within these limits, or it would last for hours.

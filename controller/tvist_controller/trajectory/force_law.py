@@ -50,17 +50,12 @@ def free_damping(parameter: float) -> float:
 
 
 def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats, period: float) -> Floats:
-    """Velocity of the axes of the frame a tick later.
+    """Velocity of the axes of the frame a tick later, shape (6,) [m/s, rad/s].
 
-    Each compliant axis is a virtual mass with damping, M v̇ = g (w + f) - D v, with the wanted wrench w, the felt one f
-    and the gain g; it is integrated implicitly, so no damping is too large for a tick. Where a force is felt, D is at
-    least that of contact. An axis that is not compliant loses the speed it had when it was.
-
-    Args:
-        task: What is to be reached.
-        velocity: Present velocity of the axes, shape (6,) [m/s, rad/s].
-        felt: What the environment exerts on the tool, shape (6,) [N, N m].
-        period: Tick [s].
+    Each compliant axis is a virtual mass with damping, M v̇ = g (w + f) - D v, with the wanted wrench w, the
+    one f that is felt from the environment, shape (6,) [N, N m], and the gain g; it is integrated implicitly,
+    so no damping is too large for a tick. Where a force is felt, D is at least that of contact. An axis that
+    is not compliant loses the speed it had when it was.
     """
     scale = np.repeat([1.0, LEVER * LEVER], 3)
     touched = np.minimum(np.abs(felt) / np.repeat([CONTACT, CONTACT * LEVER], 3), 1.0)

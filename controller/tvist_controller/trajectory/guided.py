@@ -43,22 +43,15 @@ class Following(Guided):
 
     The client determines the timing of the signal, so the speed slider has no effect on it; reduced speed limits the
     velocity.
-
-    Args:
-        state: Position [rad], velocity [rad/s] and acceleration [rad/s^2] to continue from, each of shape (n,).
-        limits: Limits of every joint.
-        reach: Largest position of each joint in either direction, shape (n,) [rad].
-        torque: Motion that the torque permits.
-        period: Tick [s].
     """
 
     def __init__(
         self,
-        state: tuple[Floats, Floats, Floats],
+        state: tuple[Floats, Floats, Floats],  # to continue from, q, q̇ and q̈, each of shape (n,)
         limits: MotionLimits,
-        reach: Floats,
+        reach: Floats,  # largest |q| of each joint, shape (n,) [rad]
         torque: TorqueRoom,
-        period: float,
+        period: float,  # tick [s]
     ) -> None:
         self.limits = self._arm = limits
         self._reach, self._torque, self._period = reach, torque, period

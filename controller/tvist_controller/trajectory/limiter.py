@@ -47,14 +47,6 @@ class Limiter:
 
     Each joint is limited independently. A joint that lags behind is controlled relative to the signal's position,
     velocity and acceleration, so that it also catches up with a moving signal.
-
-    Args:
-        q: Position at rest to start from, shape (n,) [rad].
-        limits: Limits for every joint.
-        period: Tick [s].
-        reach: Largest position of each joint in either direction, shape (n,) [rad]; None for no limit.
-        torque: Motion that the torque permits; None for no limit.
-        state: Position, velocity and acceleration to start from instead of rest, each of shape (n,).
     """
 
     TOLERANCE = 1e-6
@@ -72,13 +64,13 @@ class Limiter:
 
     def __init__(
         self,
-        q: Floats,
+        q: Floats,  # at rest to start from, shape (n,) [rad]
         limits: MotionLimits,
-        period: float,
+        period: float,  # tick [s]
         *,
-        reach: Floats | None = None,
-        torque: TorqueRoom | None = None,
-        state: tuple[Floats, Floats, Floats] | None = None,
+        reach: Floats | None = None,  # largest |q| of each joint, shape (n,) [rad]; None for no limit
+        torque: TorqueRoom | None = None,  # None for no limit
+        state: tuple[Floats, Floats, Floats] | None = None,  # q, q̇ and q̈ to start from instead
     ) -> None:
         n = len(q)
         self._limits, self._period = limits, period
@@ -134,11 +126,7 @@ class Limiter:
         return not self._now[STEP].any()
 
     def follow(self, q: Floats, qd: Floats) -> Floats:
-        """Advance by one tick towards a moving position.
-
-        Returns:
-            Position of the reference, shape (n,) [rad].
-        """
+        """Advance by one tick towards a moving position; return the reference, shape (n,) [rad]."""
         now, fits = np.empty((DIFFERENCES, len(q))), np.empty(len(q), dtype=np.bool_)
         found = judge(q, self.q, self._now, self._most, now, fits)
         if self._behind is not None:

@@ -48,13 +48,7 @@ class PlannedMotion(Trajectory):
     """A planned motion from rest to rest.
 
     Its samples are the path's parameter; for a straight line in joint space these are the joint positions.
-
-    Args:
-        path: Path of the motion.
-        law: Time law, from the path's start to its end.
-        period: Tick [s].
-        speed: Initial rate of its time relative to the clock's [-].
-        agility: Limits of a change of the rate, at least those of the law, which may be slow; None for the same.
+    The limits of a change of its rate are at least those of the law, which may be slow.
     """
 
     path: Path
@@ -63,10 +57,10 @@ class PlannedMotion(Trajectory):
     def __init__(
         self,
         path: Path,
-        law: TimeLaw,
-        period: float,
-        speed: float = 1.0,
-        agility: MotionLimits | None = None,
+        law: TimeLaw,  # from the path's start to its end
+        period: float,  # tick [s]
+        speed: float = 1.0,  # initial rate of its time relative to the clock's [-]
+        agility: MotionLimits | None = None,  # of a change of the rate; None for those of the law
     ) -> None:
         self.path, self._period = path, period
         self.law = law
@@ -174,15 +168,11 @@ class PlannedMotion(Trajectory):
         return float(np.abs(self.law.at(self.time)[1]).max()) * self._pace.rate
 
     def hold(self, acceleration: float) -> bool:
-        """Pause the motion, if it then stands noticeably sooner than by continuing.
+        """Pause the motion, if it then stands noticeably sooner than by continuing; return whether it pauses.
 
-        Near the end hardly any acceleration is left for a pause, which would only draw the end out.
-
-        Args:
-            acceleration: Limit for every entry of the parameter while slowing down, at most that of its agility.
-
-        Returns:
-            Whether it pauses.
+        Near the end hardly any acceleration is left for a pause, which would only draw the end out. While
+        slowing down, `acceleration` is the limit for every entry of the parameter, at most that of its
+        agility.
         """
         paused = self.fork()
         paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind
@@ -226,14 +216,7 @@ class PlannedMotion(Trajectory):
 def quickest_motion(
     path: Path, limits: MotionLimits, period: float, speed: float = 1.0, agility: MotionLimits | None = None
 ) -> PlannedMotion:
-    """Return the double-S motion along a path from rest to rest within limits.
-
-    Args:
-        path: Path of the motion.
-        limits: Limits for every joint.
-        period: Tick [s].
-        speed: Initial rate of its time relative to the clock's [-].
-        agility: See `PlannedMotion`.
+    """Return the double-S motion along a path from rest to rest within limits; see `PlannedMotion`.
 
     Raises:
         ValueError: There is no such motion within these limits, or it would last for hours.

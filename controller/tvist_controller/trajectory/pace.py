@@ -19,12 +19,7 @@ class Pace:
     Along a path q(s) with ṡ = r the acceleration is q̈ = q'' r² + q' ṙ. So ṙ may have any value that keeps |q̈|
     within the limit of every joint; near the limits a motion is neither slowed down nor sped up until its own curve
     leaves room. The rate approaches its target time-optimally within that room, with limited jerk of its own
-    (ruckig).
-
-    Args:
-        limits: Limits for every joint.
-        period: Tick [s].
-        rate: Initial rate [-].
+    (ruckig), in ticks of `period` seconds.
     """
 
     def __init__(self, limits: MotionLimits, period: float, rate: float) -> None:
@@ -51,12 +46,10 @@ class Pace:
         return self.rate == target and self._slope == 0.0
 
     def advance(self, target: float, curve: Sequence[Floats]) -> float:
-        """Advance by one tick and return the time that passes on the path [s].
+        """Advance by one tick towards a target rate [-] and return the time that passes on the path [s].
 
-        Args:
-            target: Target of the rate [-].
-            curve: q' [rad/s] and q'' [rad/s^2] at the present point of the path and at the points just ahead, each of
-                shape (2, n). The rate must suit all of them, since a tick has a finite length.
+        `curve` has q' [rad/s] and q'' [rad/s^2], each of shape (2, n), at the present point of the path and
+        just ahead: the rate must suit all of them, since a tick has a finite length.
         """
         rooms = [self._room(qd, qdd) for qd, qdd in curve]
         # ruckig requires limits on both sides of zero, so leave a little room in both directions.

@@ -26,10 +26,6 @@ class Path(ABC):
     Time laws, the TVIST filter and stops act on the parameter, so their results stay on the path, however it curves.
     The parameter has shape (m,) and moves straight from `start` to `end`. Its unit is that of the path: radians for a
     straight line in joint space, metres for a path of the tool.
-
-    Args:
-        start: Parameter at the start, shape (m,).
-        end: Parameter at the end, shape (m,).
     """
 
     posture_of: Posture | None
@@ -48,29 +44,17 @@ class Path(ABC):
 
     @abstractmethod
     def states(self, x: Floats, xd: Floats, xdd: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the joints' state of motion for a state of the parameter.
+        """Return q, q̇ and q̈, shape (n,) or (k, n) [rad, s], for one or k states of the parameter.
 
-        Args:
-            x: Parameter, shape (m,), or (k, m) for k states.
-            xd: Its velocity, same shape [1/s].
-            xdd: Its acceleration, same shape [1/s^2].
-
-        Returns:
-            q [rad], q̇ [rad/s] and q̈ [rad/s^2], each of shape (n,) or (k, n).
+        Those are x, its velocity [1/s] and its acceleration [1/s^2], each of shape (m,) or (k, m).
         """
 
     @abstractmethod
     def paced(self, x: Floats, xd: Floats, xdd: Floats, acceleration: float) -> Floats:
-        """Return the velocities and accelerations that a change of the motion's rate has to consider.
+        """Return velocities and accelerations for a change of the motion's rate, shape (2, k).
 
-        Args:
-            x: Parameter, shape (m,).
-            xd: Its velocity at full rate, same shape [1/s].
-            xdd: Its acceleration at full rate, same shape [1/s^2].
-            acceleration: Limit of the parameter's acceleration [1/s^2].
-
-        Returns:
-            Array of shape (2, k), scaled so that this limit is that of every column.
+        They are scaled so that `acceleration`, the limit of the parameter's [1/s^2], is that of every column.
+        Velocity and acceleration of the parameter x are those at full rate, each of shape (m,) [1/s, 1/s^2].
         """
 
     @abstractmethod
@@ -79,25 +63,15 @@ class Path(ABC):
 
     @abstractmethod
     def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits | None:
-        """Return limits for the parameter's acceleration and jerk in a stop.
+        """Return the parameter's limits in a stop; None if the curve alone uses up those of the joints.
 
-        Args:
-            limits: Limits for every joint; the velocity is ignored.
-            velocity: Largest velocity of the parameter in the stop [1/s].
-            x: Parameter at which the stop begins, shape (m,).
-
-        Returns:
-            None if the curve alone uses up the limits of the joints.
+        The stop begins at x, shape (m,), and is never faster than `velocity` [1/s]; that of the joints'
+        limits is ignored.
         """
 
     @abstractmethod
     def way(self, start: Floats, end: Floats) -> Way:
-        """Return a part of the path, to be checked for collisions.
-
-        Args:
-            start: Parameter at the start, shape (m,).
-            end: Parameter at the end, shape (m,).
-        """
+        """Return the part of the path between two parameters, shape (m,), to be checked for collisions."""
 
     @property
     def whole(self) -> Way:
@@ -114,13 +88,9 @@ class Path(ABC):
 
 
 class JointLine(Path):
-    """The straight line between two postures in joint space.
+    """The straight line between two postures in joint space, each of shape (n,) [rad].
 
-    Its parameter is the posture itself, shape (n,), so shaping the parameter shapes the posture.
-
-    Args:
-        start: Joint positions at the start, shape (n,) [rad].
-        end: Joint positions at the end, shape (n,) [rad].
+    Its parameter is the posture itself, so shaping the parameter shapes the posture.
     """
 
     posture_of = None

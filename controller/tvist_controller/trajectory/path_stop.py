@@ -22,16 +22,6 @@ class PathStop(Trajectory):
     It brakes from its first step with full jerk: the second difference b of the positions played last becomes b -
     jerk·h, and the stop continues from the state of motion that central differences give with this step. If the
     motion is so slow that the limits let it stand at once, it does.
-
-    Args:
-        path: Path of the stop.
-        x: Newest sample, shape (m,) [rad].
-        step: Difference from the previous sample, along the path's direction, shape (m,) [rad].
-        xdd: Second difference of the last three samples, in the same direction, shape (m,) [rad/s^2].
-        acceleration: Acceleration limit for the joints [rad/s^2].
-        braking: Corresponding acceleration limit for the parameter [rad/s^2].
-        jerk: Jerk limit for the parameter [rad/s^3].
-        period: Tick [s].
     """
 
     path: Path
@@ -39,14 +29,14 @@ class PathStop(Trajectory):
     def __init__(
         self,
         path: Path,
-        x: Floats,
-        step: Floats,
-        xdd: Floats,
+        x: Floats,  # newest sample, shape (m,) [rad]
+        step: Floats,  # from the sample before, along the path's direction, shape (m,) [rad]
+        xdd: Floats,  # second difference of the last three, likewise, shape (m,) [rad/s^2]
         *,
-        acceleration: float,
-        braking: float,
-        jerk: float,
-        period: float,
+        acceleration: float,  # limit for the joints [rad/s^2]
+        braking: float,  # corresponding one for the parameter [rad/s^2]
+        jerk: float,  # limit for the parameter [rad/s^3]
+        period: float,  # tick [s]
     ) -> None:
         self.path, self._origin = path, x
         self.acceleration = acceleration
@@ -87,11 +77,7 @@ class PathStop(Trajectory):
         return float(self._trajectory.at_time(min(time, self.duration))[0][0])
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the joints at k times after the start.
-
-        Returns:
-            Three arrays of shape (k, n).
-        """
+        """Position, velocity and acceleration of the joints at k times after the start, shape (k, n)."""
         duration, at_time, along = self.duration, self._trajectory.at_time, self.path.direction
         states = [at_time(min(time, duration)) for time in times.tolist()]
         x, xd, xdd = (np.array([state[order][0] for state in states])[:, None] * along for order in range(3))

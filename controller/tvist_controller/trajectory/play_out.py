@@ -32,17 +32,15 @@ class PlayOut:
     for a gap. The delay approaches its target through three first-order lags in series, which cannot overshoot. With
     q' the stream's velocity and D the delay, q̈ contains a term -q' D̈. The lags' time constant limits this term, and
     the corresponding one in jerk, to a share of the limits; at rest the time constant is zero.
-
-    Args:
-        first: Set-point to play next; it has just arrived.
-        look_ahead: Periods between the position and the newest set-point it needs [-].
-        ticks: Ticks per period of the stream, at least one [-].
-        limits: Limits of the stream.
-        period: Tick [s].
     """
 
     def __init__(
-        self, first: int, look_ahead: int, ticks: float, limits: MotionLimits, period: float
+        self,
+        first: int,  # set-point to play next; it has just arrived
+        look_ahead: int,  # periods between the position and the newest set-point it needs [-]
+        ticks: float,  # per period of the stream, at least one [-]
+        limits: MotionLimits,  # of the stream
+        period: float,  # tick [s]
     ) -> None:
         self._limits, self._period, self._ticks = limits, period, ticks
         self._base = (look_ahead + SPARE * (ticks > 1.0)) * ticks - 1.0
@@ -92,11 +90,9 @@ class PlayOut:
             self._wanted = wanted
 
     def advance(self, speed: float, behind: float) -> None:
-        """Advance by one tick.
+        """Advance by one tick, at the velocity of the fastest joint in the stream [rad/s].
 
-        Args:
-            speed: Velocity of the fastest joint in the stream [rad/s].
-            behind: Time by which the reference lags behind the stream, if it cannot catch up [s].
+        If the reference cannot catch up, it lags `behind` the stream [s].
         """
         self._now += 1
         delay = self._lags[2]

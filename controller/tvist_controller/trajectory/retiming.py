@@ -66,14 +66,10 @@ class Way:
 def passes(
     edges: Floats, highest: Floats, p: Floats, q: Floats, known: Floats
 ) -> Floats:  # pragma: no cover  compiled
-    """Return the largest b = ṡ² at the edges, zero at the last one.
+    """Return the largest b = ṡ² at the c + 1 edges, zero at the last one; `p` and `q` as in `Cells`.
 
-    Args:
-        edges: Ends of the cells, shape (c + 1,).
-        highest: Largest b in each cell, shape (c,).
-        p: See `Cells`.
-        q: See `Cells`.
-        known: Values of b at the first edges, which stay as they are, shape (k,): only a 0 for a motion from rest.
+    `highest` is the largest b in each of the c cells. The first edges keep their `known` values, shape (k,):
+    only a 0 for a motion from rest.
     """
     count, rows = p.shape
     begun = len(known)
@@ -102,11 +98,8 @@ def widened(
 ) -> Floats:  # pragma: no cover  compiled
     """Return for each cell the largest value, or the lowest, of all cells that are passed within a window of time.
 
-    Args:
-        times: Times at the edges, shape (c + 1,) [s].
-        window: The window, to either side [s].
-        values: A value for each cell and row, shape (c, r).
-        lowest: Whether the lowest value is returned.
+    The window is to either side [s]; `times` are those at the edges, shape (c + 1,) [s], and `values` has a
+    row for each cell, shape (c, r).
     """
     count, rows = values.shape
     out = values.copy()
@@ -127,11 +120,8 @@ def widened(
 def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragma: no cover  compiled
     """Let a motion go on evenly for a ramp between speeding up and braking, so that its jerk is not twice that of both.
 
-    Args:
-        edges: Ends of the cells, shape (c + 1,).
-        b: ṡ² there, shape (c + 1,).
-        ramp: The ramp [s].
-        known: Number of the edge up to which the motion stays as it is; if it brakes there, it first goes on evenly.
+    It stays as it is up to the edge of number `known`; if it brakes there, it first goes on evenly. The ramp
+    is in seconds; `b` is ṡ² at the edges, both of shape (c + 1,).
     """
     out, last = b.copy(), len(b) - 1
     number = known + 1
@@ -163,13 +153,10 @@ def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragm
 class RetimedLaw:
     """The time law of a curve's parameter: the mean over `ramp` seconds of a motion with constant accelerations.
 
-    Args:
-        edges: Places at which the acceleration may change, shape (c + 1,).
-        b: ṡ² there, shape (c + 1,), zero at the last one, and nowhere else but at the first one.
-        ramp: Time over which the mean is taken [s].
-        rate: Rate of its time relative to the clock's, above 0 [-].
-        start: Time at the first edge, before the mean and at a rate of 1 [s]. If b is not 0 there, the motion is known
-            only from a ramp later on.
+    Its acceleration changes at most at the edges, shape (c + 1,), where ṡ² is `b`: 0 at the last one, and
+    nowhere else but at the first one. `rate` is that of its time relative to the clock's, above 0. `start` is
+    the time at the first edge, before the mean and at a rate of 1 [s]; if `b` is not 0 there, the motion is
+    known only from a ramp later on.
     """
 
     def __init__(self, edges: Floats, b: Floats, ramp: float, rate: float = 1.0, start: float = 0.0) -> None:
@@ -262,11 +249,8 @@ def arrivals(edges: Floats, b: Floats) -> Floats:
 def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False) -> RetimedLaw:
     """Return the quickest law within the limits along a curve.
 
-    Args:
-        way: The limits.
-        jerk: Jerk limit of s [1/s^3].
-        window: Time over which a shaper mixes moments of the motion [s].
-        goes_on: Whether others may continue it, with its ramp.
+    The jerk limit is that of s [1/s^3]; within the window of time a shaper mixes moments of the motion [s].
+    Others may continue a law that `goes_on`, with its ramp.
     """
     lengths = np.diff(way.edges)
     b = _passed(way.edges, way.joints, way.tool, AT_REST)
@@ -285,16 +269,9 @@ def longer_law(
 ) -> RetimedLaw | None:
     """Return the quickest law that is equal to another one up to an edge, and goes on behind the end of that.
 
-    Args:
-        way: The limits. It begins with edge `first` of the law before; its edges up to `known` are those of that law.
-        jerk: See `quickest_law`.
-        window: See `quickest_law`.
-        before: The law that it continues; it gives the ramp, too.
-        first: Number of the edge of that law with which this one begins.
-        known: Number of the edge of this law up to which they are equal.
-
-    Returns:
-        None if it cannot keep the limits from there on.
+    The way begins with edge `first` of the law `before`, which gives the ramp, too; up to edge `known` of the
+    way, both laws are equal. Jerk and window as in `quickest_law`. None if it cannot keep the limits from
+    there on.
     """
     fixed, ramp, start = before.b[first : first + known + 1], before.ramp, float(before.times[first])
     # The ramp being given, it is the acceleration that has to keep the jerk.

@@ -31,8 +31,6 @@ class Servo(Following):
     plus 1.5 ticks, so that `target_q` follows commands with a lag of lookahead plus two ticks. The gain decides how
     quickly the velocity changes: with a high one, the posture is approached with the time constant T from the start;
     with a low one, the motion begins and ends more gently. A gain below 3/T² would overshoot, and is raised to that.
-
-    The arguments are those of `Following`.
     """
 
     def __init__(

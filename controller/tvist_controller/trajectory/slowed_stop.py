@@ -14,20 +14,19 @@ class SlowedStop(Trajectory):
     Where the path has tight bends ahead, for which the motion slows down by itself, a stop that knows only the path's
     curvature finds no limits that suit all of them. This one passes them as the motion would have, only later: it is
     on the path, never ahead of the motion, and no faster.
-
-    Args:
-        path: Path of the motion.
-        ahead: Parameter of the motion at the last two ticks and the coming ones, shape (k, m), k >= 4.
-        acceleration: Acceleration that the slowing of time may cause at any joint [rad/s^2].
-        jerk: Jerk that it may cause [rad/s^3].
-        fastest: Largest velocity of any joint now [rad/s].
-        period: Tick [s].
     """
 
     path: Path
 
     def __init__(
-        self, path: Path, ahead: Floats, *, acceleration: float, jerk: float, fastest: float, period: float
+        self,
+        path: Path,
+        ahead: Floats,  # parameter at the last two ticks and the coming ones, shape (k, m), k >= 4
+        *,
+        acceleration: float,  # that the slowing of time may cause at any joint [rad/s^2]
+        jerk: float,  # that it may cause [rad/s^3]
+        fastest: float,  # largest velocity of any joint now [rad/s]
+        period: float,  # tick [s]
     ) -> None:
         self.path, self.acceleration, self.jerk = path, acceleration, jerk
         request = ruckig.InputParameter(1)

@@ -39,25 +39,17 @@ class Speed(Guided):
     A tool goes straight: its pose is integrated, and the joints follow it by Newton's method, so the tool does not
     drift. Near a singular posture the joints' way q(s) has a large second derivative with respect to the tool's way, so
     q'' ṡ² may use up only a share of the joints' acceleration. This slows the tool down before it gets there.
-
-    Args:
-        state: Position [rad], velocity [rad/s] and acceleration [rad/s^2] to continue from, each of shape (n,).
-        limits: Limits of every joint; the jerk is that of stops.
-        torque: Motion that the torque permits.
-        period: Tick [s].
-        rate: Rate of its time, 0 to 1 [-]; more if the joints are too fast for it at the start.
-        arm: The arm whose tool has the velocity; None for velocities of the joints.
     """
 
     def __init__(
         self,
-        state: tuple[Floats, Floats, Floats],
-        limits: MotionLimits,
+        state: tuple[Floats, Floats, Floats],  # to continue from, q, q̇ and q̈, each of shape (n,)
+        limits: MotionLimits,  # of every joint; the jerk is that of stops
         torque: TorqueRoom,
-        period: float,
+        period: float,  # tick [s]
         *,
-        rate: float = 1.0,
-        arm: Arm | None = None,
+        rate: float = 1.0,  # of its time, 0 to 1 [-]; more if the joints are too fast for it at the start
+        arm: Arm | None = None,  # the arm whose tool has the velocity; None for velocities of the joints
     ) -> None:
         self._q, self._qd, self._qdd = (np.array(values, dtype=float) for values in state)
         self._torque, self._period = torque, period
@@ -84,13 +76,10 @@ class Speed(Guided):
         self._most: tuple[float, ...] = (np.inf,)
 
     def aim(self, goal: Floats, *accelerations: float) -> None:
-        """Approach another velocity.
+        """Approach other velocities of the joints [rad/s], or of the tool in the base frame [m/s, rad/s].
 
-        Args:
-            goal: Velocities of the joints, shape (n,) [rad/s], or velocity [m/s] and angular velocity [rad/s] of the
-                tool in the base frame, shape (6,).
-            accelerations: Acceleration of the joint whose velocity changes most [rad/s^2], or the tool's linear [m/s^2]
-                and angular acceleration [rad/s^2].
+        The acceleration is that of the joint whose velocity changes most [rad/s^2]; or there are two, the
+        tool's linear [m/s^2] and angular one [rad/s^2].
         """
         self._goal, self._most = np.array(goal, dtype=float), accelerations
 

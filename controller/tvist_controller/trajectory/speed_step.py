@@ -67,35 +67,21 @@ def rate_by_bend(
 
 @compiled_for_ticks
 def speed_step(  # noqa: C901  a kernel: its branches are loops
-    chain: Floats,
-    inverse: Floats,
-    joints: Floats,
-    velocities: Floats,
-    ranges: Floats,
-    change: Floats,
-    given: Floats,
-    place: Floats,
-    goal: Floats,
-    q: Floats,
+    chain: Floats,  # to the tool centre point; no links if the velocities are those of the joints
+    inverse: Floats,  # pseudo-inverse of the Jacobian in mid-tick, shape (n, 6); else the unit matrix
+    joints: Floats,  # present positions [rad] and the step to them [rad], shape (2, n)
+    velocities: Floats,  # at the beginning and the end, in the trajectory's own time, shape (2, 6) or (2, n)
+    ranges: Floats,  # least and largest change of the joints' step, and largest step, shape (3, n) [rad]
+    change: Floats,  # largest one of the velocity, shape (6,) or (n,)
+    given: Floats,  # present and commanded rate [-], the joints' limits, `Speed._lag`, tick [s]
+    place: Floats,  # present rotation and position of the tool, shape (4, 3)
+    goal: Floats,  # result: those a tick later
+    q: Floats,  # result: positions of the joints a tick later, shape (n,) [rad]
 ) -> tuple[int, float]:
     """Follow the mean of two velocities for a tick, at the rate that the joints' limits and their way permit.
 
-    Args:
-        chain: The links, the tool centre point being their end; none if the velocities are those of the joints.
-        inverse: Pseudo-inverse of the Jacobian in the middle of the tick, shape (n, 6); else the unit matrix.
-        joints: Present positions [rad] and the step to them [rad], shape (2, n).
-        velocities: Velocity at the beginning and at the end, in the trajectory's own time, shape (2, 6) or (2, n).
-        ranges: Least and largest change of the joints' step, and largest step, shape (3, n) [rad].
-        change: Largest change of the velocity, shape (6,) or (n,).
-        given: Present and commanded rate of that time [-], velocity [rad/s] and acceleration limit [rad/s^2] of the
-            joints, what an acceleration is multiplied by in a change of their step [s^2], and the tick [s], shape (6,).
-        place: Present rotation and position of the tool, shape (4, 3).
-        goal: Result: those a tick later.
-        q: Result: positions of the joints a tick later, shape (n,) [rad].
-
-    Returns:
-        FOUND; IMPOSSIBLE if the limits do not permit it; or SINGULAR if the curvature permits next to no speed. And the
-        rate at the end.
+    Returns that rate at the end, and FOUND; IMPOSSIBLE if the limits do not permit it; or SINGULAR if the
+    curvature permits next to no speed.
     """
     rate, speed, slowest, acceleration, lag, h = given[0], given[1], given[2], given[3], given[4], given[5]
     n, straight = len(q), chain.shape[0] > 0

@@ -32,13 +32,8 @@ def hermite(
 ) -> Floats:
     """Coefficients of the polynomial of degree five with given values and first two derivatives at both ends.
 
-    Args:
-        length: Distance of the ends; an array for several polynomials at once.
-        start: Value and two derivatives at 0, each of shape (..., m).
-        end: The same at the length.
-
-    Returns:
-        Coefficients of rising powers of the distance from the start, shape (6, ..., m).
+    The ends have the distance `length`, an array for several polynomials at once; values and derivatives have
+    shape (..., m). The coefficients are of rising powers of the distance from the start, shape (6, ..., m).
     """
     h = length
     p0, v0, a0 = start
@@ -55,13 +50,10 @@ def hermite(
 def evaluate(
     knots: Floats, coefficients: Floats, s: Floats, out: Floats
 ) -> None:  # pragma: no cover  compiled
-    """Evaluate a spline and its first three derivatives.
+    """Evaluate a spline and its first three derivatives, shape (4, p, n), at p parameters.
 
-    Args:
-        knots: Ends of its intervals, shape (k + 1,).
-        coefficients: Coefficients of rising powers, shape (k, 6, n).
-        s: Parameters, shape (p,); beyond the ends the outermost polynomial continues.
-        out: Receives value and derivatives, shape (4, p, n).
+    The k intervals end at the knots, shape (k + 1,); beyond them the outermost polynomial continues. The
+    coefficients are of rising powers, shape (k, 6, n).
     """
     last = len(knots) - 2
     joints = coefficients.shape[2]

@@ -13,11 +13,7 @@ from tvist_controller._compiled import compiled_for_ticks
 def stop_phases(v: float, a: float, limit: float, jerk: float) -> tuple[float, float, float, float, float]:
     """Return duration [s] and jerk [rad/s^3] of the first phase, the other durations, and the last phase's jerk.
 
-    Args:
-        v: Velocity at its start [rad/s].
-        a: Acceleration at its start [rad/s^2].
-        limit: Acceleration limit [rad/s^2], which a may exceed.
-        jerk: Jerk limit [rad/s^3].
+    Velocity and acceleration are those at the start [rad/s, rad/s^2]; the acceleration may exceed its limit.
     """
     # Without braking, the velocity would become this while the acceleration is reduced to zero.
     left = v + 0.5 * a * abs(a) / jerk

@@ -27,14 +27,6 @@ class SetpointStream(Trajectory):
     parabola through its neighbours. If no set-points arrive at all, the reference comes to rest within the limits
     until the stream continues. After a gap, and if the sender runs ahead, play-out continues with the newest
     set-point. The result passes through the `Limiter`.
-
-    Args:
-        q: Joint angles at which the arm is at rest, shape (n,) [rad].
-        stream_period: Time between set-points, at least a tick [s].
-        limits: Limits of velocity, acceleration and jerk, for every joint.
-        period: Tick [s].
-        reach: Largest position of each joint in either direction, shape (n,) [rad]; None for no limit.
-        torque: Motion that the torque permits; None for no limit.
     """
 
     limits: MotionLimits
@@ -42,13 +34,13 @@ class SetpointStream(Trajectory):
 
     def __init__(
         self,
-        q: Floats,
-        stream_period: float,
+        q: Floats,  # at which the arm is at rest, shape (n,) [rad]
+        stream_period: float,  # time between set-points, at least a tick [s]
         limits: MotionLimits,
-        period: float,
+        period: float,  # tick [s]
         *,
-        reach: Floats | None = None,
-        torque: TorqueRoom | None = None,
+        reach: Floats | None = None,  # largest |q| of each joint, shape (n,) [rad]; None for no limit
+        torque: TorqueRoom | None = None,  # None for no limit
     ) -> None:
         self._rest = np.array(q, dtype=float)
         self._ticks = max(round(stream_period / period, 9), 1.0)

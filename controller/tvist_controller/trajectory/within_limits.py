@@ -20,20 +20,15 @@ FIT, FAR = 1, 2
 
 
 @compiled_for_ticks
-def judge(q: Floats, last: Floats, before: Floats, most: Floats, now: Floats, fits: Bools) -> int:
-    """Find which joints' differences are within the limits and can stay there.
-
-    Args:
-        q: Position, shape (n,) [rad].
-        last: Position a tick earlier.
-        before: Differences a tick earlier, shape (4, n), see `DIFFERENCES`.
-        most: Numbers to compare with, see `FASTEST`.
-        now: Result: differences, shape (4, n).
-        fits: Result: which joints fit, shape (n,).
-
-    Returns:
-        Sum of `FIT` and `FAR`, where they apply.
-    """
+def judge(
+    q: Floats,  # shape (n,) [rad]
+    last: Floats,  # a tick earlier
+    before: Floats,  # differences a tick earlier, shape (4, n), see `DIFFERENCES`
+    most: Floats,  # what they are compared with, see `FASTEST`
+    now: Floats,  # result: differences, shape (4, n)
+    fits: Bools,  # result: which joints fit, shape (n,)
+) -> int:
+    """Find which joints' differences are and can stay within limits; return the sum of `FIT` and `FAR`."""
     fastest, jerk, h = most[FASTEST], most[JERK], most[PERIOD]
     far, free = True, True
     for j in range(q.shape[0]):

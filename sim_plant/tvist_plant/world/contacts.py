@@ -55,12 +55,9 @@ Contacts = Sequence[tuple[float | None, float | None]]
 
 
 def add_pairs(spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names) -> Contacts:
-    """Add every pair of shapes that may touch.
+    """Add every pair of shapes that may touch; those of the arm, by their names, do not touch one another.
 
-    Args:
-        spec: The world; all its shapes have names.
-        model: The same, compiled.
-        arm: Names of the arm's shapes, which do not touch one another.
+    All shapes of the world have names; the model is the same world, compiled.
 
     Raises:
         SceneError: There are too many.
@@ -90,12 +87,7 @@ def add_pairs(spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names) -> Con
 
 
 def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
-    """Give each pair of a world its spring and damper, as far as it is one of ours, for the masses that it has now.
-
-    Args:
-        model: The world.
-        given: Result of `add_pairs`.
-    """
+    """Give each pair of `add_pairs` its spring and damper, for the masses that the world has now."""
     _count_turning(model)
     for number, (stiffness, damping) in enumerate(given):
         if model.pair_solimp[number][0] != IMPEDANCE:

@@ -24,13 +24,7 @@ SIDES = {"finger left": 1.0, "finger right": -1.0}
 
 
 def add_fingers(spec: "mujoco.MjSpec", load: "mujoco.MjsBody", hand: Hand) -> None:
-    """Add the fingers of a hand to an arm, open.
-
-    Args:
-        spec: The arm.
-        load: Body of what is beyond its flange.
-        hand: The hand.
-    """
+    """Add the fingers of a hand to an arm, open, on the body of what is beyond its flange."""
     turn = np.roll(pin.Quaternion(hand.rotation).coeffs(), 1).tolist()
     for name, side in SIDES.items():
         half = hand.stroke / 2.0
@@ -54,12 +48,7 @@ def add_fingers(spec: "mujoco.MjSpec", load: "mujoco.MjsBody", hand: Hand) -> No
 
 
 class Fingers:
-    """The law that moves the fingers of a compiled arm.
-
-    Args:
-        model: The arm.
-        hand: The hand.
-    """
+    """The law that moves the fingers of a compiled arm."""
 
     def __init__(self, model: "mujoco.MjModel", hand: Hand) -> None:
         self._dofs = [int(model.joint(name).dofadr[0]) for name in SIDES]

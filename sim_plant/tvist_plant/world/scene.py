@@ -46,14 +46,9 @@ class World:
 def build(
     description: RobotDescription, payload: Payload, scene: SceneFile, timestep: float, hand: Hand | None
 ) -> World:
-    """Put an arm into a scene.
+    """Put an arm with its payload, and maybe a gripper, into a scene, whose origin is the arm's base.
 
-    Args:
-        description: The arm.
-        payload: What it carries.
-        scene: The scene; its origin is the base of the arm.
-        timestep: Time step of MuJoCo's integrator [s].
-        hand: Gripper on the flange; None for none.
+    The time step is that of MuJoCo's integrator [s].
 
     Raises:
         SceneError: The file is no scene, or no arm can stand in it.
@@ -100,10 +95,8 @@ def build(
 def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody", alone: "mujoco.MjModel") -> None:
     """Mount the shapes of the scene's tool on the flange; their weight is the payload's.
 
-    Args:
-        tool: The tool.
-        load: Body of what is beyond the flange.
-        alone: The scene, compiled, in which poses and sizes are numbers however the file gives them.
+    The load is the body beyond the flange. In `alone`, the scene compiled, poses and sizes are numbers
+    however the file gives them.
 
     Raises:
         SceneError: It is more than shapes of primitive kinds.

@@ -36,10 +36,7 @@ def scenes() -> list[str]:
 
 
 def find_scene(name: str) -> SceneFile:
-    """Find a scene.
-
-    Args:
-        name: One of `scenes`, or path of a file in MuJoCo's format (MJCF).
+    """Find a scene: one of `scenes`, or the path of a file in MuJoCo's format (MJCF).
 
     Raises:
         SceneError: There is no such file, or it is none of MuJoCo's.

@@ -1,0 +1,280 @@
+"""Motions by number; the parts, rate and pause of a planned one in progress."""
+
+import math
+from typing import Protocol, Unpack
+
+import numpy as np
+
+from tvist_controller.commands.events import Emit, Told
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.differentiator import STILL
+from tvist_controller.line.limits import REDUCED_SHARE, acceleration_on_way, rate_of
+from tvist_controller.motion.safety_system import SafetySystem
+from tvist_controller.planning.course import Course
+from tvist_controller.planning.move_planner import PlannedMove
+from tvist_controller.trajectory import Guided, PlannedMotion
+from tvist_protocol.replies import Code
+
+PAUSE_SHARE = 0.95
+"""Share of the acceleration permitted by the torque that a pause uses, since the filter may add a little [-]."""
+LEAST_PAUSE = 0.2
+"""Smallest share of a motion's acceleration that the torque must permit for a pause; else the motion runs on [-]."""
+
+
+class RunningMotion(Protocol):
+    """A motion in progress, whose speed can be changed."""
+
+    @property
+    def rate(self) -> float:
+        """Rate of its time [-]."""
+
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Change its speed [-]; `slowest` is the velocity limit of reduced speed [rad/s], None without."""
+
+
+class RunningMove:
+    """One planned motion."""
+
+    def __init__(self, planned: PlannedMove, cycle: ControlCycle) -> None:
+        self._velocity, self._cycle = planned.velocity, cycle
+        self._window, self._peak = planned.window, planned.peak
+        self._room, self._surplus = planned.room, planned.surplus
+        self._held = False
+        self._course = planned.course
+        self._parts = len(planned.parts)
+        self._trajectory, *coming = planned.parts
+        self.coming: tuple[PlannedMotion, ...] = tuple(coming)
+        """Parts that have not begun."""
+        self._begin()
+
+    def go_on(self, speed: float, slowest: float | None) -> None:
+        """Begin the next part; see `RunningMotion` for the arguments."""
+        self._trajectory, *coming = self.coming
+        self.coming, self._held = tuple(coming), False
+        self._trajectory.speed = self._rate(speed, slowest)
+        self._begin()
+
+    @property
+    def course(self) -> tuple[Course | None, float]:
+        """What its last part may go on from, and the time of that part, 0 before it begins [s]; None if it cannot."""
+        return self._course, 0.0 if self.coming else self._trajectory.time
+
+    def extend(self, planned: PlannedMove, speed: float, slowest: float | None) -> None:
+        """Go on to further parts of the path; speeds as in `RunningMotion`.
+
+        The first part of their plan is the last one so far, which is the same until now and some ticks more.
+        """
+        longer, *coming = planned.parts
+        if self.coming:
+            self.coming = (*self.coming[:-1], longer, *coming)
+            self._velocity = max(self._velocity, planned.velocity)
+            self._window = min(self._window, planned.window)
+        else:
+            self._cycle.go_on(longer)
+            self._velocity, self._window, self.coming = planned.velocity, planned.window, tuple(coming)
+        self._peak, self._course = planned.peak, planned.course
+        self._parts += len(coming)
+        self.pace(speed, slowest)
+
+    def _begin(self) -> None:
+        self._cycle.begin(self._trajectory)
+        self._cycle.tvist.aim(self._trajectory.path.end)
+
+    def _rate(self, speed: float, slowest: float | None) -> float:
+        """Rate of its time [-]: lower if it was planned for a shaper that is less slow, peaked or uneven."""
+        tvist = self._cycle.tvist
+        room = min(_fitting(self._window, tvist.delay), _fitting(self._peak, tvist.peak))
+        if tvist.surplus != self._surplus:
+            (velocity, acceleration), (more_velocity, more_acceleration) = self._room, tvist.surplus
+            room = min(
+                room, velocity / (1.0 + more_velocity), math.sqrt(acceleration / (1.0 + more_acceleration))
+            )
+        return min(rate_of(speed, self._velocity, slowest), room)
+
+    @property
+    def progress(self) -> tuple[int, float] | None:
+        """Number of its present part, from 0, and the length covered on it [m]; None on a part without length."""
+        if self._trajectory.path.posture_of is None:
+            return None
+        return self._parts - 1 - len(self.coming), float(self._cycle.along.newest.q[0])
+
+    @property
+    def stops_at(self) -> tuple[int, float] | None:
+        """Progress at which a stop that has begun ends; None if no stop on the path has begun."""
+        forecast, present = self._cycle.trajectory.forecast, self.progress
+        if present is None or forecast is None or forecast.path is not self._trajectory.path:
+            return None
+        if self._held and self._cycle.trajectory is self._trajectory:
+            return present  # it is paused, and does not go on to its end
+        return present[0], float(forecast.end[0])
+
+    @property
+    def rate(self) -> float:
+        """Rate of its time [-]."""
+        return self._trajectory.rate
+
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Change the rate, unless the motion is paused; see `RunningMotion`."""
+        if not self._held:
+            self._trajectory.speed = self._rate(speed, slowest)
+
+    def hold(self) -> None:
+        """Slow down to a standstill within the torque limits, if that takes less time; see `PlannedMotion.hold`."""
+        if self._held or self._cycle.mode.at_rest:  # at rest, it is between two parts
+            return
+        trajectory, cycle = self._trajectory, self._cycle
+        most = trajectory.agility.acceleration
+        newest = cycle.along.newest
+        speed = max(trajectory.velocity, float(np.abs(newest.qd).max()))
+        left = trajectory.path.end - newest.q
+        farthest = float(np.abs(left).max())
+        way = left * min(speed * speed / (most * max(farthest, STILL)), 1.0)
+        limits = np.array(cycle.description.limits.torque)
+        room = PAUSE_SHARE * acceleration_on_way(
+            cycle.dynamics, trajectory.path, newest.q, way, speed, limits
+        )
+        if not trajectory.steady:  # the slider is changing its speed already, and may use all
+            room = most
+        self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))
+
+    def release(self, speed: float, slowest: float | None) -> None:
+        """Resume after a pause; see `RunningMotion`."""
+        if self._held:
+            self._trajectory.release(self._rate(speed, slowest))
+        self._held = False
+
+
+class Motions:
+    """Starts motions, one at a time; each number ends in either done or stopped."""
+
+    def __init__(self, cycle: ControlCycle, safety: SafetySystem, emit: Emit) -> None:
+        self._cycle, self._safety, self._emit = cycle, safety, emit
+        self._reduced_velocity = REDUCED_SHARE * min(cycle.description.limits.velocity)
+        self._started = 0
+        self._running: RunningMotion | None = None
+        self.asked_speed = 1.0
+        """Speed that was set [-]."""
+        self._scale = 1.0
+
+    @property
+    def running(self) -> bool:
+        """Whether a motion is running."""
+        return self._running is not None
+
+    @property
+    def wanted_speed(self) -> float:
+        """Speed that was set, as far as the robot's own slider lets it [-]."""
+        return self.asked_speed * self._scale
+
+    @property
+    def speed(self) -> float:
+        """Rate of the running motion's time; without one, that of the next motion [-]."""
+        return self.wanted_speed if self._running is None else self._running.rate
+
+    @property
+    def slowest(self) -> float | None:
+        """Largest velocity of a joint while the safety system reduces the speed [rad/s]; None while it does not."""
+        return self._reduced_velocity if self._safety.reduced else None
+
+    def begin(self, planned: PlannedMove) -> int:
+        """Start a planned motion and return its number."""
+        number = self._begin(RunningMove(planned, self._cycle))
+        self._warn(planned)
+        return number
+
+    def extend(self, planned: PlannedMove) -> None:
+        """Let the running motion go on to further parts of its path; the plan holds for the present state."""
+        assert isinstance(self._running, RunningMove)
+        self._running.extend(planned, self.wanted_speed, self.slowest)
+        self._warn(planned)
+
+    def _warn(self, planned: PlannedMove) -> None:
+        for why in planned.skipped:
+            self._emit("warning", id=self._started, code="blend_skipped", why=why)
+        if planned.limited is not None:
+            code, why = planned.limited
+            self._emit("warning", id=self._started, code=code, why=why)
+
+    def guide(self, trajectory: Guided) -> int:
+        """Return the number of a guided motion, which is that of its predecessor if there is one."""
+        trajectory.pace(self.wanted_speed, self.slowest)
+        if self._running is None:
+            return self._begin(trajectory)
+        self._running = trajectory
+        return self._started
+
+    def _begin(self, motion: RunningMotion) -> int:
+        self._started += 1
+        self._running = motion
+        self._emit("motion_started", id=self._started)
+        return self._started
+
+    def go_on(self) -> bool:
+        """Start the next part of the running motion, since one has come to rest; return whether there was one."""
+        if not self.coming:
+            return False
+        assert isinstance(self._running, RunningMove)
+        self._running.go_on(self.wanted_speed, self.slowest)
+        return True
+
+    @property
+    def coming(self) -> tuple[PlannedMotion, ...]:
+        """Parts of the running motion that have not begun."""
+        return self._running.coming if isinstance(self._running, RunningMove) else ()
+
+    @property
+    def course(self) -> tuple[Course | None, float]:
+        """What the running motion may go on from, and its time [s]; None if it cannot go on."""
+        return self._running.course if isinstance(self._running, RunningMove) else (None, 0.0)
+
+    @property
+    def progress(self) -> tuple[int, float] | None:
+        """Number of the running motion's present part, and the length covered on it [m]; None if it has no length."""
+        return self._running.progress if isinstance(self._running, RunningMove) else None
+
+    @property
+    def stops_at(self) -> tuple[int, float] | None:
+        """Progress at which a stop of the running motion ends; None if no stop on its path has begun."""
+        return self._running.stops_at if isinstance(self._running, RunningMove) else None
+
+    def set_speed(self, fraction: float) -> None:
+        """Scale the time of the running motion and of later ones."""
+        self.asked_speed = fraction
+        self.keep_rate()
+
+    def scale(self, share: float) -> None:
+        """Scale that speed, too, by the slider of a robot that is moved through its own controller [-]."""
+        self._scale = share
+        self.keep_rate()
+
+    def keep_rate(self) -> None:
+        """Let the running motion continue at the rate that is set and allowed."""
+        if self._running is not None:
+            self._running.pace(self.wanted_speed, self.slowest)
+
+    def hold(self) -> None:
+        """Bring a planned motion to a standstill on its path."""
+        if isinstance(self._running, RunningMove):
+            self._running.hold()
+
+    def release(self) -> None:
+        """Resume a planned motion."""
+        if isinstance(self._running, RunningMove):
+            self._running.release(self.wanted_speed, self.slowest)
+
+    def done(self) -> None:
+        """Report that the shaped reference has come to rest at the motion's target."""
+        if self._running is not None:
+            self._emit("motion_done", id=self._started)
+            self._running = None
+
+    def stopped(self, why: str, code: Code | None, **told: Unpack[Told]) -> None:
+        """Report that the motion ended before its target."""
+        if self._running is not None:
+            self._emit("motion_stopped", id=self._started, code=code, why=why, **told)
+            self._running = None
+
+
+def _fitting(planned: float, present: float) -> float:
+    """Rate at which a property of the shaper is no larger than planned [-]."""
+    return 1.0 if present <= planned else planned / present
