@@ -29,6 +29,8 @@ CONTINUOUS: Final = 4.0 * math.pi
 """Largest distance from zero of a joint without end stops [rad]."""
 UPRIGHT: Final = 1e-6
 """Deviation of the first axis from the vertical that still counts as rounding [-]."""
+DEEPEST: Final = 200
+"""Largest number of joints from the base to a link, fixed ones included: parsers of URDF recurse along a chain."""
 LARGEST: Final = 1e7
 """Largest number, as in other robot files."""
 NUMBERS: Final = {
@@ -97,6 +99,7 @@ def _named(element: Element, where: str) -> str:
 def _check_tree(root: Element, links: dict[str, Element], where: str) -> None:
     """Check that joints make one tree of the links."""
     children: Counter[str] = Counter()
+    after: dict[str, list[str]] = {}
     for joint in root.findall("joint"):
         here = f"{where}: joint {_named(joint, where)}"
         ends = [
@@ -108,12 +111,23 @@ def _check_tree(root: Element, links: dict[str, Element], where: str) -> None:
             if link not in links:
                 raise UrdfError(f"{here}: there is no link {link!r:.{LONGEST_NAME}}")
         children[ends[1]] += 1
+        after.setdefault(ends[0], []).append(ends[1])
     twice = next((name for name, count in children.items() if count > 1), None)
     if twice is not None:
         raise UrdfError(f"{where}: link {twice} is the child of two joints: closed chains are not supported")
     roots = [name for name in links if name not in children]
     if len(roots) != 1:
         raise UrdfError(f"{where}: {len(roots)} links are no joint's child: exactly one must be, the base")
+    row, count = roots, 0
+    for _ in range(DEEPEST + 1):
+        count += len(row)
+        row = [child for link in row for child in after.get(link, ())]
+    if row:
+        raise UrdfError(
+            f"{where}: link {row[0]} is more than {DEEPEST} joints from the base: make the chain shorter"
+        )
+    if count < len(links):
+        raise UrdfError(f"{where}: some joints lead round in a circle: closed chains are not supported")
 
 
 def _check_numbers(root: Element, where: str) -> None:

@@ -89,7 +89,7 @@ BRANCH = '<link name="x"/><joint name="jx" type="{}"><parent link="elbow"/><chil
         ('lower="-3.05" upper="3.05"', 'lower="3" upper="-3"', "joint j7: <limit> has lower 3 and upper -3"),
         ('xyz="0 0 0.16"', 'xyz="0 0 up"', "joint j1: xyz is '0 0 up': must be 3 numbers"),
         ('<parent link="wrist"/>', '<parent link="wirst"/>', "joint j7: there is no link 'wirst'"),
-        ('<parent link="base"/>', '<parent link="tool0"/>', "no joint"),
+        ('<parent link="base"/>', '<parent link="tool0"/>', "in a circle"),
         ('rpy="0 0 0.4"', 'rpy="1.5 0 0"', "the axis of joint j1 must point straight up"),
         ('ixx="0.03"', 'ixx="3.0"', "no body can have this"),
         ('<robot name="seven">', "<!DOCTYPE x><robot>", "it has a document type"),
