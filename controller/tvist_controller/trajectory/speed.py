@@ -95,7 +95,18 @@ class Speed(Guided):
         """Set the speed; the present one is kept until the next tick."""
         self._speed, self._slowest = speed, self._arm_limits.velocity if slowest is None else slowest
         if not self._u.any():
-            self.rate = speed
+            self.rate = self._wanted_rate
+
+    @property
+    def _wanted_rate(self) -> float:
+        """The commanded rate, or one at which joints that are or will be faster than permitted keep the limit.
+
+        Of a tool, the joints' velocities on its way are not known ahead: `speed_step` looks at them.
+        """
+        if self.arm is not None:
+            return self._speed
+        fastest = max(float(np.abs(self._goal).max()), float(np.abs(self._u).max()))
+        return self._speed if fastest <= self._slowest else min(self._speed, self._slowest / fastest)
 
     @property
     def _accelerations(self) -> Floats:
@@ -148,7 +159,7 @@ class Speed(Guided):
         for share in self._shares():
             part = part_of(duration, share * self.rate * h)
             u = self._goal if part == 1.0 else self._u + part * (self._goal - self._u)
-            given = np.array((self.rate, self._speed, self._slowest, limits.acceleration, self._lag, h))
+            given = np.array((self.rate, self._wanted_rate, self._slowest, limits.acceleration, self._lag, h))
             place, q = np.empty((4, 3)), np.empty_like(self._q)
             status, rate = speed_step(
                 self._chain, self._inverse, np.stack((self._q, self._step)), np.stack((self._u, u)), ranges,

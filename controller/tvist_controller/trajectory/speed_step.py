@@ -73,7 +73,7 @@ def speed_step(  # noqa: C901  a kernel: its branches are loops
     velocities: Floats,  # at the beginning and the end, in the trajectory's own time, shape (2, 6) or (2, n)
     ranges: Floats,  # least and largest change of the joints' step, and largest step, shape (3, n) [rad]
     change: Floats,  # largest one of the velocity, shape (6,) or (n,)
-    given: Floats,  # present and commanded rate [-], the joints' limits, `Speed._lag`, tick [s]
+    given: Floats,  # present and wanted rate [-], the joints' limits, `Speed._lag`, tick [s]
     place: Floats,  # present rotation and position of the tool, shape (4, 3)
     goal: Floats,  # result: those a tick later
     q: Floats,  # result: positions of the joints a tick later, shape (n,) [rad]
@@ -100,8 +100,6 @@ def speed_step(  # noqa: C901  a kernel: its branches are loops
     least, most = fitting_rates(-rate * present, u, -change, change)
     fastest = np.max(np.abs(slope))
     wanted = speed
-    if not straight and fastest > slowest:
-        wanted = min(speed, slowest / fastest)
     if wanted != rate:  # the present rate is possible, but for rounding
         wanted = min(max(wanted, least), most)
     if straight and fastest > 0.0:
