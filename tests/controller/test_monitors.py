@@ -5,7 +5,7 @@ import pytest
 from tvist_controller.motion.monitor import Finding, Monitor
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
-from tvist_protocol.simulation import SimulationReset
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 
 from .robots import Q2, Robot
 
@@ -69,3 +69,13 @@ def test_a_monitor_looks_while_it_has_what_it_needs_and_begins_anew_when_the_dri
     assert (held.looked, held.restarts) == (seen + 10, restarts + 1)
     robot.send(SimulationReset, q=tuple(Q2))
     assert held.restarts == restarts + 2
+
+
+def test_what_was_found_before_an_unlock_does_not_count_again():
+    held = WhileHeld()
+    robot = with_monitor(held)
+    robot.send(SimulationInject, fault="protective_stop")
+    robot.tick(100)
+    before = held.restarts
+    assert robot.send(c.UnlockProtectiveStop) == Done()
+    assert held.restarts == before + 1

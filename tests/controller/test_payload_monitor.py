@@ -155,11 +155,11 @@ def test_a_new_declaration_starts_anew():
     watched = Watched(PAPER[0], 2.0, 5.0)
     assert watched.move(PAPER[1])
     watched.cycle.dynamics.declare(disc(5.0))
-    watched.monitor.declare(disc(5.0))
+    watched.monitor.declare(disc(5.0), 1)
     assert watched.monitor.excess == (0.0, np.inf)
     assert not watched.move(PAPER[2])
     watched.cycle.dynamics.declare(disc(1.0))
-    watched.monitor.declare(disc(1.0))
+    watched.monitor.declare(disc(1.0), 1)
     assert watched.move(PAPER[3]) or watched.move(PAPER[0])
 
 

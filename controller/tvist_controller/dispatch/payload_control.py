@@ -122,7 +122,7 @@ class PayloadControl:
         self._motion.cycle.dynamics.declare(carried, ticks)
         found = payload is not self.declared
         self._filters.declare(payload, tvist, found=found)
-        self.monitor.declare(carried, found=found, told=told)
+        self.monitor.declare(carried, ticks, found=found, told=told)
 
     rows: ClassVar[tuple[Row, ...]] = (
         Row(

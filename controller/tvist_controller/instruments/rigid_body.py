@@ -61,7 +61,7 @@ class RigidBody:
     def __init__(self, description: RobotDescription) -> None:
         self._arm = self._tool = Arm(description)
         self._payload: Payload | None = None
-        self._offset = [0.0] * 6
+        self._offset = [0.0] * 6  # as messages have it
         self._joints_to_elbow = min(description.joints, ELBOW)
         still = np.zeros((3, description.joints))
         self.tool(still, self._offset)  # this loads compiled code, which takes many ticks, as the next two do

@@ -103,7 +103,7 @@ class ToolWrench:
         drives = description.drives
         self._drives = np.array([drives.rotor_inertia, drives.coulomb_friction])
         self._width, self._linear = drives.friction_width, drives.linear_friction
-        self._offset = [0.0] * 6
+        self._offset: tuple[float, ...] = (0.0,) * 6
         # Loads compiled code, which takes many ticks.
         self.estimate(np.zeros((ROWS, description.joints)), self._offset)
 
@@ -123,8 +123,8 @@ class ToolWrench:
         Returns:
             Shape (6 + n,).
         """
-        if offset != self._offset:
-            self._offset, self._arm = list(offset), self._arm.with_tool(offset)
+        if tuple(offset) != self._offset:
+            self._offset, self._arm = tuple(offset), self._arm.with_tool(offset)
         share = motion[SHAPED_QD] / self._width
         out = np.empty(6 + len(share))
         slip = share if self._linear else np.tanh(share)

@@ -200,10 +200,6 @@ class ForceControl(Monitor):
         self._beyond = 0
         return Finding(why, "limit_force", "protective_stop")
 
-    def restart(self) -> None:
-        """Restart the count of ticks beyond a limit."""
-        self._beyond = 0
-
     def _note_contact(self, contact: ContactWatch, sample: Sample, pressed: Sequence[Floats]) -> None:
         """Tell the present watch of contacts the force; it begins anew where forces jump."""
         basis = self._forces.basis

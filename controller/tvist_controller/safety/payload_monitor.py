@@ -131,14 +131,14 @@ class PayloadMonitor(Monitor):
         # Without this floor, a joint without friction would dominate the estimate.
         self._friction = np.maximum(drives.coulomb_friction, 0.01 * np.array(description.limits.torque))
         self._fade = np.exp(-EVERY * PERIOD / np.array([MEMORY, RECENT]))
-        self.declare(declared)
+        self.declare(declared, SLEW)
         still = np.zeros_like(self._sum)  # the first calls load compiled code, which takes many ticks
         add(still, still, still)
         nothing = np.zeros_like(self._sums)
         correlate(self._chain, still, still, still, self._scratch, self._friction, still, self._fade, nothing)
 
-    def declare(self, payload: Payload, *, found: bool = False, told: bool = False) -> None:
-        """Set another payload: discard past measurements, and wait until it is fully phased in.
+    def declare(self, payload: Payload, ticks: int, *, found: bool = False, told: bool = False) -> None:
+        """Set another payload: discard past measurements, and wait for the ticks in which it is phased in.
 
         If the robot has `found` it, it is assumed, not declared; `told` says whether a warning has told
         already that the arm carries something else.
@@ -148,11 +148,10 @@ class PayloadMonitor(Monitor):
         kilogram = pin.Inertia(1.0, np.array(payload.com), np.zeros((3, 3)))
         self._chain[-2, BODY:] = self._placement.act(kilogram).toDynamicParameters()
         self.restart()
-        self._wait, self._warned = SLEW, told
+        self._wait, self._warned = ticks, told
 
     def restart(self) -> None:
         """Discard past measurements."""
-        self._wait = 0
         self._ticks, self._sum[:] = 0, 0.0
         self._time = 0.0
         self._sums = np.zeros((3, len(self._fade)))

@@ -162,6 +162,9 @@ class SafetyControl:
             self._motion.check("unlock_protective_stop")
             self._hold()
         self._motion.go("unlock_protective_stop")
+        for monitor in self.monitors:  # what was found before the unlock does not count again
+            if monitor.needs == "drives":
+                monitor.restart()
 
     def watch(self, sample: Sample) -> None:
         """Warn or stop the arm by what the latest tick has shown."""
