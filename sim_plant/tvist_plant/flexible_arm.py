@@ -70,9 +70,14 @@ class FlexibleArm(SimulatedArm):
         self._load(payload)
         self._accelerometer = Accelerometer(description.sensors.accelerometer_noise, 0)
 
+    @property
+    def payload(self) -> Payload:  # type: ignore[override]
+        """Carried payload."""
+        return self._payload
+
     def _load(self, payload: Payload) -> None:
         """Create the models of the arm with this payload, and memory for its state."""
-        self.payload = payload
+        self._payload = payload
         truly = payload if self._carries is None else self._carries(payload)
         self._flexible: FlexibleModel = imperfect_model(self.description, truly, self._imperfections)
         self._outside = Outside(self._flexible)
@@ -203,7 +208,7 @@ class FlexibleArm(SimulatedArm):
 
     def load(self, payload: Payload) -> None:
         """Carry another payload from now on."""
-        self.payload, model = payload, self._flexible.model
+        self._payload, model = payload, self._flexible.model
         self._flexible.carry(payload if self._carries is None else self._carries(payload))
         self._arm.chain[model.nv - 1, BODY:] = body_of(model, model.nv)
         self._arm.pushed[:] = 0.0 if self._outside.rests else self._outside.generalized_force(self._q)

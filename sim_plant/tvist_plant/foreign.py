@@ -32,9 +32,9 @@ def is_plant(value: object) -> bool:
 
 def arm_of(plant: Plant) -> Plant:
     """Return a plant with all methods: itself, or what stands for an object that derives from no class here."""
-    if isinstance(plant, Plant):
+    if isinstance(plant, SimulatedArm | RealArm):
         return plant
-    return _standing_for(plant, _StandIn, ())
+    return _standing_for(plant, _StandIn, ())  # type: ignore[type-abstract]
 
 
 def called(plant: Plant, joints: int, *, untold: bool = False) -> Plant:
@@ -157,8 +157,8 @@ def measured_standing(plant: Plant, joints: int) -> Measurement:
     Raises:
         ValueError: The plant does not answer, or its measurement has the wrong shape or is not finite.
     """
-    assert isinstance(plant, RealArm), "a simulated arm is placed"
     name = type(plant).__name__
+    assert isinstance(plant, RealArm), f"plant {name}: a simulated arm is placed"
     try:
         measured = plant.measure()
     except PlantError as error:

@@ -234,7 +234,8 @@ class Plant(ABC):
 
     def can(self, method: Callable[..., Any]) -> bool:
         """Return whether the plant has a method of its own for one that has a default here, such as `Plant.load`."""
-        return getattr(type(self), method.__name__) is not method
+        found = getattr(self, method.__name__)
+        return callable(found) and getattr(found, "__func__", found) is not method
 
     # ------------------------------------------------------------------ what it carries and grips
 
@@ -410,12 +411,13 @@ class RealArm(Plant):
     @property
     def watched(self) -> bool:
         """Whether its own controller moves it: no command reaches it, and `step` only measures."""
-        return self.can(RealArm.sight)
+        return self.can(RealArm.sight) and self.can(Plant.wait)
 
     @property
     def supervised(self) -> bool:
         """Whether we move it through its own controller, which follows our positions and may stop it."""
-        return self.can(RealArm.seen)
+        needed = (RealArm.seen, RealArm.described, Plant.wait, Plant.switch, Plant.stop)
+        return all(self.can(one) for one in needed)
 
     def sight(self) -> Sight:
         """Return what it said in its next cycle, for which `wait` has waited.

@@ -43,6 +43,8 @@ NUMBERS: Final = {
     },
 }  # fmt: skip
 """Attributes that are read, by the elements of joints and links."""
+DEFAULTS: Final = {("axis", "xyz"): (1.0, 0.0, 0.0)}
+"""What an attribute is that is not given, where that is not zeros."""
 
 
 class UrdfError(RobotFileError):
@@ -67,9 +69,9 @@ def read_urdf(path: str | Path) -> dict[str, Any]:
         UserFileError: The file is not text, too large or nested too deeply.
         OSError: The file cannot be read.
     """
-    where = f"robot file {path}"
+    where, text = f"robot file {path}", read_text(path, "robot file")
     try:
-        root = xml(read_text(path, "robot file").encode())
+        root = xml(text.encode())
     except UserFileError as error:
         raise UrdfError(f"{where}: {error}") from error
     if root.tag != "robot":
@@ -189,11 +191,30 @@ def _model(root: Element, where: str) -> pin.Model:
         for element in root.findall(kind):
             turns = element.get("type") in TURNING
             copy = SubElement(checked, kind, {**element.attrib, **({"type": "continuous"} if turns else {})})
-            copy.extend(part for part in element if part.tag in parts)
+            copy.extend(_as_checked(part, f"{kind}/{part.tag}") for part in element if part.tag in parts)
+    twice = [
+        f"{kind} {name}"
+        for kind in ("link", "joint")
+        for name, count in Counter(one.get("name") for one in root.findall(kind)).items()
+        if count > 1
+    ]
+    if twice:
+        raise UrdfError(f"{where}: there are two of {', '.join(twice)}: give each a name of its own")
     try:
         return pin.buildModelFromXML(tostring(checked, encoding="unicode"))
     except (RuntimeError, ValueError) as error:
         raise UrdfError(f"{where}: pinocchio cannot read it: {error}") from error
+
+
+def _as_checked(element: Element, at: str) -> Element:
+    """Return an element with the numbers that were checked, written as every parser reads them."""
+    kind, _, path = at.partition("/")
+    copy = Element(element.tag, dict(element.attrib))
+    for key in NUMBERS[kind].get(path, ()):
+        default = DEFAULTS.get((element.tag, key), (0.0,) * (3 if key in {"xyz", "rpy"} else 1))
+        copy.set(key, " ".join(map(repr, numbers(element, key, default, at).tolist())))
+    copy.extend(_as_checked(part, f"{at}/{part.tag}") for part in element)
+    return copy
 
 
 def _check_chain(model: pin.Model, chain: list[_Joint], where: str) -> None:
@@ -229,9 +250,8 @@ def _content(
     first = ends[0]
     if first.rotation[2, 2] < 1.0 - UPRIGHT:
         raise UrdfError(f"{where}: the axis of joint {chain[0].name} must point straight up from the base")
-    flange = next((frames[one] for one in FLANGES if one in frames), None)
-    fixed = flange is not None and flange.parentJoint == len(chain)
-    ends.append(flange.placement if flange is not None and fixed else pin.SE3.Identity())
+    last = [frames[one] for one in FLANGES if one in frames and frames[one].parentJoint == len(chain)]
+    ends.append(last[0].placement if last else pin.SE3.Identity())
     away = first.translation * [1.0, 1.0, 0.0]  # the base frame is on the first joint's axis
     into = [pin.SE3(np.eye(3), -away)]
     """From the base link and from each joint's frame into that of the robot file's link."""

@@ -9,7 +9,7 @@ from tvist_controller.controller import Controller
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import Payload
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import Measurement, PlantError
+from tvist_plant.plant import Measurement, Plant, PlantError, SimulatedArm
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.simulation import SimulationInject, SimulationReset
@@ -56,6 +56,19 @@ def test_a_plant_cannot_be_exchanged_from_outside():
     robot = Robot()
     with pytest.raises(AttributeError):
         robot.controller.cycle.plant = NoArm()
+
+
+class Own(NoArm, Plant):
+    """An arm that derives from `Plant` itself, and can be put somewhere."""
+
+    payload = Payload()
+
+
+def test_a_class_that_derives_from_plant_alone_is_a_plant():
+    robot = Robot(plant=Own())
+    assert isinstance(robot.controller.cycle.plant, SimulatedArm)
+    state = robot.tick(10)
+    assert state.actual_q == pytest.approx(state.target_q)
 
 
 def test_a_plant_of_ones_own_is_what_moves():

@@ -92,6 +92,7 @@ BRANCH = '<link name="x"/><joint name="jx" type="{}"><parent link="elbow"/><chil
         ('<parent link="base"/>', '<parent link="tool0"/>', "in a circle"),
         ('rpy="0 0 0.4"', 'rpy="1.5 0 0"', "the axis of joint j1 must point straight up"),
         ('ixx="0.03"', 'ixx="3.0"', "no body can have this"),
+        ('<joint name="j7"', '<joint name="j5"', "two of joint j5: give each a name of its own"),
         ('<robot name="seven">', "<!DOCTYPE x><robot>", "it has a document type"),
         ('<robot name="seven">', '<robot name="seven"', "it is not valid XML"),
     ],
@@ -114,3 +115,19 @@ def test_limits_that_are_not_symmetric_are_widened_and_told(tmp_path):
     arm = load(path)
     assert arm.limits.position[-1] == 3.05
     assert arm.provenance["limits.position"] == "assumed: j7 -1 to 3.05 rad in the URDF, here ±3.05"
+
+
+def test_numbers_are_read_whatever_blanks_stand_around_them(tmp_path):
+    """pinocchio's parser alone would leave the whole body out."""
+    path, text = tmp_path / "seven.urdf", SEVEN.read_text(encoding="utf-8")
+    for old, new in (('mass value="2.7"', 'mass value=" 2.7 "'), ('ixx="0.03"', 'ixx=" 0.03 "')):
+        assert old in text
+        text = text.replace(old, new, 1)
+    path.write_text(text, encoding="utf-8")
+    assert load(path).links == load(SEVEN).links
+
+
+def test_a_link_that_is_called_like_the_flange_but_is_none_is_passed_over(tmp_path):
+    path, text = tmp_path / "seven.urdf", SEVEN.read_text(encoding="utf-8")
+    path.write_text(text.replace('"tool0"', '"flange"').replace('"elbow"', '"tool0"'), encoding="utf-8")
+    assert load(path).kinematics == load(SEVEN).kinematics

@@ -95,7 +95,8 @@ class LiveCell:
         if cell.tools:
             terminals.set_tcp(cell.tools[0].tcp)
         self._cell, self._plant, self._terminals, self._emit = cell, plant, terminals, emit
-        self._hand = plant if plant.can(Plant.grip) else None
+        grips = all(plant.can(one) for one in (Plant.mount, Plant.grip, Plant.opening))
+        self._hand = plant if grips else None
         self._kinematics = Arm(description)
         self.gripper = (
             None if cell.gripper is None else Gripper(cell.gripper.stroke, activated=cell.gripper.activated)
