@@ -103,15 +103,19 @@ class KernelCache(_Cache):
                     return from_bytes(target_context, code)
         return None
 
-    def load_file(self, file: Path) -> None:
-        """Take what is in a file into use, for the types of arguments that it is for, unless these are in use."""
+    def load_file(self, file: Path) -> bool:
+        """Take what is in a file into use, for the types of arguments that it is for, unless these are in use.
+
+        Returns False if the file is damaged.
+        """
         code, context = _code(file), cpu_target.target_context
         if not self._enabled or code is None:
-            return
+            return False
         found = from_bytes(context, code)
         if tuple(found.signature.args) not in self._dispatcher.overloads:
             context.insert_user_function(found.entry_point, found.fndesc, [found.library])
             self._dispatcher.add_overload(found)
+        return True
 
     def save_overload(self, sig: object, data: Any) -> None:
         """Write a kernel into the first folder that can be written in; if there is none, note it in `unkept`."""
@@ -186,11 +190,13 @@ def held(some: "Iterable[KernelCache]") -> "dict[KernelCache, list[Path]]":
     return {kernel: files for kernel, files in found.items() if files}
 
 
-def load_all(some: "Iterable[KernelCache]") -> None:
-    """Load all machine code of some kernels that is on disk, so that no call does, which takes milliseconds each."""
-    for kernel, files in held(some).items():
-        for file in files:
-            kernel.load_file(file)
+def load_all(some: "Iterable[KernelCache]") -> bool:
+    """Load all machine code of some kernels that is on disk, so that no call does, which takes milliseconds each.
+
+    Returns whether none was damaged.
+    """
+    loaded = [kernel.load_file(file) for kernel, files in held(some).items() for file in files]
+    return all(loaded)
 
 
 def _listed(folder: Path) -> dict[str, list[str]]:

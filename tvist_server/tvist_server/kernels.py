@@ -54,9 +54,9 @@ def compiled() -> int:
 
 @cache
 def warm_up() -> None:
-    """Load every kernel of a served robot, so that no tick does; those that could not be kept on disk are compiled."""
-    load_all(KERNELS)
-    if compiled() < len(KERNELS):
+    """Load every kernel of a served robot, so that no tick does; what is damaged or not on disk is compiled."""
+    whole = load_all(KERNELS)
+    if not whole or compiled() < len(KERNELS):
         for part in PARTS.values():
             part()
 
