@@ -4,6 +4,7 @@ import contextlib
 import faulthandler
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
@@ -139,6 +140,14 @@ class Ending:
 
     def close(self) -> None:
         """Ignore the signals until the process ends, since the interpreter removes its handlers before that."""
+        report = sys.unraisablehook
+
+        def report_others(unraisable: "sys.UnraisableHookArgs") -> None:
+            # Python reports a signal that comes just when it begins to be ignored.
+            if "ignored due to race condition" not in str(unraisable.exc_value):
+                report(unraisable)
+
+        sys.unraisablehook = report_others
         for number in self._numbers:
             signal.signal(number, signal.SIG_IGN)
 
