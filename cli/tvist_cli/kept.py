@@ -76,7 +76,10 @@ def run(
         def runner(work: Any, jobs: Any) -> Any:
             return outcomes(stack.enter_context(executor(processes, scheduler)), work, jobs)
 
-        ran = engine.run(plan, folder, runner, begin)
+        try:
+            ran = engine.run(plan, folder, runner, begin)
+        except ChildProcessError as error:
+            raise ChildProcessError(f"{error}; some moves are done: {kept}") from error
     rows, effort = ran.rows, ran.effort
     return rows, {
         "rows_file": str(folder / ROWS),

@@ -75,10 +75,7 @@ def outcomes(
                 future = arrived.get()
                 yield out.pop(future), _outcome(future)
     except BrokenExecutor:
-        raise ChildProcessError(
-            "a process died while it did a task; perhaps memory ran out: what was done is kept, and the same command "
-            "continues"
-        ) from None
+        raise ChildProcessError("a process died while it did a task; perhaps memory ran out") from None
     except CancelledError:
         raise ConnectionError("the executor has dropped its tasks; perhaps its scheduler has gone") from None
 

@@ -22,7 +22,7 @@ _OPTIONAL = (
 )  # fmt: skip
 _TELLING = ("truth", "play", "held", "modes")
 MOST_KEPT = 10
-"""Largest number of exceptions that are kept until they are told."""
+"""Largest number of exceptions that are kept until `told` returns them."""
 
 
 def is_plant(value: object) -> bool:
@@ -85,7 +85,7 @@ class _Guarded(_StandIn):
         super().__init__(plant)
         self._payload = plant.payload
         self.raised: list[Exception] = []
-        """What its methods have raised that is no `PlantError`, until it is told."""
+        """Exceptions of its methods other than `PlantError`, until `told` returns them."""
 
     @property
     def payload(self) -> Payload:  # type: ignore[override]

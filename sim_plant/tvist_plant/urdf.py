@@ -43,8 +43,6 @@ NUMBERS: Final = {
     },
 }  # fmt: skip
 """Attributes that are read, by the elements of joints and links."""
-DEFAULTS: Final = {("axis", "xyz"): (1.0, 0.0, 0.0)}
-"""What an attribute is that is not given, where that is not zeros."""
 
 
 class UrdfError(RobotFileError):
@@ -78,6 +76,7 @@ def read_urdf(path: str | Path) -> dict[str, Any]:
         raise UrdfError(f"{where}: it is no URDF: its outermost element must be <robot>; expand xacro first")
     links = {_named(link, where): link for link in root.findall("link")}
     _check_numbers(root, where)
+    _check_names(root, where)
     _check_tree(root, links, where)
     turning = {joint.name: joint for joint in _turning(root, where)}
     model = _model(root, where)
@@ -96,6 +95,18 @@ def _named(element: Element, where: str) -> str:
             f"must be at most {LONGEST_NAME} printable characters"
         )
     return name
+
+
+def _check_names(root: Element, where: str) -> None:
+    """Check that no two links or joints have the same name."""
+    same = [
+        f"{kind} {name}"
+        for kind in ("link", "joint")
+        for name, count in Counter(one.get("name") for one in root.findall(kind)).items()
+        if count > 1
+    ]
+    if same:
+        raise UrdfError(f"{where}: there are two of {', '.join(same)}: give each a name of its own")
 
 
 def _check_tree(root: Element, links: dict[str, Element], where: str) -> None:
@@ -133,13 +144,16 @@ def _check_tree(root: Element, links: dict[str, Element], where: str) -> None:
 
 
 def _check_numbers(root: Element, where: str) -> None:
-    """Check the numbers of all elements that are read."""
+    """Check the numbers of all elements that are read, and write them as every parser reads them."""
     for kind, parts in NUMBERS.items():
         for element in root.findall(kind):
             here = f"{where}: {kind} {_named(element, where)}"
             for at, keys in parts.items():
                 for part, key in product(element.findall(at), keys):
-                    numbers(part, key, (0.0,) * (3 if key in {"xyz", "rpy"} else 1), here)
+                    default = (0.0,) * (3 if key in {"xyz", "rpy"} else 1)
+                    if at == "axis":
+                        default = (1.0, 0.0, 0.0)
+                    part.set(key, " ".join(map(repr, numbers(part, key, default, here).tolist())))
     for link in root.findall("link"):
         inertial = link.find("inertial")
         if inertial is not None and (inertial.find("mass") is None or inertial.find("inertia") is None):
@@ -191,30 +205,11 @@ def _model(root: Element, where: str) -> pin.Model:
         for element in root.findall(kind):
             turns = element.get("type") in TURNING
             copy = SubElement(checked, kind, {**element.attrib, **({"type": "continuous"} if turns else {})})
-            copy.extend(_as_checked(part, f"{kind}/{part.tag}") for part in element if part.tag in parts)
-    twice = [
-        f"{kind} {name}"
-        for kind in ("link", "joint")
-        for name, count in Counter(one.get("name") for one in root.findall(kind)).items()
-        if count > 1
-    ]
-    if twice:
-        raise UrdfError(f"{where}: there are two of {', '.join(twice)}: give each a name of its own")
+            copy.extend(part for part in element if part.tag in parts)
     try:
         return pin.buildModelFromXML(tostring(checked, encoding="unicode"))
     except (RuntimeError, ValueError) as error:
         raise UrdfError(f"{where}: pinocchio cannot read it: {error}") from error
-
-
-def _as_checked(element: Element, at: str) -> Element:
-    """Return an element with the numbers that were checked, written as every parser reads them."""
-    kind, _, path = at.partition("/")
-    copy = Element(element.tag, dict(element.attrib))
-    for key in NUMBERS[kind].get(path, ()):
-        default = DEFAULTS.get((element.tag, key), (0.0,) * (3 if key in {"xyz", "rpy"} else 1))
-        copy.set(key, " ".join(map(repr, numbers(element, key, default, at).tolist())))
-    copy.extend(_as_checked(part, f"{at}/{part.tag}") for part in element)
-    return copy
 
 
 def _check_chain(model: pin.Model, chain: list[_Joint], where: str) -> None:

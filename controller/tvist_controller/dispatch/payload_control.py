@@ -68,7 +68,7 @@ class PayloadControl:
 
     @property
     def held(self) -> bool:
-        """Whether the drives hold or move the arm, so that its motions teach something."""
+        """Whether the drives hold or move the arm, so that a payload can be learnt from its motions."""
         return self._motion.robot_mode is RobotMode.RUNNING
 
     def beliefs(self) -> Beliefs:

@@ -19,7 +19,7 @@ Later = Callable[[Work], Callable[[], bool]]
 class Student(Protocol):
     """Learns from motions.
 
-    One thread at a time uses it. What it learns is told by lessons alone, so that a replay needs no students.
+    One thread at a time uses it. It returns all that it learns as lessons, so a replay needs no students.
     """
 
     def study(self, motion: MotionRecord) -> PayloadLesson | None:

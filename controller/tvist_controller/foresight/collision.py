@@ -84,7 +84,7 @@ class CollisionModel:
         self._all_pairs = self._pairs_of(description)
         self._still = np.zeros(description.joints)
         self._upright = bool(np.allclose(self._chain[0, [2, 5]], 0.0))
-        """Whether the first joint changes no height."""
+        """Whether the first axis is vertical, so that turning it leaves all heights as they are."""
         self.declare(payload)
 
     def meeting(self, q: Floats) -> Meeting | None:

@@ -89,7 +89,7 @@ class Meters:
     def update(self, tick: int, current: list[float], mechanical: float, *, powered: bool) -> None:
         """Advance to a tick, with the currents of the motors [A] and the power that they deliver [W].
 
-        That power is negative while they brake. A tick that is not later than the last adds nothing.
+        Braking drives have negative power. A tick that is not later than the last adds nothing.
         """
         standby = STANDBY if powered else 0.0
         heats = [rating.resistance * i * i for rating, i in zip(self._ratings, current, strict=True)]

@@ -55,7 +55,7 @@ class Lead(NamedTuple):
     late: Floats
     """Target of the tick before and the torque that it needs, shape (4, n)."""
     leads: Floats
-    """What is wanted and what is led at the last three ticks, the newest first, shape (2, 3, n) [rad]."""
+    """Wanted and actual leads of the last three ticks, the newest first, shape (2, 3, n) [rad]."""
     before: Floats
     """Deflections without damping of the tick before, shape (N,) [rad]."""
     motion: Floats
@@ -240,7 +240,7 @@ def follow(
 ) -> bool:
     """Advance the lead by one tick to what is wanted, and return whether its acceleration was limited.
 
-    Where that was limited, the lead returns to what is wanted like a critically damped oscillator.
+    After a limit was hit, the lead returns to the wanted one like a critically damped oscillator.
     """
     limited = False
     for j in range(led.shape[1]):

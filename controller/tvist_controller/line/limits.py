@@ -152,7 +152,7 @@ class StopTorque:
     def holds(self, stop: AnyStop, *, rebound: bool = True) -> bool:
         """Return whether a stop keeps within these torques; with `rebound`, also the overshoot at its ends.
 
-        That of the flexible arm may reach the limits themselves.
+        The torque of the flexible arm may reach the limits themselves.
 
         Thirty-two moments are checked, since torque peaks where a joint's acceleration ramp ends. Nine in ten of
         the stops that need too much do so where the whole stop's ramp ends, so that moment is checked first,

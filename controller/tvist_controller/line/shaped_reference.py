@@ -46,7 +46,7 @@ class ShapedReference:
     def take(self, x: Floats, x_star: Floats) -> Floats:
         """Take the samples of this tick, and return the joint positions before shaping, shape (n,) [rad].
 
-        Where nothing is shaped, the two samples are the same object.
+        Without a filter, both samples are the same object.
         """
         q, q_star, posture_of = x, x_star, self.posture_of
         if posture_of is not None:

@@ -86,7 +86,7 @@ class MotionControl:
     def snapshot(self, filter_now: FilterState, script: Script | None, time: float | None) -> Snapshot:
         """The state that plans depend on: of a motion from rest, or of one that goes on from the running one.
 
-        That stays as it is for a `time` [s]; None: the motion begins at rest.
+        The running motion stays as it is for a `time` [s]; None: the new one begins at rest.
         """
         cycle = self.cycle
         tvist = cycle.tvist

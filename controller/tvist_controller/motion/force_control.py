@@ -28,7 +28,7 @@ more: with the light ones a hand that presses it against something hard would be
 MOST = 250.0
 """Force at the tool above which a protective stop begins, as the widest limit of UR's robots [N]."""
 DRIVES = "the drives' torques"
-"""Where the force is known from without a sensor."""
+"""Source of the force if there is no sensor."""
 TICKS = 5
 """Ticks for which a force or a deviation must last before it does."""
 TOUCH = 10.0, 4

@@ -1,4 +1,4 @@
-"""Where the force at the tool is known from: a sensor of the user's; and what it tells of contacts."""
+"""The user's own force sensor, and contacts found from the force at the tool."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ class ContactWatch:
 
     @property
     def awake(self) -> bool:
-        """Whether somebody wants to know of contacts, so that `note` is to be called in every tick."""
+        """Whether a program watches for contacts; `note` is then called in every tick."""
         return self._asked > 0
 
     def note(self, force: Floats) -> None:
@@ -86,7 +86,7 @@ class ExternalSensor:
 
     @property
     def awaited(self) -> bool:
-        """Whether the sensor is in use, and its last value is too old or has not come yet."""
+        """Whether the sensor is in use but its last value is missing or too old."""
         return self._offset is not None and self.latest is None
 
     def next(self) -> Floats | None:

@@ -1,6 +1,6 @@
 """Functions with which programs that PolyScope has written set up terminals, tool and safety.
 
-What has no effect on the simulated robot is checked, and a warning says so if it asks for something.
+Settings without effect on the simulated robot are checked; a warning names those that a program changes.
 """
 
 from typing import Annotated, Any
