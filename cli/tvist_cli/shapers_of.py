@@ -90,9 +90,9 @@ def calibration_for(
     Raises:
         Failure: There is no such calibration or shaper.
     """
-    from tvist_controller.calibrations import default_for, load
     from tvist_controller.commands.refusal import RefusalError
     from tvist_controller.planning.choices import wanted_modes
+    from tvist_controller.sources.calibrations import default_for, load
     from tvist_controller.sources.mode_source import modal_source
     from tvist_protocol.calibration import CalibrationError
     from tvist_shaping import Registry
@@ -117,7 +117,7 @@ def calibration_of(name: str) -> "Calibration":
     Raises:
         Failure: There is no such calibration.
     """
-    from tvist_controller.calibrations import load
+    from tvist_controller.sources.calibrations import load
     from tvist_protocol.calibration import CalibrationError
 
     with told(CalibrationError, code=2):

@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from tvist_controller.about import info_of
-from tvist_controller.calibrations import available, load
+from tvist_controller.sources.calibrations import available, load
 from tvist_plant.description import load as load_robot
 from tvist_plant.description import robots
 from tvist_plant.fingerprint import fingerprint

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
-from tvist_controller import calibrations
 from tvist_controller.setup import Setup
+from tvist_controller.sources import calibrations
 from tvist_controller.sources.own_files import is_file
 from tvist_controller.sources.own_shapers import check_for, load_own
 from tvist_plant.description import RobotDescription

@@ -2,13 +2,13 @@
 
 from typing import ClassVar
 
-from tvist_controller.calibrations import fits
 from tvist_controller.commands.events import Emit
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_controller.planning.plan import Planning
 from tvist_controller.planning.snapshot import FILTER, FilterState
+from tvist_controller.sources.calibrations import fits
 from tvist_controller.sources.mode_source import ModeSource
 from tvist_protocol.commands import SetEstimator, SetShaper
 from tvist_protocol.values import Payload

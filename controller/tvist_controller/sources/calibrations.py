@@ -10,11 +10,14 @@ from tvist_protocol.values import Payload
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.polynomial import Polynomial
 
+_FILES = resources.files(__package__)
+
 
 def available() -> tuple[str, ...]:
     """Return the names of the calibrations that come with the package."""
-    files = resources.files(__name__).iterdir()
-    return tuple(sorted(file.name.removesuffix(".json") for file in files if file.name.endswith(".json")))
+    return tuple(
+        sorted(file.name.removesuffix(".json") for file in _FILES.iterdir() if file.name.endswith(".json"))
+    )
 
 
 @cache
@@ -40,7 +43,7 @@ def load(calibration: str | Path) -> Calibration:
     """
     try:
         if isinstance(calibration, str) and calibration in available():
-            content = (resources.files(__name__) / f"{calibration}.json").read_bytes()
+            content = (_FILES / f"{calibration}.json").read_bytes()
         else:
             content = read_bytes(calibration, "calibration")
         return parsed(calibration, "calibration", lambda: calibration_from_json(content))

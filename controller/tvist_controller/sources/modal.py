@@ -3,19 +3,19 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
-from tvist_plant.model import FlexibleModel, flexible_model
-from tvist_protocol.calibration import Calibration, ModalParameter, Quantity
+from tvist_plant.model import FlexibleModel, Floats, flexible_model
+from tvist_protocol.calibration import Calibration, ModalModel, ModalParameter, Quantity
 from tvist_protocol.values import Payload
+from tvist_shaping.base import Filter
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
 
-Floats = npt.NDArray[np.float64]
 FRICTION: tuple[Quantity, ...] = (
     "coulomb_friction", "breakaway", "stribeck_speed", "friction_width", "viscous_friction",
 )  # fmt: skip
@@ -35,19 +35,48 @@ def modal_estimator(
         EstimatorError: The calibration has no modal model, belongs to another arm, or does not contain each parameter
             of each joint exactly once.
     """
+    known = _modal(calibration, description)
+    flexible = flexible_model(description, Body(mass=payload.mass, com=payload.com, inertia=payload.inertia))
+    return Modal(
+        mass_matrix(flexible),
+        drivetrain(known.parameters, description, flexible),
+        modes=modes,
+        f_d_min=known.f_d_min,
+        zeta_max=known.zeta_max,
+    )
+
+
+def elastic_feed_forward(
+    tvist: Filter, description: RobotDescription, calibration: Calibration
+) -> ElasticFeedForward | None:
+    """Create the elastic feed-forward that a filter needs, with a calibration's springs; None if it does without.
+
+    Raises:
+        EstimatorError: The calibration has no modal model, belongs to another arm, or lacks a parameter.
+    """
+    if tvist.feed_forward == "rigid":
+        return None
+    parameters = _modal(calibration, description).parameters
+    springs = drivetrain(parameters, description, flexible_model(description, Body()))
+    stiffness = np.array(springs.stiffness)
+    return ElasticFeedForward(
+        description,
+        stiffness,
+        np.array(springs.damping) / stiffness,
+        tvist.period,
+        torques=tvist.feed_forward == "elastic",
+        law=friction_law(parameters, description),
+    )
+
+
+def _modal(calibration: Calibration, description: RobotDescription) -> ModalModel:
+    """Return the modal model of a calibration of this arm."""
     if calibration.modal is None:
         wanted = "a model with tvist identify --model modal; this calibration has polynomials alone"
         raise EstimatorError("modal", None, wanted)
     if calibration.robot != description.robot.model:
         raise EstimatorError("robot", calibration.robot, f"{description.robot.model!r}, which this arm is")
-    flexible = flexible_model(description, Body(mass=payload.mass, com=payload.com, inertia=payload.inertia))
-    return Modal(
-        mass_matrix(flexible),
-        drivetrain(calibration.modal.parameters, description, flexible),
-        modes=modes,
-        f_d_min=calibration.modal.f_d_min,
-        zeta_max=calibration.modal.zeta_max,
-    )
+    return calibration.modal
 
 
 def mass_matrix(flexible: FlexibleModel) -> Callable[[Floats], Floats]:
@@ -70,22 +99,19 @@ def drivetrain(
         EstimatorError: A parameter is missing, given twice, or belongs to a joint or link that does not exist.
     """
     size = flexible.model.nv
-    links = description.link_flexibility.links
+    links, joints = description.link_flexibility.links, range(description.joints)
     stiffness = np.zeros(size)
-    stiffness[flexible.joints] = _values(parameters, "gear_stiffness", range(description.joints))
+    stiffness[flexible.joints] = _values(parameters, "gear_stiffness", joints)
     # Each link has two coordinates, about its y and z axes.
     stiffness[flexible.flexes] = np.repeat(_values(parameters, "bending_stiffness", links), 2)
-    rotor_inertia, velocity_gain, position_gain = np.zeros((3, size))
-    joints = range(description.joints)
-    rotor_inertia[flexible.joints] = _values(parameters, "rotor_inertia", joints)
-    velocity_gain[flexible.joints] = _values(parameters, "velocity_gain", joints)
-    position_gain[flexible.joints] = _values(parameters, "position_gain", joints)
+    motors = np.zeros((3, size))
+    for row, quantity in zip(motors, ("rotor_inertia", "velocity_gain", "position_gain"), strict=True):
+        row[flexible.joints] = _values(parameters, quantity, joints)
     times = _values(parameters, "damping_time", joints)
     damping = stiffness.copy()
     damping[flexible.joints] *= times
     damping[flexible.flexes] *= np.repeat([times[link] for link in links], 2)
-    rows = (stiffness, rotor_inertia, velocity_gain, position_gain, damping)
-    return Drivetrain(*(tuple(row.tolist()) for row in rows))
+    return Drivetrain(*(tuple(row.tolist()) for row in (stiffness, *motors, damping)))
 
 
 def friction_law(parameters: Sequence[ModalParameter], description: RobotDescription) -> Floats | None:
@@ -111,14 +137,9 @@ def _values(
     parameters: Sequence[ModalParameter], quantity: Quantity, places: range | tuple[int, ...]
 ) -> list[float]:
     """Return a quantity of each joint or link."""
-    said = [
-        (place, parameter.value)
-        for parameter in parameters
-        if parameter.quantity == quantity
-        for place in parameter.joints
-    ]
-    if sorted(place for place, _ in said) != sorted(places):
-        numbers = sorted(place for place, _ in said)
+    said = [(j, one.value) for one in parameters if one.quantity == quantity for j in one.joints]
+    numbers = sorted(place for place, _ in said)
+    if numbers != sorted(places):
         raise EstimatorError(f"{quantity} of joints", numbers, f"said once for each of {sorted(places)}")
     values = dict(said)
     return [values[place] for place in places]
