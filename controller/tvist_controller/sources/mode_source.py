@@ -7,8 +7,7 @@ from typing import Literal
 
 from tvist_controller.sources.calibrations import available, estimator_of, load
 from tvist_controller.sources.modal import friction_law, modal_estimator
-from tvist_plant.description import RobotDescription
-from tvist_plant.fingerprint import fingerprint
+from tvist_plant.description import RobotDescription, fingerprint
 from tvist_plant.model import Floats
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.values import Payload
