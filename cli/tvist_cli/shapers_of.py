@@ -48,9 +48,10 @@ def load_given(place: str) -> "OwnShaper":
     Raises:
         Failure: The file contains no such shaper, or no file is named.
     """
-    from tvist_controller.sources.own_shapers import OwnShaperError, load_own
+    from tvist_controller.sources.own_files import OwnFileError
+    from tvist_controller.sources.own_shapers import load_own
 
-    with told(OwnShaperError, code=2):
+    with told(OwnFileError, code=2):
         return load_own(place)
 
 

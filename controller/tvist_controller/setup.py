@@ -138,7 +138,7 @@ class Setup:
         """Make the plant; None for the flexible arm of the description.
 
         Raises:
-            OwnPlantError: It cannot be made.
+            OwnFileError: It cannot be made.
         """
         carried = body(self.carried or self.payload)
         if self.hidden is not None:
