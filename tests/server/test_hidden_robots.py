@@ -17,8 +17,8 @@ from tvist_lab.in_process import free_setup
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_plant.description import load
-from tvist_plant.hidden import hidden, hidden_payload
 from tvist_plant.plant import Plant
+from tvist_plant.variants import hidden, hidden_payload
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ConfigError, ServeConfig
