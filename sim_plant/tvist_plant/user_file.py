@@ -8,9 +8,8 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 LARGEST: Final = 4 << 20
@@ -23,8 +22,6 @@ LONGEST_NAME: Final = 100
 """Largest number of characters of a name in a file."""
 LONGEST_LINE: Final = 500
 """Largest number of characters of what a file, or a library that reads it, says."""
-
-Content = TypeVar("Content")
 
 
 def named(error: BaseException, said: str | None = None) -> str:
@@ -156,18 +153,6 @@ def check_is_file(path: str | os.PathLike[str], what: str) -> None:
         OSError: There is nothing.
     """
     _check_kind(path, what, Path(path).stat())
-
-
-def parsed(path: str | os.PathLike[str], what: str, parse: Callable[[], Content]) -> Content:
-    """Parse a file with a parser that checks the depth itself; messages say what kind of file it is.
-
-    Raises:
-        UserFileError: The content is nested more deeply than the parser supports.
-    """
-    try:
-        return parse()
-    except RecursionError:
-        raise UserFileError(f"{what} {path} is nested too deeply") from None
 
 
 def _is_deeper(text: str, most: int) -> bool:

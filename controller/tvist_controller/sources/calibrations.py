@@ -4,7 +4,7 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-from tvist_plant.user_file import parsed, read_bytes
+from tvist_plant.user_file import UserFileError, read_bytes
 from tvist_protocol.calibration import Calibration, CalibrationError, calibration_from_json
 from tvist_protocol.values import Payload
 from tvist_shaping.errors import EstimatorError
@@ -46,7 +46,9 @@ def load(calibration: str | Path) -> Calibration:
             content = (_FILES / f"{calibration}.json").read_bytes()
         else:
             content = read_bytes(calibration, "calibration")
-        return parsed(calibration, "calibration", lambda: calibration_from_json(content))
+        return calibration_from_json(content)
+    except RecursionError:
+        raise UserFileError(f"calibration {calibration} is nested too deeply") from None
     except OSError as error:
         known = ", ".join(available())
         raise CalibrationError(

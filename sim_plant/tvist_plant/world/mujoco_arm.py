@@ -21,16 +21,7 @@ from tvist_plant.model import FLANGE, Floats
 from tvist_plant.plant import PERIOD, Hand, Measurement, Plant, PlantError, PlantTruth, SimulatedArm, Things
 from tvist_plant.sensors import Accelerometer, ForceSensor
 from tvist_plant.world.apart import build_apart
-from tvist_plant.world.arm_form import (
-    LOAD,
-    arm_spec,
-    carry,
-    flex_names,
-    joint_name,
-    motor_name,
-    places,
-    settle,
-)
+from tvist_plant.world.arm_form import LOAD, Hinges, arm_spec, carry, settle
 from tvist_plant.world.contacts import PREFIX, set_contacts
 from tvist_plant.world.fingers import Fingers
 from tvist_plant.world.scene import World
@@ -123,11 +114,9 @@ class MujocoArm(SimulatedArm):
         world = self._world
         self._bodies = np.array(() if world is None else world.bodies, dtype=np.int64)
         self._own = np.array(() if world is None else world.arm, dtype=np.int64)
-        model, numbers = self._model, range(description.joints)
+        model = self._model
         self._data = data = mujoco.MjData(model)
-        self._joints = places(model, [joint_name(number) for number in numbers])
-        self._motors = places(model, [motor_name(number) for number in numbers])
-        self._flexes = places(model, flex_names(description))
+        self._joints, self._motors, self._flexes = Hinges.of(description, model)
         self._flange, self._load = model.body(FLANGE).id, model.body(LOAD).id
         self._state = data.qpos, data.qvel, data.qfrc_applied
         self._place, self._turn = data.xpos[self._flange], data.xmat[self._flange]
@@ -171,7 +160,7 @@ class MujocoArm(SimulatedArm):
         Raises:
             PlantError: The state is no longer finite.
         """
-        self.move(command)
+        self._move(command)
         measured = self._measure()
         if not math.isfinite(self._force.dot(self._force)):
             raise PlantError("the state of the arm in MuJoCo is no longer finite")
@@ -179,22 +168,20 @@ class MujocoArm(SimulatedArm):
             raise PlantError("what stands around the arm is no longer anywhere")
         return measured
 
-    def move(self, command: DriveCommand) -> None:
-        """Simulate 2 ms, in which the drives approach the command linearly, without measuring."""
+    def _move(self, command: DriveCommand) -> None:
+        """Simulate 2 ms, in which the drives approach the command linearly."""
         if self._fingers is not None:
             self._fingers.drive(self._data)
         start, end = self._command, np.array([command.q, command.qd, command.torque])
         model, data, steps, timestep = self._model, self._data, self._steps, self._timestep
-        motors, laws, s, step, (q, qd, applied) = (
-            self._motors, self._laws, self._s, mujoco.mj_step, self._state,
-        )  # fmt: skip
+        motors, laws, s, (q, qd, applied) = self._motors, self._laws, self._s, self._state
         for k in range(steps):
             drive(start, end, (k + 0.5) / steps, timestep, motors, laws, s, q, qd, applied)
             if self._evaluated:  # the first half of MuJoCo's step is done
                 mujoco.mj_step2(model, data)
                 self._evaluated = False
             else:
-                step(model, data)
+                mujoco.mj_step(model, data)
         self._command = end
 
     def _measure(self) -> Measurement:
