@@ -117,11 +117,7 @@ class _StandIn(Plant):
 
 
 def check_unpaced(plant: Plant) -> None:
-    """Check that a plant may be moved as fast as a machine computes, without a clock.
-
-    Raises:
-        ValueError: It gives the tick, so it may be a real arm.
-    """
+    """Check that a plant may be moved as fast as a machine computes, without a clock."""
     if plant.can(Plant.wait):
         name = type(plant).__name__
         raise ValueError(
@@ -130,11 +126,7 @@ def check_unpaced(plant: Plant) -> None:
 
 
 def measured_standing(plant: Plant, joints: int) -> Measurement:
-    """Return what a plant that cannot be placed measures where it stands.
-
-    Raises:
-        ValueError: The plant does not answer, or its measurement has the wrong shape or is not finite.
-    """
+    """Return what a plant that cannot be placed measures where it stands."""
     name = type(plant).__name__
     assert isinstance(plant, RealArm), f"plant {name}: a simulated arm is placed"
     try:
@@ -149,11 +141,7 @@ def measured_standing(plant: Plant, joints: int) -> Measurement:
 
 
 def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
-    """Check the first measurement of a plant, which is named in the error.
-
-    Raises:
-        ValueError: An array is missing or has the wrong shape, for example for another number of joints.
-    """
+    """Check the first measurement of a plant, which is named in the error."""
     shapes = {"q": (joints,), "qd": (joints,), "moment": (joints,), "accelerometer": (3,)}
     if getattr(measured, "wrench", None) is not None:
         shapes["wrench"] = (6,)

@@ -18,11 +18,7 @@ MAX_VELOCITY: Final = 16.0 * math.pi
 
 
 def check(description: RobotDescription) -> None:
-    """Check lengths, limits, bodies and names of a robot file.
-
-    Raises:
-        RobotFileError: Something is wrong; the message names the key and what is allowed.
-    """
+    """Check lengths, limits, bodies and names of a robot file."""
     for what in (_names, _joints, _collision, _limits, _bodies, _provenance, _imperfections):
         for said in what(description):
             raise RobotFileError(said)

@@ -49,13 +49,7 @@ NUMBERS: Final = {
 
 
 def read_urdf(path: str | Path) -> dict[str, Any]:
-    """Read a URDF file as the content of a robot file without springs and drives.
-
-    Raises:
-        RobotFileError: The file describes no arm that can be simulated; the message names the link or joint.
-        UserFileError: The file is not text, too large or nested too deeply.
-        OSError: The file cannot be read.
-    """
+    """Read a URDF file as the content of a robot file without springs and drives."""
     text = read_text(path, "robot file")
     try:
         root = xml(text.encode())

@@ -80,11 +80,7 @@ class Variant:
     """Seed of its own, which then counts alone."""
 
     def make(self, description: RobotDescription, carried: Payload, seed: int) -> SimulatedArm:
-        """Create the arm from the controller's description, the payload that it is said to carry, and a seed.
-
-        Raises:
-            ValueError: It cannot be this one, since none of its links bends.
-        """
+        """Create the arm from the controller's description, the payload that it is said to carry, and a seed."""
         arm = self.truly(description, seed if self.seed is None else self.seed)
         found = self.imperfections
         if self.backlash:
@@ -261,11 +257,7 @@ VARIANTS: Final = {one.name: one for one in _ALL}
 
 
 def variant(name: str) -> Variant:
-    """Return a plant by its name: one of `VARIANTS`, or a hidden robot, `hidden-SEED`.
-
-    Raises:
-        ValueError: There is none.
-    """
+    """Return a plant by its name: one of `VARIANTS`, or a hidden robot, `hidden-SEED`."""
     kind, dash, number = name.partition("-")
     if kind == "hidden" and dash and number.isascii() and number.isdigit() and len(number) < 19:
         return hidden_variant(int(number))

@@ -59,11 +59,7 @@ def load(calibration: str | Path) -> Calibration:
 
 
 def estimator_of(calibration: Calibration) -> Polynomial:
-    """Return the paper's estimator with a calibration's polynomials.
-
-    Raises:
-        EstimatorError: The calibration has no polynomials, or their parts do not fit together.
-    """
+    """Return the paper's estimator with a calibration's polynomials."""
     if calibration.polynomial is None:
         raise EstimatorError("polynomial", None, "there; this calibration is for the estimator modal alone")
     model = calibration.polynomial

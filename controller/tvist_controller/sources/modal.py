@@ -30,10 +30,6 @@ def modal_estimator(
     """Return an estimator of the arm's lowest modes; it uses no springs or drives of the robot file.
 
     This takes less than a millisecond, so a payload can be declared between two ticks.
-
-    Raises:
-        EstimatorError: The calibration has no modal model, belongs to another arm, or does not contain each parameter
-            of each joint exactly once.
     """
     known = _modal(calibration, description)
     flexible = flexible_model(description, Body(mass=payload.mass, com=payload.com, inertia=payload.inertia))
@@ -49,11 +45,7 @@ def modal_estimator(
 def elastic_feed_forward(
     tvist: Filter, description: RobotDescription, calibration: Calibration
 ) -> ElasticFeedForward | None:
-    """Create the elastic feed-forward that a filter needs, with a calibration's springs; None if it does without.
-
-    Raises:
-        EstimatorError: The calibration has no modal model, belongs to another arm, or lacks a parameter.
-    """
+    """Create the elastic feed-forward that a filter needs, with a calibration's springs; None if it does without."""
     if tvist.feed_forward == "rigid":
         return None
     parameters = _modal(calibration, description).parameters
@@ -93,11 +85,7 @@ def mass_matrix(flexible: FlexibleModel) -> Callable[[Floats], Floats]:
 def drivetrain(
     parameters: Sequence[ModalParameter], description: RobotDescription, flexible: FlexibleModel
 ) -> Drivetrain:
-    """Return springs and drives in the order of the mass matrix.
-
-    Raises:
-        EstimatorError: A parameter is missing, given twice, or belongs to a joint or link that does not exist.
-    """
+    """Return springs and drives in the order of the mass matrix."""
     size = flexible.model.nv
     links, joints = description.link_flexibility.links, range(description.joints)
     stiffness = np.zeros(size)
@@ -115,11 +103,7 @@ def drivetrain(
 
 
 def friction_law(parameters: Sequence[ModalParameter], description: RobotDescription) -> Floats | None:
-    """Return the friction of each joint, rows F_c, F_s/F_c, v_s, w and F_v, shape (5, n); None if it is not known.
-
-    Raises:
-        EstimatorError: It is known of some joints only, or is larger than the torque that drives have.
-    """
+    """Return the friction of each joint, rows F_c, F_s/F_c, v_s, w and F_v, shape (5, n); None if it is not known."""
     if all(parameter.quantity not in FRICTION for parameter in parameters):
         return None
     law = np.array([_values(parameters, quantity, range(description.joints)) for quantity in FRICTION])

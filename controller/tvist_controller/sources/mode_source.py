@@ -46,11 +46,7 @@ class ModeSource:
 
     @cached_property
     def friction(self) -> Floats | None:
-        """Identified friction of the joints, see `friction_law`; None if the calibration has none.
-
-        Raises:
-            EstimatorError: The calibration has it for some joints only, or more than the drives have torque.
-        """
+        """Identified friction of the joints, see `friction_law`; None if the calibration has none."""
         modal = None if self.calibration is None else self.calibration.modal
         return None if modal is None else friction_law(modal.parameters, self.description)
 
@@ -62,11 +58,7 @@ class ModeSource:
         return len(self.f_d) if self.name == "fixed" else 1
 
     def estimator(self, modes: int, payload: Payload) -> Estimator:
-        """Return an estimator of the lowest modes with a payload.
-
-        Raises:
-            EstimatorError: There are fewer modes, or the calibration belongs to another arm.
-        """
+        """Return an estimator of the lowest modes with a payload."""
         if modes > self.most:
             raise EstimatorError("modes", modes, f"at most {self.most}, which the estimator {self.name} has")
         if self.calibration is None:

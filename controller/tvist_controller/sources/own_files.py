@@ -47,10 +47,6 @@ def run_file(place: str, kind: str, may_be_one: Callable[[object], bool]) -> Own
     """Run FILE.py of FILE.py:NAME, and return what it contains under the name.
 
     If there is no such name, the message gives those whose value may be one.
-
-    Raises:
-        OwnFileError: The file or the name does not exist, or running the file raises an exception.
-        UserFileError: The file is not text, or is larger than 4 MiB.
     """
     named = _FILE.fullmatch(place)
     if named is None:
@@ -80,11 +76,7 @@ def is_of_file(value: object) -> bool:
 
 @lru_cache(maxsize=8)
 def load_again(load: Callable[[str], Any], kind: str, place: str, sha256: str) -> Any:
-    """Load a shaper or a plant again in a worker process.
-
-    Raises:
-        OwnFileError: The file has changed since it was first loaded, or cannot be loaded.
-    """
+    """Load a shaper or a plant again in a worker process."""
     found = load(place)
     if found.sha256 != sha256:
         raise OwnFileError(f"{kind} {place}: the file has changed since it was first loaded")

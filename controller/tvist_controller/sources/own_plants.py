@@ -52,9 +52,6 @@ class OwnPlant:
         """Make the plant for one robot with the payload that it carries, as far as the server knows.
 
         The seed is that of what a plant of `VARIANTS` draws; others are not told.
-
-        Raises:
-            OwnFileError: Making it fails, or what is made is not a plant.
         """
         if isinstance(self.maker, Variant):
             try:
@@ -114,11 +111,7 @@ def load_plant(place: str) -> OwnPlant:
 
 
 def load_world(scene: str) -> OwnPlant:
-    """Find the arm in a scene, by its name in the package or the path of a file in MuJoCo's format.
-
-    Raises:
-        SceneError: There is none.
-    """
+    """Find the arm in a scene, by its name in the package or the path of a file in MuJoCo's format."""
     file = find_scene(scene)
 
     def make(description: RobotDescription, carried: Payload) -> Plant:

@@ -91,11 +91,7 @@ def load_own(place: str) -> OwnShaper:
 
 
 def check_for(own: OwnShaper, estimator: Estimator, joints: int) -> None:
-    """Try a shaper with the modes that an arm has anywhere, and a tenth beyond.
-
-    Raises:
-        OwnFileError: It fails for one of them.
-    """
+    """Try a shaper with the modes that an arm has anywhere, and a tenth beyond."""
     looking = estimator.fork()
     anywhere = np.random.default_rng(0).uniform(-np.pi, np.pi, (_POSTURES, joints))
     f_d, zeta = np.array([looking.settle(q) for q in anywhere])[:, :, 0].T

@@ -99,7 +99,6 @@ class MujocoArm(SimulatedArm):
         width = np.full(joints, drives.friction_width)
         self._laws = np.array([K_d, K_d * (K_p + K_i), K_d * K_p * K_i, friction, width])
         self._s, self._command, self._felt = np.zeros(joints), np.zeros((3, joints)), np.zeros(6)
-        self._world: World | None = None
         self._fingers: Fingers | None = None
         self._build(payload, None)
         self._seed(0)
@@ -107,14 +106,11 @@ class MujocoArm(SimulatedArm):
     def _build(self, payload: Payload, hand: Hand | None) -> None:
         description, self.payload = self._description, payload
         if self._scene is None:
-            self._model = arm_spec(description, payload, self._timestep).compile()
+            self._world = World(arm_spec(description, payload, self._timestep).compile())
         else:
             self._world = build_apart((description, payload, self._scene, self._timestep, hand))
-            self._model = self._world.model
-        world = self._world
-        self._bodies = np.array(() if world is None else world.bodies, dtype=np.int64)
-        self._own = np.array(() if world is None else world.arm, dtype=np.int64)
-        model = self._model
+        self._model = model = self._world.model
+        self._bodies, self._own = (np.array(own, np.int64) for own in (self._world.bodies, self._world.arm))
         self._data = data = mujoco.MjData(model)
         self._joints, self._motors, self._flexes = Hinges.of(description, model)
         self._flange, self._load = model.body(FLANGE).id, model.body(LOAD).id
@@ -135,11 +131,7 @@ class MujocoArm(SimulatedArm):
         return super().can(method) and (self._scene is not None or method not in _OF_HANDS)
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
-        """Put the arm at rest in static equilibrium under a command, and the things where the scene has them.
-
-        Raises:
-            PlantError: The arm would stand in something.
-        """
+        """Put the arm at rest in static equilibrium under a command, and the things where the scene has them."""
         self._seed(seed)
         if self._fingers is not None:
             self._fingers.open()
@@ -149,17 +141,12 @@ class MujocoArm(SimulatedArm):
         weight = settle(self._description, self._model, self._data, command.q)
         self._s = (weight - command.torque) / self._laws[2]
         measured = self._measure()
-        met = self._met(self._data)
-        if met is not None:
+        if (met := self._met(self._data)) is not None:
             raise PlantError(f"{met}: choose a posture in which the arm is clear")
         return measured
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Move the arm by one period.
-
-        Raises:
-            PlantError: The state is no longer finite.
-        """
+        """Move the arm by one period."""
         self._move(command)
         measured = self._measure()
         if not math.isfinite(self._force.dot(self._force)):
@@ -199,7 +186,7 @@ class MujocoArm(SimulatedArm):
             qd=data.qvel[self._joints],
             moment=torque + (K_d * (qd_r - qd) + K * (q_r - q)) + K_s * self._s,
             accelerometer=self._accelerometer.read(self._force),
-            wrench=None if self._world is None else self._sensor.read(self._wrench()),
+            wrench=None if self._scene is None else self._sensor.read(self._wrench()),
         )
 
     def _wrench(self) -> Floats:
@@ -230,8 +217,7 @@ class MujocoArm(SimulatedArm):
         """Carry another payload from now on. Its shape in the world stays the first one's."""
         self.payload, self._evaluated = payload, False
         carry(self._model, payload)
-        if self._world is not None:
-            set_contacts(self._model, self._world.contacts)  # their stiffness is relative to the masses
+        set_contacts(self._model, self._world.contacts)  # their stiffness is relative to the masses
 
     def push(self, torque: Floats) -> None:
         """Apply external torques to the joints."""
@@ -245,7 +231,7 @@ class MujocoArm(SimulatedArm):
 
     def things(self) -> Things | None:
         """Return what stands around it."""
-        return None if self._world is None else self._world.things
+        return self._world.things
 
     def places(self) -> Floats:
         """Return the poses of the bodies that move, shape (bodies, 6) [m, rad]."""
@@ -268,16 +254,12 @@ class MujocoArm(SimulatedArm):
 
     def _met(self, data: "mujoco.MjData") -> str | None:
         """Say what the arm stands in; None if it is clear."""
-        model, world, scene = self._model, self._world, self._scene
-        if world is None or scene is None:
-            return None
         for touch in data.contact[: data.ncon]:
-            bodies = [int(model.geom_bodyid[geom]) for geom in touch.geom]
-            if touch.dist < -DEEPEST and any(body in world.arm or model.geom(geom).name.startswith("arm ")
-                                             for body, geom in zip(bodies, touch.geom, strict=True)):  # fmt: skip
-                first, second = (model.geom(geom).name.removeprefix(PREFIX) for geom in touch.geom)
-                depth = -1e3 * touch.dist
-                return f"world {scene.name}: {first} stands {depth:.3g} mm inside {second}"
+            geoms = [self._model.geom(geom) for geom in touch.geom]
+            ours = any(one.bodyid[0] in self._world.arm or one.name.startswith("arm ") for one in geoms)
+            if self._scene is not None and ours and touch.dist < -DEEPEST:
+                first, second = (one.name.removeprefix(PREFIX) for one in geoms)
+                return f"world {self._scene.name}: {first} stands {-1e3 * touch.dist:.3g} mm inside {second}"
         return None
 
     # ------------------------------------------------------------------ the gripper

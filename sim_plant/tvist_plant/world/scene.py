@@ -31,17 +31,17 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class World:
-    """An arm in a scene."""
+    """An arm in a scene, or alone."""
 
     model: "mujoco.MjModel"
     """Both, the arm first."""
-    contacts: Contacts
+    contacts: Contacts = ()
     """Result of `add_pairs`, for `set_contacts`."""
-    things: Things
+    things: Things | None = None
     """What there is besides the arm."""
-    bodies: tuple[int, ...]
+    bodies: tuple[int, ...] = ()
     """Numbers of the bodies of `things`."""
-    arm: tuple[int, ...]
+    arm: tuple[int, ...] = ()
     """Numbers of the arm's bodies, with what is mounted on it."""
 
 
@@ -51,9 +51,6 @@ def build(
     """Put an arm with its payload, and maybe a gripper, into a scene, whose origin is the arm's base.
 
     The time step is that of MuJoCo's integrator [s].
-
-    Raises:
-        SceneError: The file is no scene, or no arm can stand in it.
     """
     spec = arm_spec(description, payload, timestep)
     option = spec.option
@@ -99,9 +96,6 @@ def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody", alone: "mujoco.MjMode
 
     The load is the body beyond the flange. In `alone`, the scene compiled, poses and sizes are numbers
     however the file gives them.
-
-    Raises:
-        SceneError: It is more than shapes of primitive kinds.
     """
     if tool.joints or tool.bodies:
         raise SceneError(
