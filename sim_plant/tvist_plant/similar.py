@@ -24,7 +24,7 @@ from typing import Any, Final
 
 import msgspec
 
-from tvist_plant.robot_tables import ArmLimits, Drives, Kinematics, LinkFlexibility, Payload, Sensors
+from tvist_plant.robot_tables import ArmLimits, Kinematics, RobotDescription
 from tvist_plant.user_file import toml
 
 RULE: Final = "assumed: the UR5e's, scaled by dynamic similarity to this arm's torques and length"
@@ -49,21 +49,11 @@ _POWERS: Final = {
 """Powers of τ and λ by which parameters of drives grow; all others are those of the UR5e."""
 
 
-class _Measured(msgspec.Struct, frozen=True):
-    """The UR5e, whose springs and drives agree with measurements."""
-
-    kinematics: Kinematics
-    limits: ArmLimits
-    payload: Payload
-    drives: Drives
-    link_flexibility: LinkFlexibility
-    sensors: Sensors
-
-
 @cache
-def _measured() -> _Measured:
+def _measured() -> RobotDescription:
+    """Return the UR5e, whose springs and drives agree with measurements."""
     text = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
-    return msgspec.convert(toml(text), _Measured)
+    return msgspec.convert(toml(text), RobotDescription)
 
 
 def stretched(kinematics: Kinematics) -> float:

@@ -13,8 +13,7 @@ from tvist_controller.line.elastic_lead import MOST, ROTOR, follow
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.setup import Setup, body, paper_payload
-from tvist_controller.sources.calibrations import load
-from tvist_controller.sources.modal import drivetrain
+from tvist_controller.sources.calibrations import drivetrain, load
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_plant.description import Payload
 from tvist_plant.model import flexible_model

@@ -8,7 +8,7 @@ import pytest
 
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.setup import body, paper_payload
-from tvist_controller.sources.modal import modal_estimator
+from tvist_controller.sources.calibrations import modal_estimator
 from tvist_lab.identification import modal_calibration
 from tvist_lab.identification.design import choose, predicted
 from tvist_lab.identification.identify import IdentificationError

@@ -16,9 +16,14 @@ from tvist_controller.planning.choices import choose_filter, wanted_modes
 from tvist_controller.planning.keeping import keeping_motion
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.sources.calibrations import available as calibrations
-from tvist_controller.sources.calibrations import estimator_of
+from tvist_controller.sources.calibrations import (
+    drivetrain,
+    elastic_feed_forward,
+    estimator_of,
+    mass_matrix,
+    modal_estimator,
+)
 from tvist_controller.sources.calibrations import load as load_calibration
-from tvist_controller.sources.modal import drivetrain, elastic_feed_forward, mass_matrix, modal_estimator
 from tvist_controller.sources.mode_source import ModeSource
 from tvist_controller.sources.own_shapers import OwnShaper, RecordedShaper
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Trajectory, quickest_motion

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from tvist_controller.sources.calibrations import available, estimator_of, load
-from tvist_controller.sources.modal import friction_law, modal_estimator
+from tvist_controller.sources.calibrations import available, estimator_of, friction_law, load, modal_estimator
 from tvist_plant.description import RobotDescription, fingerprint
 from tvist_plant.model import Floats
 from tvist_protocol.calibration import Calibration
