@@ -8,6 +8,7 @@ link; that axis must be vertical.
 
 import math
 from collections import Counter
+from itertools import product
 from pathlib import Path
 from typing import Any, Final
 from xml.etree.ElementTree import Element, SubElement, tostring
@@ -31,19 +32,15 @@ DEEPEST: Final = 200
 LARGEST: Final = 1e7
 """Largest number, as in other robot files."""
 _ORIGIN: Final = {"xyz": (0.0, 0.0, 0.0), "rpy": (0.0, 0.0, 0.0)}
-NUMBERS: Final = {
-    "joint": {
-        "origin": _ORIGIN,
-        "axis": {"xyz": (1.0, 0.0, 0.0)},
-        "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), (0.0,)),
-    },
-    "link": {
-        "inertial/origin": _ORIGIN,
-        "inertial/mass": {"value": (0.0,)},
-        "inertial/inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), (0.0,)),
-        "visual/origin": _ORIGIN,
-        "visual/geometry/mesh": {"scale": (1.0, 1.0, 1.0)},
-    },
+NUMBERS: Final[dict[tuple[str, str], dict[str, tuple[float, ...]]]] = {
+    ("joint", "origin"): {**_ORIGIN},
+    ("joint", "axis"): {"xyz": (1.0, 0.0, 0.0)},
+    ("joint", "limit"): dict.fromkeys(("lower", "upper", "effort", "velocity"), (0.0,)),
+    ("link", "inertial/origin"): {**_ORIGIN},
+    ("link", "inertial/mass"): {"value": (0.0,)},
+    ("link", "inertial/inertia"): dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), (0.0,)),
+    ("link", "visual/origin"): {**_ORIGIN},
+    ("link", "visual/geometry/mesh"): {"scale": (1.0, 1.0, 1.0)},
 }
 """Attributes that are read, by the elements of joints and links, with their defaults."""
 
@@ -58,7 +55,7 @@ def read_urdf(path: str | Path) -> dict[str, Any]:
     if root.tag != "robot":
         raise RobotFileError("it is no URDF: its outermost element must be <robot>; expand xacro first")
     links, joints = ({_named(one): one for one in root.findall(kind)} for kind in ("link", "joint"))
-    names = Counter(f"{one.tag} {one.get('name')}" for one in root if one.tag in NUMBERS)
+    names = Counter(f"{one.tag} {one.get('name')}" for one in root if one.tag in {"link", "joint"})
     if same := [name for name, count in names.items() if count > 1]:
         raise RobotFileError(f"there are two of {', '.join(same)}: give each a name of its own")
     _check_numbers(root)
@@ -84,12 +81,10 @@ def _named(element: Element) -> str:
 
 def _check_numbers(root: Element) -> None:
     """Check the numbers of all elements that are read, and write them as every parser reads them."""
-    for kind, parts in NUMBERS.items():
+    for (kind, at), keys in NUMBERS.items():
         for element in root.findall(kind):
-            for at, keys in parts.items():
-                for part in element.findall(at):
-                    for key, default in keys.items():
-                        _check_number(part, key, default, f"{kind} {element.get('name')}")
+            for part, (key, default) in product(element.findall(at), keys.items()):
+                _check_number(part, key, default, f"{kind} {element.get('name')}")
     for link in root.findall("link"):
         inertial = link.find("inertial")
         if inertial is not None and (inertial.find("mass") is None or inertial.find("inertia") is None):

@@ -37,6 +37,8 @@ FRICTION: tuple[Quantity, ...] = (
     "coulomb_friction", "breakaway", "stribeck_speed", "friction_width", "viscous_friction",
 )  # fmt: skip
 """Quantities of a joint's friction, in the order of `friction_law`."""
+MOTORS: tuple[Quantity, ...] = ("rotor_inertia", "velocity_gain", "position_gain")
+"""Quantities of a joint's motor, in the order of `Drivetrain`."""
 MODES = 4
 """Default number of estimated modes."""
 
@@ -179,7 +181,7 @@ def drivetrain(
     # Each link has two coordinates, about its y and z axes.
     stiffness[flexible.flexes] = np.repeat(_values(parameters, "bending_stiffness", links), 2)
     motors = np.zeros((3, size))
-    for row, quantity in zip(motors, ("rotor_inertia", "velocity_gain", "position_gain"), strict=True):
+    for row, quantity in zip(motors, MOTORS, strict=True):
         row[flexible.joints] = _values(parameters, quantity, joints)
     times = _values(parameters, "damping_time", joints)
     damping = stiffness.copy()

@@ -147,7 +147,7 @@ class MujocoArm(SimulatedArm):
 
     def step(self, command: DriveCommand) -> Measurement:
         """Move the arm by one period."""
-        self._move(command)
+        self.move(command)
         measured = self._measure()
         if not math.isfinite(self._force.dot(self._force)):
             raise PlantError("the state of the arm in MuJoCo is no longer finite")
@@ -155,7 +155,7 @@ class MujocoArm(SimulatedArm):
             raise PlantError("what stands around the arm is no longer anywhere")
         return measured
 
-    def _move(self, command: DriveCommand) -> None:
+    def move(self, command: DriveCommand) -> None:
         """Simulate 2 ms, in which the drives approach the command linearly."""
         if self._fingers is not None:
             self._fingers.drive(self._data)
