@@ -57,12 +57,12 @@ def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -
     spec.option.disableflags = int(
         mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_AUTORESET
     )
-    frame = spec.worldbody
+    frame = spec.worldbody  # its joints are hinges, which is MuJoCo's default
     for number in range(description.joints):
         place = link_frame(description, number)
         turn = np.roll(pin.Quaternion(place.rotation).coeffs(), 1).tolist()  # MuJoCo has the scalar first
         body = frame.add_body()
-        body.add_joint(name=f"joint {number}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+        body.add_joint(name=f"joint {number}", axis=[0, 0, 1])
         if number in stiffness_of:
             a, d = kinematics.a[number], kinematics.d[number]
             x, y, z = links.com[number]
@@ -76,7 +76,6 @@ def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -
             for axis, direction in (("y", [0, 1, 0]), ("z", [0, 0, 1])):
                 body.add_joint(
                     name=f"flex {number} {axis}",
-                    type=mujoco.mjtJoint.mjJNT_HINGE,
                     axis=direction,
                     stiffness=stiffness_of[number],
                     damping=stiffness_of[number] * flexibility.damping_time,
@@ -93,7 +92,6 @@ def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -
         add_mass(rotor, 1.0, (0.0, 0.0, 0.0), (B, 0.0, 0.0, B, 0.0, B))
         rotor.add_joint(
             name=f"motor {number}",
-            type=mujoco.mjtJoint.mjJNT_HINGE,
             axis=[0, 0, 1],
             damping=drives.velocity_gain[number] + drives.coulomb_friction[number] / drives.friction_width,
         )
