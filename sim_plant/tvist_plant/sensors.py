@@ -49,7 +49,7 @@ class ForceSensor:
 
     def read(self, wrench: Floats) -> Floats:
         """Return a noisy reading, shape (6,) [N, N m]."""
-        return wrench + next(self._drawn)
+        return np.asarray(wrench + next(self._drawn))
 
 
 def gear_phases(joints: int, seed: int) -> Floats:
