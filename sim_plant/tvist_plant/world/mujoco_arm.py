@@ -92,9 +92,7 @@ class MujocoArm(SimulatedArm):
             raise ValueError(f"timestep is {timestep} s; {PERIOD} s must be a multiple of it")
         self._description, self._scene, self._timestep = description, scene, timestep
         drives, joints = description.drives, description.joints
-        K_d, K_p, K_i = (
-            np.array(gain) for gain in (drives.velocity_gain, drives.position_gain, drives.integral_gain)
-        )
+        K_d, K_p, K_i = map(np.array, (drives.velocity_gain, drives.position_gain, drives.integral_gain))
         friction = np.array(drives.coulomb_friction) * (not drives.linear_friction)
         width = np.full(joints, drives.friction_width)
         self._laws = np.array([K_d, K_d * (K_p + K_i), K_d * K_p * K_i, friction, width])
