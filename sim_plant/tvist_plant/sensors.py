@@ -33,7 +33,8 @@ class Accelerometer:
         """Return noisy readings one after the other, as `read` does, shape (T, 3) [m/s^2]."""
         if self._noise == 0.0:
             return specific_forces.copy()
-        return specific_forces + np.reshape(list(islice(self._drawn, len(specific_forces))), (-1, 3))
+        rows = list(islice(self._drawn, len(specific_forces)))
+        return np.asarray(specific_forces + np.reshape(rows, (-1, 3)))
 
 
 class ForceSensor:
