@@ -14,8 +14,8 @@ from tvist_controller.authority.stepping import Standing, may_step
 from tvist_controller.cell.gripper import changes
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
-from tvist_controller.dispatch.setpoints import Unreadable
 from tvist_controller.experience.experience import Experience
+from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.socket_traffic import NoPorts, SocketNews, SocketPorts
 from tvist_controller.reporting.sink import Sink

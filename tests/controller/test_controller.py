@@ -7,7 +7,7 @@ import pytest
 from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.motion.streaming import TIMEOUT
+from tvist_controller.motion.setpoints import TIMEOUT
 from tvist_controller.setup import body, paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol.codec import check, encode

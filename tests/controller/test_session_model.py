@@ -19,7 +19,7 @@ from hypothesis.stateful import (
 from tests.examples import share
 
 from tvist_controller.controller import Controller
-from tvist_controller.motion.streaming import TIMEOUT
+from tvist_controller.motion.setpoints import TIMEOUT
 from tvist_protocol import commands as c
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused

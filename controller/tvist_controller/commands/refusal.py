@@ -47,10 +47,11 @@ def out_of_turn(command: str, activity: Activity) -> RefusalError:
 
 def check_joints(q: Sequence[float], description: RobotDescription, where: str = "q") -> None:
     """Refuse a posture with a wrong number of joints or outside their range."""
-    if len(q) != description.joints:
-        why = f"{where} has {len(q)} angles; the arm has {description.joints}"
-        raise RefusalError("out_of_range", where, why, description.joints)
-    for number, (angle, limit) in enumerate(zip(q, description.limits.position, strict=True)):
+    limits = description.limits.position
+    if len(q) != len(limits):
+        why = f"{where} has {len(q)} angles; the arm has {len(limits)}"
+        raise RefusalError("out_of_range", where, why, len(limits))
+    for number, (angle, limit) in enumerate(zip(q, limits, strict=True)):
         if not abs(angle) <= limit:
             field = f"{where}[{number}]"
             why = f"{field} is {angle:g} rad; the joint goes to ±{limit:g}"

@@ -17,8 +17,8 @@ from tvist_controller.authority.stepping import (
     check_step,
     check_step_token,
 )
-from tvist_controller.dispatch.setpoints import Unreadable
 from tvist_controller.dispatch.table import COMMANDS
+from tvist_controller.motion.setpoints import Unreadable
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import Envelope, decode_command, decode_envelope, decode_setpoint, refusal
 from tvist_protocol.commands import Command, ReleaseClock, Setpoint, TakeClock, TakeControl
@@ -76,7 +76,7 @@ def admit_command(
 def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | None:
     """Decode a set-point; return None if its sender is not known to have control, to spare the controller's thread.
 
-    Whose it is decides the lease at the moment at which it is carried out: see `Setpoints`.
+    Whose it is decides the lease at the moment at which it is carried out.
     """
     if lease is None or len(data) > EXPLAINED_BYTES:
         return None

@@ -1,36 +1,30 @@
 """The payload: what a client declares, what the robot has learnt, and what is assumed therefore."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 from tvist_controller.commands.events import Emit
-from tvist_controller.commands.refusal import RefusalError, check_body
+from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.experience.motion_record import Beliefs
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.line.inverse_dynamics import SLEW
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.filter_control import Filters
-from tvist_controller.planning.command_row import Call, Row
-from tvist_controller.planning.filter_planner import FilterPlanner
-from tvist_controller.planning.plan import Plan, Planning
-from tvist_controller.planning.snapshot import FILTER, FilterState
+from tvist_controller.planning.plan import Plan
+from tvist_controller.planning.snapshot import FilterState
 from tvist_controller.safety.payload_monitor import PayloadMonitor
 from tvist_controller.setup import body
-from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
-from tvist_protocol.commands import Forget, SetPayload
+from tvist_protocol.commands import SetPayload
 from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
 
 
-def _payload_of(command: SetPayload) -> Payload:
+def payload_of(command: SetPayload) -> Payload:
+    """Return the payload that a command declares."""
     return Payload(mass=command.mass, com=command.com, inertia=command.inertia)
-
-
-def _check(command: SetPayload, description: RobotDescription) -> None:
-    check_body(_payload_of(command), rated=description.limits.payload)
 
 
 class PayloadControl:
@@ -90,17 +84,18 @@ class PayloadControl:
             self._emit("warning", code="payload_mismatch", why=lesson.why)
         self._peripherals.changed = True
 
-    def _declare(self, call: Call[SetPayload]) -> None:
-        payload, tvist = _payload_of(call.command), call.planned()
+    def declare(self, command: SetPayload, tvist: Filter | None) -> None:
+        """Take another payload, with the filter that is planned for it."""
+        payload = payload_of(command)
         self._clear_with(payload, tvist)
         self.declared = payload
-        self._assume(payload, tvist, max(round(call.command.transition_time / PERIOD), SLEW))
+        self._assume(payload, tvist, max(round(command.transition_time / PERIOD), SLEW))
 
-    def _forget(self, call: Call[Forget]) -> None:
-        """Assume what was declared again."""
+    def forget(self, planned: Callable[[], Any]) -> None:
+        """Assume what was declared again, with the filter that is planned for it."""
         if self.assumed == self.declared:
             return
-        tvist = call.planned()
+        tvist = planned()
         self._clear_with(self.declared, tvist)
         self._assume(self.declared, tvist, SLEW)
         self._emit("learnt", why=f"the declared {self.declared.mass:g} kg are assumed again")
@@ -123,27 +118,3 @@ class PayloadControl:
         found = payload is not self.declared
         self._filters.declare(payload, tvist, found=found)
         self.monitor.declare(carried, ticks, found=found, told=told)
-
-    rows: ClassVar[tuple[Row, ...]] = (
-        Row(
-            SetPayload,
-            _declare,
-            changes_io=True,
-            check=_check,
-            plan=Planning(
-                FILTER,
-                FilterPlanner,
-                lambda planner, command, now: planner.with_payload(_payload_of(command), now.filter),
-            ),
-        ),
-        Row(
-            Forget,
-            _forget,
-            changes_io=True,
-            plan=Planning(
-                FILTER,
-                FilterPlanner,
-                lambda planner, _, now: planner.with_payload(now.filter.given, now.filter),
-            ),
-        ),
-    )

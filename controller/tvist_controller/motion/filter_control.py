@@ -1,16 +1,11 @@
 """The control line's filter and the source of its modes: changes and supervision."""
 
-from typing import ClassVar
-
 from tvist_controller.calibrations import fits
 from tvist_controller.commands.events import Emit
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.planning.command_row import Call, Row
-from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
-from tvist_controller.planning.plan import Planning
-from tvist_controller.planning.snapshot import FILTER, FilterState
+from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_controller.planning.snapshot import FilterState
 from tvist_controller.sources.mode_source import ModeSource
-from tvist_protocol.commands import SetEstimator, SetShaper
 from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
 
@@ -45,13 +40,14 @@ class Filters:
         if idle:
             self._warn_of_payload()
 
-    def _choose(self, call: Call[SetShaper] | Call[SetEstimator]) -> None:
-        chosen: PlannedFilter = call.planned()
+    def choose(self, chosen: PlannedFilter) -> None:
+        """Shape with a filter from now on, unless the rest of the motion would not be clear with it."""
         self._motion.ahead.check_filter(chosen.tvist)
         self.use(chosen)
 
-    def _estimate(self, call: Call[SetEstimator]) -> None:
-        self._choose(call)
+    def estimate(self, chosen: PlannedFilter) -> None:
+        """Shape with other modes from now on; else as `choose`."""
+        self.choose(chosen)
         self._warn_of_payload()
 
     def declare(self, payload: Payload, tvist: Filter | None, *, found: bool = False) -> None:
@@ -95,18 +91,3 @@ class Filters:
                 "the shaper's frequencies will be wrong; measure this arm with tvist identify"
             )
             self._emit("warning", why=why)
-
-    rows: ClassVar[tuple[Row, ...]] = (
-        Row(
-            SetShaper,
-            _choose,
-            plan=Planning(
-                FILTER,
-                FilterPlanner,
-                lambda planner, command, now: planner.choose(
-                    command.name, command.modes, now.filter.source, now.filter.declared, "name"
-                ),
-            ),
-        ),
-        Row(SetEstimator, _estimate, plan=Planning(FILTER, FilterPlanner, FilterPlanner.estimate), long=True),
-    )

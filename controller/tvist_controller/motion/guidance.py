@@ -35,12 +35,11 @@ class Guidance:
         """Largest position of each joint in either direction, shape (n,) [rad]."""
         self.torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.dynamics)
         """Motion that the torque permits."""
-        self._tcp, self._kinematics = motion.tcp, Arm(motion.cycle.description)
         self._rehearse()
 
     def _rehearse(self) -> None:
         """Compile what a motion of the tool uses, or load it from disk, before a tick needs it."""
-        q, still, arm = self.reach * 0.1, np.zeros(len(self.reach)), self._kinematics
+        q, still, arm = self.reach * 0.1, np.zeros(len(self.reach)), self.tool
         speed = Speed((q, still, still), self.limits, self.torque, PERIOD, arm=arm)
         speed.aim(arm.jacobian(q)[:, 0] * 1e-3, 1.0, 1.0)
         speed.next()
@@ -138,10 +137,7 @@ class Guidance:
     @property
     def tool(self) -> Arm:
         """Kinematics of the present tool centre point."""
-        if self.motion.tcp != self._tcp:
-            self._tcp = self.motion.tcp
-            self._kinematics = self._kinematics.with_tool(self._tcp)
-        return self._kinematics
+        return self.motion.tool
 
     def _most(self, shaped: bool) -> MotionLimits:
         """Limits of a reference."""

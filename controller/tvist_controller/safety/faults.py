@@ -4,13 +4,11 @@ import heapq
 import math
 from collections.abc import Callable
 from itertools import count
-from typing import ClassVar
 
 import numpy as np
 
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.planning.command_row import Row
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD, Plant
@@ -18,7 +16,8 @@ from tvist_protocol.faults import FAULTS
 from tvist_protocol.simulation import SimulationInject
 
 
-def _check(command: SimulationInject, description: RobotDescription) -> None:
+def check_fault(command: SimulationInject, description: RobotDescription) -> None:
+    """Refuse a fault that no such robot can have."""
     joints = description.joints
     fault = FAULTS.get(command.fault)
     if fault is None:
@@ -136,7 +135,3 @@ class Faults:
         self._push[joint] += torque
         if self._pushable is not None:
             self._pushable.push(self._push)
-
-    rows: ClassVar[tuple[Row, ...]] = (
-        Row(SimulationInject, lambda self, call: self.inject(call.command, call.tick), check=_check),
-    )

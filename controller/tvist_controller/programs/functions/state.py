@@ -173,7 +173,7 @@ class StateFunctions(Family):
 
     def is_steady(self) -> bool:
         """Return whether the target has been at rest for 500 ms."""
-        return self._access.steadiness.steady
+        return self._access.motion.steady
 
     def get_tool_current(self) -> float:
         """Return the current of the tool's supply [A]: 0, since nothing draws any."""
@@ -200,9 +200,9 @@ class StateFunctions(Family):
     @costs(4)
     def get_actual_joint_positions_history(self, steps: object = 0) -> Array:
         """Return the measured joint positions a number of ticks ago [rad]."""
-        past = self._access.steadiness
-        ago = integer("steps", steps, 0, max(past.known - 1, 0))
-        return a_list(past.past(ago) if past.known else self._access.latest().actual_q)
+        past = self._access.motion.past
+        ago = integer("steps", steps, 0, max(len(past) - 1, 0))
+        return a_list(past[-1 - ago].tolist() if past else self._access.latest().actual_q)
 
     def _speed(self, q: list[float], qd: list[float]) -> Array:
         return a_list((self._kinematics.jacobian(np.array(q)) @ np.array(qd)).tolist())
