@@ -6,7 +6,7 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
-from tvist_controller.authority.session import NoControlError, is_holders
+from tvist_controller.authority.rights import NoControlError, is_holders
 from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.dispatch.robot import Robot

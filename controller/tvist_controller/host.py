@@ -9,8 +9,7 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 from tvist_controller.about import info_of
-from tvist_controller.authority.session import is_holders
-from tvist_controller.authority.stepping import Standing, may_step
+from tvist_controller.authority.rights import Standing, is_holders, may_step
 from tvist_controller.cell.gripper import changes
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
@@ -284,7 +283,7 @@ class Host:
 
     def _standing(self) -> Standing:
         controller = self.controller
-        return Standing(controller.session.lease, controller.stepping.hold)
+        return Standing(controller.session.lease, controller.session.clock)
 
     def _step(self, step: SimulationStep, attend: Attend | None) -> Done:
         """Tick as often as a step says, or until its token no longer gives the right to advance time."""
@@ -295,7 +294,7 @@ class Host:
             for _ in range(step.ticks):
                 going_on = attend is None or attend()
                 if not going_on or not may_step(
-                    controller.stepping.hold, controller.session.lease, step.token
+                    controller.session.clock, controller.session.lease, step.token
                 ):
                     break
                 setpoint = next(setpoints, None)

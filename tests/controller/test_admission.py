@@ -4,7 +4,7 @@ import msgpack
 import msgspec
 import pytest
 
-from tvist_controller.authority.session import Lease
+from tvist_controller.authority.rights import Lease
 from tvist_controller.dispatch.admission import admit, admit_setpoint
 from tvist_protocol import commands as c
 from tvist_protocol.codec import MAX_BYTES, encode

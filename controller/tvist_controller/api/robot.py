@@ -4,7 +4,7 @@ The modules behind it may change.
 """
 
 from tvist_controller.about import info_of
-from tvist_controller.authority.presence import Presence
+from tvist_controller.authority.rights import Presence
 from tvist_controller.controller import Controller
 from tvist_controller.experience.experience import Student, experience_of
 from tvist_controller.host import Host

@@ -77,7 +77,6 @@ class Robot(ABC):
         """Robot mode, safety mode and runtime state."""
         self.session = Authority(self._interrupt, self.emit, realtime=timeouts, instance=setup.instance)
         """Rights to control the robot and to advance time."""
-        self.stepping = self.session.stepping
         self.safety = safety = SafetyControl(motion, self.emit)
         self.faults = Faults(motion, safety)
         self.peripherals = Peripherals(motion.set_tcp)

@@ -46,14 +46,14 @@ _RIGHTS = (
     Row(c.KeepAlive, lambda _, __: None),  # every command renews the lease
     # Who takes control from the new holder gets a token of its own.
     Row(c.HandOver, lambda robot, call: robot.session.hand_over(call.command.client, call.now, call.session)),
-    Row(c.ReleaseControl, lambda robot, _: robot.session.give_up()),
+    Row(c.ReleaseControl, lambda robot, _: robot.session.release()),
     Row(
         c.TakeClock,
         lambda robot, call: Accepted(token=robot.session.take_clock(call.command.client, call.session)),
         lease="none",
         check=_check_version,
     ),
-    Row(c.ReleaseClock, lambda robot, call: robot.stepping.release(call.command.token), lease="none"),
+    Row(c.ReleaseClock, lambda robot, call: robot.session.release_clock(call.command.token), lease="none"),
 )
 
 # ---------------------------------------------------------------------- filter, payload, terminals
