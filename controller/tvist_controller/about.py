@@ -32,7 +32,7 @@ def info_of(controller: Controller) -> Info:
     """Describe the robot, its limits and its present setup."""
     setup, limits = controller.setup, controller.setup.description.limits
     lease, hold = controller.session.lease, controller.session.clock
-    calibration = controller.filters.source.calibration
+    calibration = controller.assumed.source.calibration
     watched = controller.watching is not None
     place = None if setup.plant is None else setup.plant.place
     own = (setup.calibration.name,) if setup.calibration is not None else ()
@@ -59,8 +59,8 @@ def info_of(controller: Controller) -> Info:
         else CalibrationInfo(
             name=calibration.name,
             payload_mass=calibration.payload.mass,
-            fits_payload=fits(calibration, controller.declared, controller.filters.source.name),
-            fits_arm=controller.filters.source.fits_arm,
+            fits_payload=fits(calibration, controller.declared, controller.assumed.source.name),
+            fits_arm=controller.assumed.source.fits_arm,
             seed=calibration.provenance.seed,
             f_d_range=calibration.provenance.measured_f_d_range,
             zeta_range=calibration.provenance.measured_zeta_range,
@@ -68,7 +68,7 @@ def info_of(controller: Controller) -> Info:
         ),
         shaper=tvist.name,
         modes=tvist.estimator.modes,
-        estimator=controller.filters.source.name,
+        estimator=controller.assumed.source.name,
         calibrations=sorted({*available(), *own}),
         shapers=list(setup.registry.names()),
         control=None if lease is None else lease.client,

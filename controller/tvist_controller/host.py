@@ -156,8 +156,8 @@ class Host:
         if experience is not None:
             experience.watch(
                 report.sample,
-                controller.payload.beliefs,
-                held=controller.payload.held,
+                controller.assumed.beliefs,
+                held=controller.assumed.held,
                 placements=controller.cycle.placements,
             )
         for sink in self._sinks:
@@ -173,11 +173,11 @@ class Host:
 
     def _take(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
         self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
-        self.controller.payload.learn(lesson, plan)
+        self.controller.assumed.learn(lesson, plan)
 
     def _learn(self, experience: Experience) -> None:
         for beliefs, lesson, plan in experience.lessons():
-            if beliefs.payload != self.controller.payload.beliefs().payload:
+            if beliefs.payload != self.controller.assumed.beliefs().payload:
                 continue  # it is void: another payload was declared, learnt or forgotten since
             self._take(lesson, plan)
         for error in experience.raised():

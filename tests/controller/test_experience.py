@@ -95,11 +95,11 @@ def test_what_is_learnt_is_told_journaled_replayed_and_undone():
     robot = Served(Recalling(2.0), payload=paper_payload(ROBOT, 1.0), carried=paper_payload(ROBOT, 2.0))
     controller = robot.host.controller
     robot.move(Q2)
-    assert (controller.declared.mass, controller.payload.beliefs().payload.mass) == (1.0, 2.0)
+    assert (controller.declared.mass, controller.assumed.beliefs().payload.mass) == (1.0, 2.0)
     assert b"it carries 2 kg" in b"".join(robot.events)
     robot.move(Q1)
     robot.ask(Forget(token=robot.token, what="payload"))
-    assert controller.payload.beliefs().payload.mass == 1.0
+    assert controller.assumed.beliefs().payload.mass == 1.0
     robot.move(Q2)
     assert [entry.kind for entry in robot.host.entries].count("lesson") == 1
     assert replay(robot.setup, robot.host.entries, robot.states[1:]).first_difference is None

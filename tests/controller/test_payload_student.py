@@ -38,7 +38,7 @@ class Following(Served):
 
     @property
     def assumed(self):
-        return self.host.controller.payload.beliefs().payload
+        return self.host.controller.assumed.beliefs().payload
 
     def told(self, kind):
         return [event for event in map(decode_event, self.events) if event.kind == kind]

@@ -79,7 +79,12 @@ def _check_limit(code: Code, name: str, value: float, highest: float, unit: str,
     if value > highest:
         why = f"{where} is {value:g} {unit}; the arm's limit is {highest:g}"
         raise RefusalError(code, where, why, highest)
+    _check_least(name, value, unit, prefix)
+
+
+def _check_least(name: str, value: float, unit: str, prefix: str) -> None:
     if value < (lowest := SLOWEST[name]):
+        where = f"{prefix}{name}"
         why = f"{where} is {value:g} {unit}; it must be at least {lowest:g}"
         raise RefusalError("out_of_range", where, why, lowest)
 
@@ -111,12 +116,6 @@ def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> No
 
 def check_pace(velocity: float, acceleration: float, jerk: float, where: str = "") -> None:
     """Refuse limits of a motion of the tool that are so low that it would hardly move."""
-    for name, value, unit in (
-        ("velocity", velocity, "m/s"),
-        ("acceleration", acceleration, "m/s²"),
-        ("jerk", jerk, "m/s³"),
-    ):
-        if value < (lowest := SLOWEST[name]):
-            field = f"{where}{name}"
-            why = f"{field} is {value:g} {unit}; it must be at least {lowest:g}"
-            raise RefusalError("out_of_range", field, why, lowest)
+    _check_least("velocity", velocity, "m/s", where)
+    _check_least("acceleration", acceleration, "m/s²", where)
+    _check_least("jerk", jerk, "m/s³", where)

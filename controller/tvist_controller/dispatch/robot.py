@@ -10,14 +10,13 @@ from tvist_controller.authority.rights import Authority
 from tvist_controller.cell.live_cell import LiveCell
 from tvist_controller.commands.counters import Counters
 from tvist_controller.commands.events import Fields
-from tvist_controller.dispatch.payload_control import PayloadControl
+from tvist_controller.dispatch.assumptions import Assumptions
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.motion.filter_control import Filters
 from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.monitor import Monitor
@@ -97,12 +96,11 @@ class Robot(ABC):
         """Guided motions."""
         self.force_control = ForceControl(self.guidance, self.forces, timeouts=timeouts)
         self.programs = ProgramPlayer(self._access(), safety)
-        self.filters = Filters(motion, first.source, setup.payload, self.emit)
-        self.payload = PayloadControl(
-            setup.payload, motion, self.filters, self.peripherals, planner.for_lesson, self.emit,
+        self.assumed = Assumptions(
+            setup.payload, first.source, motion, self.peripherals, planner.for_lesson, self.emit,
             follows=setup.adapt == "payload",
         )  # fmt: skip
-        """What it carries."""
+        """What it carries, and how it shapes."""
         safety.monitors = self._monitors()
         self.true_modes: dict[str, list[float]] = {}
         """The arm's true modes, which are computed now and then; empty if the next truth needs them anew."""
@@ -116,7 +114,7 @@ class Robot(ABC):
         overload = Overload(description.robot.joints, description.limits.torque)
         # An arm with a controller of its own is watched by that; here its torques may be guessed from currents.
         drives = () if self.cycle.plant.supervised else (overload,)
-        return *drives, ShaperMonitor(self.cycle), self.force_control, self.payload.monitor
+        return *drives, ShaperMonitor(self.cycle), self.force_control, self.assumed.monitor
 
     def _access(self) -> Access:
         """What programs may use of the robot."""
@@ -139,7 +137,7 @@ class Robot(ABC):
     @property
     def declared(self) -> Payload:
         """Declared payload; that of a robot that is watched, if it says so."""
-        declared = self.payload.declared
+        declared = self.assumed.declared
         return declared if self.watching is None else self.watching.declared(declared)
 
     @property
@@ -154,7 +152,7 @@ class Robot(ABC):
 
     def snapshot(self, time: float | None = None) -> Snapshot:
         """The present state that plans depend on; for a time, that of a path that goes on from the running motion."""
-        return self.motion.snapshot(self.filters.present, self.programs.statements.last, time)
+        return self.motion.snapshot(self.assumed.present, self.programs.statements.last, time)
 
     def io(self, *, wrench: bool = True) -> Io:
         """Return inputs, outputs and registers as they are for the next tick.
@@ -162,7 +160,7 @@ class Robot(ABC):
         Args:
             wrench: Whether to compute the wrench at the tool, which takes a third of a tick.
         """
-        said, payload = self.watching or self.supervision, self.payload
+        said, payload = self.watching or self.supervision, self.assumed
         io = self.peripherals.io(
             self.tick_number + 1, payload.declared, self.motion.motions.asked_speed, self.programs.published,
             self.forces.wrench() if wrench and said is None else None,

@@ -9,7 +9,7 @@ import numpy as np
 
 from tvist_controller.commands.refusal import RefusalError, check_body, check_joints
 from tvist_controller.dispatch import guided_commands, motion_commands, program_commands
-from tvist_controller.dispatch.payload_control import payload_of
+from tvist_controller.dispatch.assumptions import payload_of
 from tvist_controller.dispatch.robot import Robot
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.filter_planner import FilterPlanner
@@ -71,7 +71,7 @@ def _filter(make: Any) -> Planning:
 _FILTERS = (
     Row(
         c.SetShaper,
-        lambda robot, call: robot.filters.choose(call.planned()),
+        lambda robot, call: robot.assumed.choose(call.planned()),
         plan=_filter(
             lambda planner, command, now: planner.choose(
                 command.name, command.modes, now.source, now.declared, "name"
@@ -80,7 +80,7 @@ _FILTERS = (
     ),
     Row(
         c.SetEstimator,
-        lambda robot, call: robot.filters.estimate(call.planned()),
+        lambda robot, call: robot.assumed.estimate(call.planned()),
         plan=Planning(FILTER, FilterPlanner, FilterPlanner.estimate),
         long=True,
     ),
@@ -88,14 +88,14 @@ _FILTERS = (
 _SETTINGS = (
     Row(
         c.SetPayload,
-        lambda robot, call: robot.payload.declare(call.command, call.planned()),
+        lambda robot, call: robot.assumed.declare(call.command, call.planned()),
         changes_io=True,
         check=_check_payload,
         plan=_filter(lambda planner, command, now: planner.with_payload(payload_of(command), now)),
     ),
     Row(
         c.Forget,
-        lambda robot, call: robot.payload.forget(call.planned),
+        lambda robot, call: robot.assumed.forget(call.planned),
         changes_io=True,
         plan=_filter(lambda planner, _, now: planner.with_payload(now.given, now)),
     ),
@@ -147,7 +147,7 @@ def _place(robot: Robot, call: Call[SimulationReset]) -> Reply:
     motion.abandon("simulation.reset")
     robot.faults.clear()
     if chosen is not None:
-        robot.filters.use(chosen)
+        robot.assumed.use(chosen)
     if command.seed is not None:
         robot.seed = command.seed
     cycle.reset(q, carried=carried, seed=robot.seed)

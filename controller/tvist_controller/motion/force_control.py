@@ -1,11 +1,11 @@
 """Force mode and freedrive: guided motions that give way to the force at the tool, and what ends them."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
 from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.kinematics.rotation import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
@@ -13,7 +13,7 @@ from tvist_controller.motion.force_sensing import SILENT, ContactWatch, External
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.monitor import Finding, Monitor
 from tvist_controller.motion.task_frame import Feature, frame_of
-from tvist_controller.trajectory import Compliant, ForceTask, Guided, Rest, Speed
+from tvist_controller.trajectory import Compliant, ForceTask, Guided, Rest
 from tvist_controller.trajectory.compliant import CRAWL
 from tvist_controller.trajectory.force_law import FREE_DAMPING
 from tvist_plant.plant import PERIOD
@@ -39,33 +39,11 @@ GENTLE = 1.0
 """Deceleration of the fastest joint where force mode ends, the lowest of any stop [rad/s^2]."""
 
 
-class Forces(Protocol):
-    """What acts on the arm from outside."""
-
-    @property
-    def basis(self) -> object:
-        """What forces are reckoned from: one that changes makes them jump."""
-
-    def felt(self, sample: Sample) -> Floats:
-        """Return force and torque at the tool centre point in a tick, base frame, shape (6,) [N, N m]."""
-
-    def estimated(self, sample: Sample, qd_before: Floats) -> Floats:
-        """Return the force that the drives' torques and, with the velocities before, the accelerations tell [N]."""
-
-    def unexplained(self, sample: Sample, wrench: Floats, *, zeroed: bool) -> Floats:
-        """Return the force in a sensor's wrench that is neither weight nor inertia of the payload, shape (3,) [N]."""
-
-    def forget_zero(self) -> None:
-        """Take nothing as zero any longer."""
-
-
 class ForceControl(Monitor):
     """Begins and ends force mode, and watches its limits; `timeouts` as in `ExternalSensor`."""
 
-    def __init__(self, guidance: Guidance, forces: Forces, *, timeouts: bool) -> None:
-        self.guidance = self._guidance = guidance
-        """Guided motions."""
-        self._forces = forces
+    def __init__(self, guidance: Guidance, forces: ToolForces, *, timeouts: bool) -> None:
+        self._guidance, self._forces = guidance, forces
         self.external = ExternalSensor(timeouts=timeouts)
         """A force sensor of the user's own."""
         self._motion, self._cycle = guidance.motion, guidance.motion.cycle
@@ -159,8 +137,7 @@ class ForceControl(Monitor):
         elif self._cycle.mode.at_rest:
             inner = Rest(state[0])
         else:
-            inner = stop = Speed(state, guidance.limits, guidance.torque, PERIOD)
-            stop.aim(np.zeros_like(state[0]), guidance.limits.acceleration)
+            inner = guidance.halting(state, guidance.limits.acceleration)
         return Compliant(
             state, guidance.limits, guidance.reach, guidance.torque, PERIOD, tool=lambda: guidance.tool, inner=inner,
             felt=self._felt,
@@ -171,7 +148,8 @@ class ForceControl(Monitor):
         sample = self._cycle.sample
         found = self._forces.felt(sample)
         if sample.wrench is None:
-            found = self._smooth = self._smooth + PERIOD / (PERIOD + SMOOTHED) * (found - self._smooth)
+            found = np.asarray(self._smooth + PERIOD / (PERIOD + SMOOTHED) * (found - self._smooth))
+            self._smooth = found
         return found
 
     def look(self, sample: Sample) -> Finding | None:

@@ -103,9 +103,7 @@ class Guidance:
             motion.end(trigger, f"{trigger} was commanded", deceleration=acceleration)
             return
         acceleration = min(max(acceleration, GENTLEST_STOP), self.limits.acceleration)
-        state = self.state
-        stop = Speed(state, self.limits, self.torque, PERIOD)
-        stop.aim(np.zeros_like(state[0]), acceleration)
+        stop = self.halting(self.state, acceleration)
         stop.acceleration = acceleration
         self._halt(trigger, stop, stop.duration)
 
@@ -169,11 +167,9 @@ class Guidance:
     @property
     def guided(self) -> Guided | None:
         """The present guided motion, which is the inner one of a motion that gives way; None if none can go on."""
-        lead, present = self.compliant, self._cycle.trajectory
-        found = present if lead is None else lead.inner
-        return (
-            found if self._continues(shaped=self._cycle.mode.shaped) and isinstance(found, Guided) else None
-        )
+        lead = self.compliant
+        found = self._cycle.trajectory if lead is None else lead.inner
+        return found if self.motion.activity is Activity.GUIDED and isinstance(found, Guided) else None
 
     @property
     def reference(self) -> Floats:
@@ -196,9 +192,13 @@ class Guidance:
         lead = self.compliant
         if lead is None or lead.inner.finished:
             return
-        stop = Speed(self._start(shaped=False), self.limits, self.torque, PERIOD)
-        stop.aim(np.zeros(len(self.reach)), deceleration)
-        lead.take(stop)
+        lead.take(self.halting(self._start(shaped=False), deceleration))
+
+    def halting(self, state: tuple[Floats, Floats, Floats], deceleration: float) -> Speed:
+        """Return a trajectory that comes to rest from a state of motion with a deceleration [rad/s^2]."""
+        stop = Speed(state, self.limits, self.torque, PERIOD)
+        stop.aim(np.zeros_like(state[0]), deceleration)
+        return stop
 
     def slow_down(self) -> None:
         """Let a commanded velocity end until the next command; a commanded posture is one where the arm may stay."""
