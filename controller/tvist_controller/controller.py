@@ -6,16 +6,16 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
-from tvist_controller.authority.rights import NoControlError, is_holders
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.dispatch.planner import Planner
+from tvist_controller.dispatch.rights import NoControlError, is_holders
 from tvist_controller.dispatch.robot import Robot
 from tvist_controller.dispatch.table import COMMANDS, HARMLESS
+from tvist_controller.instruments.report import TRUE_MODES_EVERY, Report, true_modes, truth_message
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.planning.command_row import Call
 from tvist_controller.planning.plan import Order, Plan
-from tvist_controller.reporting.report import TRUE_MODES_EVERY, Report, true_modes, truth_message
+from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.own_controller import REFUSED
 from tvist_controller.setup import Setup
 from tvist_plant.foreign import arm_of

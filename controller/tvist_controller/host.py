@@ -9,15 +9,15 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 from tvist_controller.about import info_of
-from tvist_controller.authority.rights import Standing, is_holders, may_step
 from tvist_controller.cell.gripper import changes
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
-from tvist_controller.experience.experience import Experience
+from tvist_controller.dispatch.rights import Standing, is_holders, may_step
+from tvist_controller.instruments.sink import Sink
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.socket_traffic import NoPorts, SocketNews, SocketPorts
-from tvist_controller.reporting.sink import Sink
+from tvist_controller.safety.experience import Experience
 from tvist_plant.foreign import told
 from tvist_plant.user_file import named
 from tvist_protocol.codec import encode

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tvist_controller.experience.motion_record import AFTER, LONGEST
 from tvist_controller.loopback import LoopbackHost
+from tvist_controller.safety.motion_record import AFTER, LONGEST
 from tvist_controller.setup import paper_payload
 from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay
@@ -158,7 +158,7 @@ def test_what_is_being_learnt_when_it_is_to_be_forgotten_is_not_taken():
 
 
 def test_motions_that_are_made_faster_than_studied_do_not_fill_the_memory(monkeypatch):
-    monkeypatch.setattr("tvist_controller.experience.experience.WAITING", 2)
+    monkeypatch.setattr("tvist_controller.safety.experience.WAITING", 2)
     robot = Served(Recalling())
     experience = robot.host._host._experience
     experience._later = lambda _: lambda: False

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tvist_controller.authority.rights import Authority, NoControlError
+from tvist_controller.dispatch.rights import Authority, NoControlError
 from tvist_controller.line.limits import REDUCED_SHARE
 from tvist_controller.safety.monitors import TICKS, Overload
 from tvist_plant.plant import Measurement

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tvist_controller.authority.rights import NoControlError, Presence
+from tvist_controller.dispatch.rights import NoControlError, Presence
 
 
 @pytest.fixture

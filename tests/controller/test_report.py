@@ -4,8 +4,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from tvist_controller.instruments import state_layout
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.reporting import state_layout
 from tvist_lab.in_process import free_setup
 from tvist_protocol.codec import decode_state, encode
 from tvist_protocol.commands import MoveJ, ServoStart, Setpoint, TakeControl
@@ -78,7 +78,7 @@ def test_of_any_tick_and_set_point(number, plain, monkeypatch):
         for name, function in vars(state_layout).copy().items():
             if hasattr(function, "py_func"):
                 monkeypatch.setattr(state_layout, name, function.py_func)
-        monkeypatch.setattr("tvist_controller.reporting.report.write_state", state_layout.write_state)
+        monkeypatch.setattr("tvist_controller.instruments.report.write_state", state_layout.write_state)
     for sequence in (None, 0, number):
         changed = msgspec.structs.replace(
             report, tick=number, sequence=sequence, missed=number, made=None, written=None

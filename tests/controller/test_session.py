@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from tvist_controller.authority.rights import Authority, NoControlError, check_token
+from tvist_controller.dispatch.rights import Authority, NoControlError, check_token
 
 
 def authority(*, realtime=True, instance=""):

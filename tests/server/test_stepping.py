@@ -6,12 +6,12 @@ from tests.controller.robots import UR5E, setup
 
 from tvist_client.blocking import Robot
 from tvist_client.transports.loopback import LoopbackTransport
-from tvist_controller.authority.rights import Lease
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit
+from tvist_controller.dispatch.rights import Lease
 from tvist_controller.host import Host
+from tvist_controller.instruments.sink import Sink
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.reporting.sink import Sink
 from tvist_lab.in_process import free_setup
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from tvist_controller.authority.rights import (
+from tvist_controller.dispatch.rights import (
     CLOCK,
     Lease,
     NoControlError,

@@ -4,15 +4,15 @@ from collections.abc import Callable
 from typing import Any
 
 from tvist_controller.calibrations import fits
-from tvist_controller.commands.events import Emit
-from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.experience.motion_record import Beliefs
+from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.line.inverse_dynamics import SLEW
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.snapshot import FilterState
+from tvist_controller.refusal import RefusalError
+from tvist_controller.safety.motion_record import Beliefs
 from tvist_controller.safety.payload_monitor import PayloadMonitor
 from tvist_controller.setup import body
 from tvist_controller.sources.mode_source import ModeSource

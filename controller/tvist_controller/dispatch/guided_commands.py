@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError, check_acceleration, check_joints, check_speeds
 from tvist_controller.dispatch.robot import Robot
 from tvist_controller.planning.command_row import Call, Row
+from tvist_controller.refusal import RefusalError, check_acceleration, check_joints, check_speeds
 from tvist_controller.trajectory import ForceTask
 from tvist_plant.description import RobotDescription
 from tvist_protocol import forces as f

@@ -2,13 +2,13 @@
 
 from typing import Any
 
-from tvist_controller.commands.refusal import SLOWEST, check_joints, check_motion, check_pace
 from tvist_controller.dispatch.robot import Robot
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.planning.path_planner import PathPlanner
 from tvist_controller.planning.plan import Planning
 from tvist_controller.planning.snapshot import MOTION
+from tvist_controller.refusal import SLOWEST, check_joints, check_motion, check_pace
 from tvist_controller.trajectory import MotionLimits
 from tvist_plant.description import RobotDescription
 from tvist_protocol import commands as c

@@ -1,11 +1,11 @@
 """Commands that load, play, pause and stop programs, and that add statements to one."""
 
-from tvist_controller.commands.refusal import RefusalError, out_of_turn
 from tvist_controller.dispatch.robot import Robot
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.plan import Planning
 from tvist_controller.planning.snapshot import SCRIPT
 from tvist_controller.programs.compiling import Kept, ScriptCompiler
+from tvist_controller.refusal import RefusalError, out_of_turn
 from tvist_protocol import programs as p
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Accepted

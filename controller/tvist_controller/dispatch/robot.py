@@ -6,13 +6,13 @@ from typing import Unpack
 
 import numpy as np
 
-from tvist_controller.authority.rights import Authority
 from tvist_controller.cell.live_cell import LiveCell
-from tvist_controller.commands.counters import Counters
-from tvist_controller.commands.events import Fields
 from tvist_controller.dispatch.assumptions import Assumptions
+from tvist_controller.dispatch.rights import Authority
+from tvist_controller.events import Counters, Fields
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.instruments.peripherals import Peripherals
+from tvist_controller.instruments.report import Layouts, Report, truth_of
 from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.sample import Sample
@@ -25,7 +25,6 @@ from tvist_controller.planning.plan import MakesPlans, Order, Plan, Plans
 from tvist_controller.planning.snapshot import Snapshot
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
-from tvist_controller.reporting.report import Layouts, Report, truth_of
 from tvist_controller.safety.faults import Faults
 from tvist_controller.safety.monitors import Overload, ShaperMonitor
 from tvist_controller.safety.own_controller import Supervision, Watching

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError, check_body, check_joints
 from tvist_controller.dispatch import guided_commands, motion_commands, program_commands
 from tvist_controller.dispatch.assumptions import payload_of
 from tvist_controller.dispatch.robot import Robot
@@ -16,6 +15,7 @@ from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import Planning
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.snapshot import FILTER, TOOL
+from tvist_controller.refusal import RefusalError, check_body, check_joints
 from tvist_controller.safety.faults import check_fault
 from tvist_controller.setup import body
 from tvist_plant.description import RobotDescription

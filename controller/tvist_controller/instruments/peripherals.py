@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, get_args
 
-from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.io import (
     BITS,
     NUMBERS,

@@ -9,8 +9,7 @@ from typing import Unpack
 import numpy as np
 from msgspec.structs import replace
 
-from tvist_controller.commands.events import Emit, Told
-from tvist_controller.commands.refusal import RefusalError, out_of_turn
+from tvist_controller.events import Emit, Told
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.foresight.rest_of_motion import WayAhead
 from tvist_controller.foresight.stopper import Outlook
@@ -28,6 +27,7 @@ from tvist_controller.motion.safety_system import SafetySystem
 from tvist_controller.motion.setpoints import Setpoints
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.snapshot import FilterState, Snapshot
+from tvist_controller.refusal import RefusalError, out_of_turn
 from tvist_controller.trajectory import MotionLimits, SetpointStream
 from tvist_plant.plant import PERIOD
 from tvist_protocol.modes import RuntimeState, SafetyMode

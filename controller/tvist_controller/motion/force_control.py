@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.kinematics.rotation import turn
 from tvist_controller.line.differentiator import Floats
@@ -13,6 +12,7 @@ from tvist_controller.motion.force_sensing import SILENT, ContactWatch, External
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.monitor import Finding, Monitor
 from tvist_controller.motion.task_frame import Feature, frame_of
+from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory import Compliant, ForceTask, Guided, Rest
 from tvist_controller.trajectory.compliant import CRAWL
 from tvist_controller.trajectory.force_law import FREE_DAMPING

@@ -4,13 +4,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.rotation import turn, turned
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import GENTLEST_STOP, GuidedTorqueRoom, arm_limits
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory import Compliant, Guided, MotionLimits, Servo, Speed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.transitions import Activity

@@ -5,7 +5,7 @@ from typing import Protocol, Unpack
 
 import numpy as np
 
-from tvist_controller.commands.events import Emit, Told
+from tvist_controller.events import Emit, Told
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import STILL
 from tvist_controller.line.limits import REDUCED_SHARE, acceleration_on_way, rate_of

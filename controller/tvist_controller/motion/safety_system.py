@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.transitions import TRANSITIONS, Activity
 

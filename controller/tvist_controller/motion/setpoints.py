@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError, check_joints
+from tvist_controller.refusal import RefusalError, check_joints
 from tvist_controller.trajectory import SetpointStream
 from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import Setpoint

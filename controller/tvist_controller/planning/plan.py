@@ -6,10 +6,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.snapshot import FilterState, Snapshot
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command
 from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.replies import Posture, ToolPose

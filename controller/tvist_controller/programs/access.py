@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tvist_controller.cell.live_cell import LiveCell
-from tvist_controller.commands.events import Emit
+from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.motion.activity_control import MotionControl

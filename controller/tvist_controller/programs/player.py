@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.arm import ProgramArm
@@ -14,6 +13,7 @@ from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.programs.library import MOVING, functions
 from tvist_controller.programs.sockets import Sockets
 from tvist_controller.programs.watchdogs import MissedTurns, Watchdogs
+from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.programs import ProgramLabel, ProgramState

@@ -8,8 +8,8 @@ from itertools import count
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD, Plant

@@ -7,12 +7,12 @@ from enum import IntEnum
 
 import msgspec
 
-from tvist_controller.commands.events import Emit
-from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_plant.plant import PlantError, RealArm, Sight

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError, check_joints
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.instruments.variables import READERS
 from tvist_controller.line.differentiator import Floats
@@ -24,6 +23,7 @@ from tvist_controller.programs.arguments import (
 )
 from tvist_controller.programs.functions.family import Family, Parts
 from tvist_controller.programs.functions.settings import ToolPose
+from tvist_controller.refusal import RefusalError, check_joints
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
 from tvist_protocol.stream import State

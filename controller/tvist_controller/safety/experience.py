@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, Protocol
 
-from tvist_controller.experience.motion_record import Beliefs, MotionRecord, MotionRecorder
-from tvist_controller.experience.payload_student import PayloadStudent
 from tvist_controller.line.sample import Sample
+from tvist_controller.safety.motion_record import Beliefs, MotionRecord, MotionRecorder
+from tvist_controller.safety.payload_student import PayloadStudent
 from tvist_controller.setup import Setup
 from tvist_plant.user_file import named
 from tvist_protocol.lessons import PayloadLesson

@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from tvist_controller.commands.events import Emit
-from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.events import Emit
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.replies import Code, Refused
 from tvist_protocol.simulation import SimulationStep
 
