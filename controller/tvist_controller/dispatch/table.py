@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.dispatch import guided_commands, motion_commands, program_commands
+from tvist_controller.dispatch import motion_commands, program_commands
 from tvist_controller.dispatch.assumptions import payload_of
 from tvist_controller.dispatch.robot import Robot
 from tvist_controller.planning.command_row import Call, Row
@@ -206,7 +206,7 @@ _QUESTIONS = tuple(
 COMMANDS: dict[type[c.Command], Row] = {
     row.message: row
     for row in (
-        *_RIGHTS, *motion_commands.ROWS, *guided_commands.ROWS, *_FILTERS, *_SETTINGS, *program_commands.ROWS,
+        *_RIGHTS, *motion_commands.ROWS, *_FILTERS, *_SETTINGS, *program_commands.ROWS,
         *_SIMULATION, *_QUESTIONS,
     )
 }  # fmt: skip

@@ -20,10 +20,9 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import StreamTorqueRoom
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
-from tvist_controller.motion.activities import PUT, runtime_of
 from tvist_controller.motion.arm_power import ArmPower
 from tvist_controller.motion.motions import Motions
-from tvist_controller.motion.safety_system import SafetySystem
+from tvist_controller.motion.safety_system import PUT, SafetySystem, runtime_of
 from tvist_controller.motion.setpoints import Setpoints
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.snapshot import FilterState, Snapshot

@@ -8,10 +8,9 @@ from tvist_controller.events import Emit
 from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.line.limits import REDUCED_SHARE
 from tvist_controller.line.sample import Sample
-from tvist_controller.motion.activities import PUT, at_rest
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.monitor import Monitor
-from tvist_controller.motion.safety_system import Emergency, Latched
+from tvist_controller.motion.safety_system import PUT, Emergency, Latched, at_rest
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.brakes import brake
 from tvist_controller.trajectory import Compliant
