@@ -23,7 +23,6 @@ from tvist_plant.user_file import named
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command, Forget, Setpoint
 from tvist_protocol.journal import Entry, entry_of
-from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event
@@ -94,8 +93,8 @@ class Host:
             self.controller.session.lease, getattr(command, "token", None)
         ):
             self._note(entry)
-        if self._experience is not None and not isinstance(reply, Refused):
-            self._outdate(self._experience, command)
+        if self._experience is not None and not isinstance(reply, Refused) and self._forgets(command):
+            self._experience.void()
         if isinstance(command, SimulationStep) and isinstance(reply, Done):
             reply = self._step(command, attend)
         self.standing = self._standing()
@@ -171,27 +170,22 @@ class Host:
             self.socket(one)
         self.tell_raised()
 
-    def _take(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
-        self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
-        self.controller.assumed.learn(lesson, plan)
-
     def _learn(self, experience: Experience) -> None:
         for beliefs, lesson, plan in experience.lessons():
             if beliefs.payload != self.controller.assumed.beliefs().payload:
                 continue  # it is void: another payload was declared, learnt or forgotten since
-            self._take(lesson, plan)
+            self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
+            self.controller.assumed.learn(lesson, plan)
         for error in experience.raised():
             self.warn(f"a motion has taught nothing: {named(error)}")
             for sink in self._sinks:
                 sink.raised(error)
 
-    def _outdate(self, experience: Experience, command: Command) -> None:
-        """Drop what a command that was carried out makes wrong."""
-        match command:
-            case Forget():
-                experience.void()
-            case SimulationReset() if command.payload is not None or self.controller.cell is not None:
-                experience.void()
+    def _forgets(self, command: Command) -> bool:
+        """Whether a command that was carried out makes wrong what is being learnt."""
+        if isinstance(command, SimulationReset):
+            return command.payload is not None or self.controller.cell is not None
+        return isinstance(command, Forget)
 
     def _tell_truth(self) -> None:
         """Pass on what a real robot cannot measure, computed once, to those who want it."""

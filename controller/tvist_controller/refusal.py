@@ -48,14 +48,27 @@ def out_of_turn(command: str, activity: Activity) -> RefusalError:
 def check_joints(q: Sequence[float], description: RobotDescription, where: str = "q") -> None:
     """Refuse a posture with a wrong number of joints or outside their range."""
     limits = description.limits.position
-    if len(q) != len(limits):
-        why = f"{where} has {len(q)} angles; the arm has {len(limits)}"
-        raise RefusalError("out_of_range", where, why, len(limits))
-    for number, (angle, limit) in enumerate(zip(q, limits, strict=True)):
-        if not abs(angle) <= limit:
+    _check_each(q, limits, "limit_position", where, "angles; the arm has {}", "rad; the joint goes to ±{:g}")
+
+
+def check_speeds(qd: Sequence[float], description: RobotDescription) -> None:
+    """Refuse velocities with a wrong number of joints or above their limits."""
+    limits = description.limits.velocity
+    has, goes = "velocities; the arm has {} joints", "rad/s; the joint's limit is {:g}"
+    _check_each(qd, limits, "limit_velocity", "qd", has, goes)
+
+
+def _check_each(
+    values: Sequence[float], limits: Sequence[float], code: Code, where: str, has: str, goes: str
+) -> None:
+    """Refuse values that are not one for each joint, or beyond a limit."""
+    count = len(limits)
+    if len(values) != count:
+        raise RefusalError("out_of_range", where, f"{where} has {len(values)} {has.format(count)}", count)
+    for number, (value, limit) in enumerate(zip(values, limits, strict=True)):
+        if not abs(value) <= limit:
             field = f"{where}[{number}]"
-            why = f"{field} is {angle:g} rad; the joint goes to ±{limit:g}"
-            raise RefusalError("limit_position", field, why, limit)
+            raise RefusalError(code, field, f"{field} is {value:g} {goes.format(limit)}", limit)
 
 
 def check_motion(
@@ -87,18 +100,6 @@ def _check_least(name: str, value: float, unit: str, prefix: str) -> None:
         where = f"{prefix}{name}"
         why = f"{where} is {value:g} {unit}; it must be at least {lowest:g}"
         raise RefusalError("out_of_range", where, why, lowest)
-
-
-def check_speeds(qd: Sequence[float], description: RobotDescription) -> None:
-    """Refuse velocities with a wrong number of joints or above their limits."""
-    if len(qd) != description.joints:
-        why = f"qd has {len(qd)} velocities; the arm has {description.joints} joints"
-        raise RefusalError("out_of_range", "qd", why, description.joints)
-    for number, (speed, limit) in enumerate(zip(qd, description.limits.velocity, strict=True)):
-        if not abs(speed) <= limit:
-            field = f"qd[{number}]"
-            why = f"{field} is {speed:g} rad/s; the joint's limit is {limit:g}"
-            raise RefusalError("limit_velocity", field, why, limit)
 
 
 def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> None:

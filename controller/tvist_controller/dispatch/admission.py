@@ -56,12 +56,11 @@ def admit(data: bytes, lease: Lease | None, clock: Lease | None = None) -> Admit
     try:
         if len(data) > EXPLAINED_BYTES:
             _check_envelope(decode_envelope(data), len(data), lease, clock)
-        command = decode_command(data)
+        return admit_command(decode_command(data), lease, clock)
     except ProtocolError as error:
         return refusal(error)
     except NoControlError as error:
         return error.reply
-    return admit_command(command, lease, clock)
 
 
 def admit_command(command: Command, lease: Lease | None, clock: Lease | None = None) -> Admitted | Refused:
@@ -84,15 +83,11 @@ def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | 
     try:
         setpoint = decode_setpoint(data)
     except ProtocolError as error:
-        setpoint = Unreadable(_token(data), error.why)
+        token = None
+        with contextlib.suppress(ProtocolError):
+            token = decode_envelope(data).token
+        setpoint = Unreadable(token, error.why)
     return setpoint if is_holders(lease, setpoint.token) else None
-
-
-def _token(data: bytes) -> str | None:
-    """Return the token of a message that cannot be decoded, if one is found."""
-    with contextlib.suppress(ProtocolError):
-        return decode_envelope(data).token
-    return None
 
 
 def _authorize(command: Command, lease: Lease | None, clock: Lease | None) -> str | None:

@@ -20,20 +20,6 @@ NOTHING: Floats = np.empty((0, 0))
 NOWHERE: Floats = np.empty(0)
 
 
-class Layouts:
-    """The layout of the last state, which is usually that of the next."""
-
-    def __init__(self) -> None:
-        self._known: tuple[Key, Layout] | None = None
-
-    def of(self, key: Key, report: "Report") -> Layout:
-        """Return the layout of a report's state, which depends on nothing but the key."""
-        known = self._known
-        if known is None or known[0] != key:
-            known = self._known = key, Layout.of(report.state)
-        return known[1]
-
-
 class Report(Struct, gc=False):
     """A tick, of which clients get a state. Threads may share it."""
 
@@ -59,8 +45,8 @@ class Report(Struct, gc=False):
     """Number of ticks that began too late."""
     arm: Arm
     """The arm with its tool, which must not change."""
-    layouts: Layouts
-    """Layouts of such states."""
+    layouts: dict[Key, Layout]
+    """The layout of the last state, by all that it depends on; it is usually that of the next."""
     made: State | None = None
     written: bytes | None = None
 
@@ -86,7 +72,12 @@ class Report(Struct, gc=False):
             unshaped is None, motors is not None and motors.limited, motors is None, len(f_d),
             sample.wrench is None,
         )  # fmt: skip
-        template, places, integers = self.layouts.of(key, self)
+        layout = self.layouts.get(key)
+        if layout is None:
+            layout = Layout.of(self.state)
+            self.layouts.clear()
+            self.layouts[key] = layout
+        template, places, integers = layout
         before, middle, last = unshaped or (NOWHERE, NOWHERE, NOWHERE)
         out = template.copy()
         write_state(

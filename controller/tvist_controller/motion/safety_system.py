@@ -57,15 +57,15 @@ class SafetySystem:
         Raises:
             RefusalError: The command is not allowed.
         """
-        mode = self.mode(activity)
         if trigger in _LIVE and self.latched is not None:
-            raise RefusalError("wrong_mode", "", f"safety_mode is {mode.name}: send restart_safety first")
-        if trigger in _LIVE and self.emergencies:
-            why = f"safety_mode is {mode.name}: release the emergency stop first"
-            raise RefusalError("wrong_mode", "", why)
-        if trigger in _MOTION and self.safeguard:
-            why = f"safety_mode is {mode.name}: release the safeguard stop first"
-            raise RefusalError("wrong_mode", "", why)
+            way_out = "send restart_safety first"
+        elif trigger in _LIVE and self.emergencies:
+            way_out = "release the emergency stop first"
+        elif trigger in _MOTION and self.safeguard:
+            way_out = "release the safeguard stop first"
+        else:
+            return
+        raise RefusalError("wrong_mode", "", f"safety_mode is {self.mode(activity).name}: {way_out}")
 
     def clear(self) -> None:
         """Release safeguard and emergency stops, and clear the latched fault; reduced speed stays as it is."""
