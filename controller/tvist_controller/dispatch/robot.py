@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from tvist_controller.dispatch.rights import Authority
 from tvist_controller.events import Counters, Fields
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.instruments.peripherals import Peripherals
-from tvist_controller.instruments.report import Report, truth_of
+from tvist_controller.instruments.report import Key, Report, truth_of
+from tvist_controller.instruments.state_layout import Layout
 from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.sample import Sample
@@ -103,7 +104,7 @@ class Robot(ABC):
         safety.monitors = self._monitors()
         self.true_modes: dict[str, list[float]] = {}
         """The arm's true modes, which are computed now and then; empty if the next truth needs them anew."""
-        self._layouts: dict[Any, Any] = {}
+        self._layouts: dict[Key, Layout] = {}
         self.report = self.reported(self.cycle.sample)
         """Report of the last tick, or of the arm at rest if it has not ticked yet or was placed somewhere since."""
 
