@@ -194,8 +194,8 @@ class Controller(Robot):
         try:
             if failed is not None:
                 raise failed
-            sensor = self.force_control.external
-            sample = motion.step(None if sensor.latest is None else sensor.next())
+            force = self.force_control
+            sample = motion.step(None if force.external.latest is None else force.sensed())
             self.safety.watch_power(sample)
             if self.cell is not None:
                 self.cell.tick(self.tick_number + 1, sample.measured.q)

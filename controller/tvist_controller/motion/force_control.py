@@ -84,6 +84,7 @@ class ForceControl(Monitor):
             raise RefusalError("wrong_mode", "", why)
         self.check_sensor()
         self._guidance.check(trigger)
+        self.awake = True
         lead = self.compliant or self._new()
         lead.aim(task, frame_of(feature, kind))
         self._by_hand = trigger == "freedrive"
@@ -111,6 +112,11 @@ class ForceControl(Monitor):
             why = "the external force sensor has told nothing yet: send its values, every 100 ms at least"
             raise RefusalError("wrong_mode", "", why)
 
+    def sensed(self) -> Floats | None:
+        """Return what the user's own sensor feels in the next tick; needed in each while it has a latest value."""
+        self.awake = True
+        return self.external.next()
+
     def begin_anew(self) -> None:
         """Use the arm's own sensor, and take nothing as zero, since the arm was placed somewhere."""
         self.external.use(None)
@@ -123,7 +129,7 @@ class ForceControl(Monitor):
         """
         estimated = self._cycle.sample.wrench is None
         if self._contact is None:
-            self._contact = ContactWatch()
+            self._contact, self.awake = ContactWatch(), True
             self._basis, self._qd = self._forces.basis, self._cycle.sample.measured.qd
         return self._contact.steps(direction, *(ESTIMATED_TOUCH if estimated else TOUCH))
 
@@ -154,11 +160,12 @@ class ForceControl(Monitor):
 
     def look(self, sample: Sample) -> Finding | None:
         """Find an arm that presses too hard, or leaves its way in an axis that does not give way."""
-        # Most arms have no sensor, and give way seldom.
+        # Most arms have no sensor, and give way seldom: it then sleeps until something else is asked of it.
         leads = isinstance(self._cycle.trajectory, Compliant)
         if sample.wrench is None and self._contact is None and self._source == DRIVES and not leads:
-            self._beyond = 0
+            self._beyond, self.awake = 0, False
             return None
+        self.awake = True
         changed = self._follow_source(self._source_of(sample))
         if changed is not None:
             return changed

@@ -173,6 +173,8 @@ class SafetyControl:
             self._restart_monitors()
         self._held = held
         for monitor in self.monitors:
+            if not monitor.awake and sample.measured.wrench is None:
+                continue
             if monitor.needs != "nothing" and (
                 not held
                 or (monitor.needs == "drives alone" and isinstance(motion.cycle.trajectory, Compliant))
