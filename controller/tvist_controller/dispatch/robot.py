@@ -171,10 +171,12 @@ class Robot(ABC):
     def reported(self, sample: Sample) -> Report:
         """Return the report of a tick."""
         motion, cycle, tvist = self.motion, self.cycle, self.cycle.tvist
+        stream = motion.streams.stream
         return Report(
             self.tick_number, sample, self.modes.now,
             motion.motions.speed if self.watching is None else self.watching.speed,
-            tvist.f_d, tvist.zeta, tvist.delay + cycle.drives.delay, tvist.clipped, motion.streams.sequence,
+            tvist.f_d, tvist.zeta, tvist.delay + cycle.drives.delay, tvist.clipped,
+            None if stream is None else stream.sequence,
             self.counters.missed_ticks, motion.tool, self._layouts,
         )  # fmt: skip
 

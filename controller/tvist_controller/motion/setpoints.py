@@ -34,11 +34,6 @@ class Setpoints:
         self._refused: str | None = None
         self._ended = 0, 0, 0
 
-    @property
-    def sequence(self) -> int | None:
-        """Sequence number of the newest accepted set-point; None without a stream or before its first set-point."""
-        return None if self.stream is None else self.stream.sequence
-
     def begin(self, stream: SetpointStream, now: float) -> None:
         """Feed a stream from the present time on [s]."""
         self.stream, self._heard, self._refused = stream, now, None
