@@ -238,6 +238,7 @@ class ProgramPlayer:
         self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
         if running is self._main:
             self._main, self.state, self.line, self.label = None, "STOPPED", 0, None
+            self._access.peripherals.changed = True
             self._runstate.tell(runs=False, failed=self._failed)
             self._watchdogs.clear()
             self.statements.close()
