@@ -3,7 +3,6 @@
 The modules behind it may change; a study of moves imports nothing else of this package.
 """
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
 from tvist_controller.foresight.line_copy import resting_after
 from tvist_controller.line.cycle import ControlCycle
@@ -14,6 +13,7 @@ from tvist_controller.line.limits import REBOUND, TORQUE_SHARE, acceleration_on_
 from tvist_controller.line.whole_motion import Driven, DrivenLine, respond
 from tvist_controller.planning.choices import choose_filter, wanted_modes
 from tvist_controller.planning.keeping import keeping_motion
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.sources.calibrations import available as calibrations
 from tvist_controller.sources.calibrations import (

@@ -1,6 +1,6 @@
 """Choose shapers and estimators by the names that clients send."""
 
-from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup
 from tvist_controller.sources.calibrations import available, load
 from tvist_controller.sources.mode_source import ModeSource, modal_source
