@@ -14,8 +14,7 @@ from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.monitor import Finding, Monitor
 from tvist_controller.motion.task_frame import Feature, frame_of
 from tvist_controller.trajectory import Compliant, ForceTask, Guided, Rest, Speed
-from tvist_controller.trajectory.compliant import CRAWL
-from tvist_controller.trajectory.force_law import FREE_DAMPING
+from tvist_controller.trajectory.compliant import CRAWL, FREE_DAMPING
 from tvist_plant.plant import PERIOD
 
 SMOOTHED = 0.04
