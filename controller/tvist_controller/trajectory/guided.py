@@ -68,7 +68,7 @@ class Following(Guided):
         state: tuple[Floats, Floats, Floats],  # to continue from, q, q̇ and q̈, each of shape (n,)
         limits: MotionLimits,
         reach: Floats,  # largest |q| of each joint, shape (n,) [rad]
-        torque: TorqueRoom,
+        torque: TorqueRoom | None,  # None for no limit
         period: float,  # tick [s]
     ) -> None:
         self.limits = self._arm = limits

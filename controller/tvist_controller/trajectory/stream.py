@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.trajectory.base import Trajectory
-from tvist_controller.trajectory.limiter import Limiter, TorqueRoom
+from tvist_controller.trajectory.guided import Following
+from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.play_out import PlayOut
 from tvist_controller.trajectory.stop import JointStop
@@ -17,7 +17,7 @@ BRIDGED = 2
 """Largest number of consecutive missing set-points that are extrapolated."""
 
 
-class SetpointStream(Trajectory):
+class SetpointStream(Following):
     """A reference generated from a client's set-points.
 
     At the controller's own rate, set-points pass through unchanged. Slower ones are the control points of a cubic
@@ -29,9 +29,6 @@ class SetpointStream(Trajectory):
     set-point. The result passes through the `Limiter`.
     """
 
-    limits: MotionLimits
-    foreseeable = False
-
     def __init__(
         self,
         q: Floats,  # at which the arm is at rest, shape (n,) [rad]
@@ -42,16 +39,12 @@ class SetpointStream(Trajectory):
         reach: Floats | None = None,  # largest |q| of each joint, shape (n,) [rad]; None for no limit
         torque: TorqueRoom | None = None,  # None for no limit
     ) -> None:
-        self._rest = np.array(q, dtype=float)
+        self._rest, still = np.array(q, dtype=float), np.zeros(len(q))
+        reach = np.full(len(q), np.inf) if reach is None else reach
+        super().__init__((self._rest, still, still), limits, reach, torque, period)
         self._ticks = max(round(stream_period / period, 9), 1.0)
         direct = self._ticks == 1.0
         self._curve, self._look_ahead = (linear, 1) if direct else (cubic, 2)
-        self._period = period
-        self.limits = limits
-        """Limits of the reference."""
-        self._reach = math.inf if reach is None else np.array(reach, dtype=float)
-        self._torque = torque
-        self._limiter = Limiter(self._rest, limits, period, reach=reach, torque=torque)
         self._play_out: PlayOut | None = None
         self._waiting: dict[int, Floats] = {}
         self._heard: list[int] = []
@@ -99,13 +92,8 @@ class SetpointStream(Trajectory):
 
     def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:
         """Keep lower limits from now on, if the filter needs that; see `Trajectory.adapt`."""
-        limits = spared(self.limits)
-        if limits != self.limits:
-            state, self.limits = self.state, limits
-            reach = np.broadcast_to(self._reach, state[0].shape)
-            self._limiter = Limiter(
-                state[0], limits, self._period, reach=reach, torque=self._torque, state=state
-            )
+        if (limits := spared(self.limits)) != self.limits:
+            self.adopt(limits)
 
     @property
     def end(self) -> JointStop:
@@ -119,11 +107,6 @@ class SetpointStream(Trajectory):
         return False
 
     @property
-    def state(self) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the reference, each of shape (n,)."""
-        return self._limiter.state
-
-    @property
     def delay(self) -> float:
         """Time from the arrival of the earliest set-points until the curve reaches them [s]."""
         return 0.0 if self._play_out is None else self._play_out.delay * self._period
@@ -133,7 +116,10 @@ class SetpointStream(Trajectory):
         play_out, newest = self._play_out, max(self._waiting)
         self.sequence = newest
         if play_out is None:
-            play_out = self._begin(min(self._waiting))
+            first = min(self._waiting)
+            self._real.extend(((first - 2, self._rest), (first - 1, self._rest)))
+            self._head = first - 1
+            play_out = self._play_from(first)
         if newest in self._heard and play_out.breaks(newest):
             # After a gap, or if the sender is ahead of its own clock, continue with the newest.
             play_out = self._restart(newest)
@@ -145,11 +131,6 @@ class SetpointStream(Trajectory):
                 # It was replaced meanwhile, but later replacements should take it into account.
                 self._keep(sequence, self._waiting.pop(sequence))
                 self.late += 1
-
-    def _begin(self, first: int) -> PlayOut:
-        self._real.extend(((first - 2, self._rest), (first - 1, self._rest)))
-        self._head = first - 1
-        return self._play_from(first)
 
     def _restart(self, newest: int) -> PlayOut:
         """Continue with the newest set-point; the others that wait become the curve's last points."""
@@ -216,10 +197,7 @@ class SetpointStream(Trajectory):
     def _wait(self) -> tuple[Floats, Floats]:
         """Come to rest, and wait until the stream continues."""
         if self._pause is None:
-            limits = self.limits
-            self._pause = JointStop(
-                *self.state, acceleration=limits.acceleration, jerk=limits.jerk, period=self._period
-            )
+            self._pause = self.end
         return self._pause.next(), self._pause.velocity
 
 
