@@ -13,7 +13,7 @@ from tvist_controller.motion.force_sensing import SILENT, ContactWatch, External
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.monitor import Finding, Monitor
 from tvist_controller.motion.task_frame import Feature, frame_of
-from tvist_controller.trajectory import Compliant, ForceTask, Guided, Rest, Speed
+from tvist_controller.trajectory import Compliant, ForceTask, Speed
 from tvist_controller.trajectory.compliant import CRAWL, FREE_DAMPING
 from tvist_plant.plant import PERIOD
 
@@ -152,11 +152,8 @@ class ForceControl(Monitor):
         guidance = self._guidance
         state, present = guidance.state, guidance.guided
         self._smooth = self._forces.felt(self._cycle.sample)
-        inner: Guided | Rest
         if present is not None and not self._cycle.mode.shaped:
             inner = present
-        elif self._cycle.mode.at_rest:
-            inner = Rest(state[0])
         else:
             inner = stop = Speed(state, guidance.limits, guidance.torque, PERIOD)
             stop.aim(np.zeros_like(state[0]), guidance.limits.acceleration)

@@ -8,7 +8,6 @@ import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.rotation import turn, turned
-from tvist_controller.trajectory.base import Rest
 from tvist_controller.trajectory.guided import Following, Guided, StuckError
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
@@ -106,7 +105,7 @@ class Compliant(Following):
         period: float,
         *,
         tool: Callable[[], Arm],  # of the tool centre point, which another one may replace at any time
-        inner: Guided | Rest,  # moves the tool otherwise, and continues from the same state
+        inner: Guided,  # moves the tool otherwise, and continues from the same state
         felt: Callable[[], Floats],  # on the tool centre point in the last tick, base frame [N, N m]
     ) -> None:
         super().__init__(state, abrupt(limits, period), reach, torque, period)
@@ -129,7 +128,7 @@ class Compliant(Following):
         """Kinematics of the tool centre point."""
         self._pose = kinematics.pose(q)
         self._twist = kinematics.inverse(q)[0] @ qd
-        nominal, moving = self.nominal, self.inner.state[1] if isinstance(self.inner, Guided) else 0.0 * qd
+        nominal, moving, _ = self.inner.state
         self._nominal, self._moved = kinematics.pose(nominal), kinematics.inverse(nominal)[0] @ moving
         """Velocity of the inner reference's tool [m/s, rad/s]."""
         self._given = self._twist - self._moved
@@ -157,13 +156,12 @@ class Compliant(Following):
     @property
     def nominal(self) -> Floats:
         """Position of the joints by the inner reference, shape (n,) [rad]."""
-        return self.inner.state[0] if isinstance(self.inner, Guided) else self.inner.next()
+        return self.inner.state[0]
 
-    def take(self, inner: Guided | Rest) -> None:
+    def take(self, inner: Guided) -> None:
         """Move the tool by another reference, which continues from where the present one is."""
         self.inner = inner
-        if isinstance(inner, Guided):
-            inner.pace(*self._speed)
+        inner.pace(*self._speed)
 
     def adopt(self, limits: MotionLimits) -> None:
         """See `Guided.adopt`."""
@@ -172,8 +170,7 @@ class Compliant(Following):
     def pace(self, speed: float, slowest: float | None) -> None:
         """Set the speed of the inner reference, and the velocity limit of all."""
         self._speed = speed, slowest
-        if isinstance(self.inner, Guided):
-            self.inner.pace(speed, slowest)
+        self.inner.pace(speed, slowest)
         super().pace(speed, slowest)
 
     def next(self) -> Floats:
