@@ -158,8 +158,9 @@ class PlannedMotion(Trajectory):
             self._ticks += 1
         else:
             time = self.time
-            ends = (time, time + LOOK_AHEAD * self._period)
-            curve = [self._paced(end) for end in ends]
+            most, ends = self.agility.acceleration, (time, time + LOOK_AHEAD * self._period)
+            states = (np.array(self.law.at(end)) for end in ends)
+            curve = [self.path.paced(x, xd, xdd, most) for x, xd, xdd in states]
             step = self._pace.advance(self.speed, curve)
             self._since, self._ticks = time + step, 0
         time = self.time
@@ -173,10 +174,6 @@ class PlannedMotion(Trajectory):
         self.law, self.agility = longer.law, longer.agility
         self.limits, self.duration = longer.limits, longer.duration
         self._pace.limits = self.agility
-
-    def _paced(self, time: float) -> Floats:
-        x, xd, xdd = (np.array(values) for values in self.law.at(time))
-        return self.path.paced(x, xd, xdd, self.agility.acceleration)
 
     @property
     def rate(self) -> float:
