@@ -193,7 +193,11 @@ class Speed(Guided):
         """
         h, limits, speed = self._period, self._arm_limits, np.abs(self._qd)
         most = (1.0 + ROUNDING if self.arm is None else USED) * limits.acceleration
-        rise = np.minimum(rise_within(speed, limits, h), most)
+        # A stop ends the present acceleration with the limit's jerk, and the joint gets faster until it has. Two ticks
+        # are reserved, since the acceleration of the newest reference is known as the mean of two ticks.
+        left, two = np.maximum(limits.velocity - speed, 0.0), 2.0 * h
+        rise = limits.jerk * (np.sqrt(two * two + 2.0 * left / limits.jerk) - two)
+        rise = np.minimum(np.minimum(rise, limits.acceleration), most)
         up, down = np.where(self._qd > 0.0, rise, most), np.where(self._qd < 0.0, rise, most)
         return np.stack((-down * self._lag, up * self._lag, h * np.maximum(limits.velocity, speed)))
 
@@ -218,16 +222,3 @@ class Speed(Guided):
 def abrupt(limits: MotionLimits, period: float) -> MotionLimits:
     """Return limits with which the joints may change the sign of their acceleration within a tick."""
     return MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
-
-
-def rise_within(speed: Floats, limits: MotionLimits, period: float) -> Floats:
-    """Return the acceleration at which joints of a speed, shape (n,), may get faster, so that a stop keeps the limit.
-
-    A stop ends the present acceleration with the limit's jerk, and the joint gets faster until it has. Two ticks are
-    reserved, since the acceleration of the newest reference is known as the mean of two ticks.
-    """
-    left, two = np.maximum(limits.velocity - speed, 0.0), 2.0 * period
-    rise: Floats = np.minimum(
-        limits.jerk * (np.sqrt(two * two + 2.0 * left / limits.jerk) - two), limits.acceleration
-    )
-    return rise
