@@ -15,7 +15,7 @@ acceleration changes on the way [-].
 """
 
 
-class LookAhead(Guard):
+class StreamGuard(Guard):
     """Checks the stop from the state of motion that a reference would lead to.
 
     As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from tvist_controller.foresight.line_copy import Ahead
+from tvist_controller.foresight.line_copy import LineSimulation
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import GENTLEST_STOP, StopTorque, torque_along
@@ -97,7 +97,7 @@ class StopPlanner:
 
     def under(
         self,
-        ahead: Ahead,  # simulated for as long as a stop lasts; until rest if the motion may turn back
+        ahead: LineSimulation,  # simulated for as long as a stop lasts; until rest if the motion may turn back
         state: Target,  # for this and the next two see `on_path`
         forecast: Forecast,
         wanted: float | None,
@@ -124,7 +124,12 @@ class StopPlanner:
         return self._quickest_on_path(state, newest, forecast, wanted, permitted, asked)
 
     def slowed(
-        self, ahead: Ahead, state: Target, forecast: Forecast, wanted: float | None, asked: Floats | None
+        self,
+        ahead: LineSimulation,
+        state: Target,
+        forecast: Forecast,
+        wanted: float | None,
+        asked: Floats | None,
     ) -> SlowedStop | None:
         """Return the quickest stop that plays a motion more and more slowly, see `SlowedStop`; arguments as of `under`.
 
