@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 
 from tvist_controller.controller import Controller
-from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.instruments.sink import Sink
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.elastic_lead import loads_of
@@ -120,7 +120,7 @@ def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0, plant: Plant | 
 def stop(line: Line, deceleration: float | None):
     """Stop a line; what is done, or None where a stop goes on."""
     if not hasattr(line, "outlook"):
-        line.outlook = Outlook(line)
+        line.outlook = Stopper(line)
     return line.outlook.stop(deceleration)
 
 

@@ -13,13 +13,13 @@ from tvist_controller.line import limits as line_limits
 from tvist_controller.line.differentiator import Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import GuidedTorqueRoom, StreamTorqueRoom
-from tvist_controller.trajectory import JointStop, b_spline, limiter, stop_profile
+from tvist_controller.trajectory import JointStop, limiter, stream
 from tvist_plant.description import Payload, load
 
 from .robots import PAPER, UR5E, H
 from .streams import network, played, swinging, there_and_back
 
-MODULES = (b_spline, clearance, differentiator, limiter, line_limits, stop_profile)
+MODULES = (clearance, differentiator, limiter, line_limits, stream)
 FAR_OUT = Payload(mass=2.0, com=(0.2, -0.1, 0.15))
 
 
@@ -107,12 +107,12 @@ def test_the_stop_in_closed_form_is_ruckigs(limit, in_python):
         stop = JointStop(np.zeros(40), qd, qdd, acceleration=limit, jerk=2000.0, period=H)
         durations = []
         for j, (v, a) in enumerate(zip(qd.tolist(), qdd.tolist(), strict=True)):
-            phases = stop_profile.stop_phases(v, a, limit, 2000.0)
-            assert phases == in_python(lambda v=v, a=a: stop_profile.stop_phases(v, a, limit, 2000.0))
+            phases = clearance.stop_phases(v, a, limit, 2000.0)
+            assert phases == in_python(lambda v=v, a=a: clearance.stop_phases(v, a, limit, 2000.0))
             durations.append(phases[0] + phases[2] + phases[3])
             for share in (0.0, 0.01, 0.1, 0.4, 0.8, 1.0):
                 wanted = [values[j] for values in stop.at(share * stop.duration)]
-                found = stop_profile.after(v, a, phases, share * stop.duration)
+                found = clearance.after(v, a, phases, share * stop.duration)
                 assert found == pytest.approx(wanted, abs=1e-9)
         assert max(durations) == pytest.approx(stop.duration, abs=1e-9)
 

@@ -11,8 +11,8 @@ from msgspec.structs import replace
 
 from tvist_controller.events import Emit, Told
 from tvist_controller.foresight.collision import CollisionModel
-from tvist_controller.foresight.rest_of_motion import WayAhead
-from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.foresight.rest_of_motion import RemainingMotion
+from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.cycle import ControlCycle
@@ -56,9 +56,9 @@ class MotionControl:
         self.safety = SafetySystem()
         """The safety system."""
         self._emit = emit
-        self.outlook = Outlook(cycle)
+        self.outlook = Stopper(cycle)
         """Forecast of the control line's motion."""
-        self.ahead = WayAhead(cycle, self.outlook, collisions)
+        self.ahead = RemainingMotion(cycle, self.outlook, collisions)
         """Collision check of that motion."""
         self.power = ArmPower.of(cycle.plant)
         """Power of an arm that has one."""

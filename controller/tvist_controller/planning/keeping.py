@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tvist_controller.foresight.line_copy import MAX_AHEAD, Ahead
+from tvist_controller.foresight.line_copy import MAX_AHEAD, LineSimulation
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.line_filter import LineFilter
 from tvist_controller.line.shaped_reference import ShapedReference
@@ -66,7 +66,7 @@ def shaped_ahead(motion: PlannedMotion, tvist: Filter) -> Floats | None:
     line_filter = LineFilter(mine, motion.limits)
     line_filter.begin(mine, path.start, path.posture_of)
     mine.aim(path.end)
-    ahead = Ahead(motion.paced_at(1.0), line_filter, shaped)
+    ahead = LineSimulation(motion.paced_at(1.0), line_filter, shaped)
     ahead.until(MAX_AHEAD)
     return np.array(ahead.references) if ahead.rests else None
 
