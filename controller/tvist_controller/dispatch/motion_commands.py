@@ -1,5 +1,6 @@
 """Commands that move, stop and power the arm."""
 
+from functools import partial
 from typing import Any, ClassVar
 
 from tvist_controller.commands.refusal import SLOWEST, check_joints, check_motion, check_pace
@@ -18,7 +19,7 @@ from tvist_protocol.channels import tag
 from tvist_protocol.motions import JointSegment, MoveC, MoveL, MovePath
 from tvist_protocol.replies import Accepted, Reply
 
-_STRAIGHT = Planning(MOTION, MovePlanner, MovePlanner.move, MovePlanner.move_within_tick)
+_STRAIGHT = Planning(MOTION, MovePlanner, MovePlanner.move, partial(MovePlanner.move, at_once=True))
 _ALONG_PATH = Planning(MOTION, PathPlanner, PathPlanner.plan)
 
 
