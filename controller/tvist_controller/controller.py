@@ -84,7 +84,7 @@ class Controller(WholeRobot):
         """Failure of the plant between two ticks, with which the next one deals."""
         self._next_timeout = -math.inf
         """Time at which something may time out next [s]."""
-        self.plans = Plans(planner, self.snapshot, order)
+        self.plans = Plans(planner.plan, self.snapshot, order)
         """The way to plans."""
         first = planner.filters.first()
         self.cycle = _cycle(setup, first, plant)
