@@ -1,15 +1,16 @@
 """Plans for commands that take longer than a tick can wait: how they are made, and how long they hold."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.planning.snapshot import FilterState, Snapshot
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command
+from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.replies import Posture, ToolPose
 from tvist_shaping.base import Filter
 from tvist_urscript import Script
@@ -52,6 +53,20 @@ def _same(one: Any, other: Any) -> bool:
 
 Order = Callable[[Command, Snapshot], Callable[[], Plan]]
 """Has a command planned on a state; returns what waits for the plan."""
+
+
+class MakesPlans(Protocol):
+    """A `Planner`, which lies above all that uses plans."""
+
+    filters: FilterPlanner
+
+    def for_lesson(self, lesson: PayloadLesson, present: FilterState) -> "Plan":
+        """Plan what the robot has learnt: the present filter for what it carries."""
+
+    def plan(
+        self, command: Command, now: Snapshot, *, within_tick: bool = False, checked: bool = False
+    ) -> Plan:
+        """Plan a command on a state."""
 
 
 class Plans:
