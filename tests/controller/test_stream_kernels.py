@@ -12,7 +12,7 @@ from tvist_controller.line import differentiator
 from tvist_controller.line import limits as line_limits
 from tvist_controller.line.differentiator import Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.limits import GuidedTorqueRoom, StreamTorqueRoom
+from tvist_controller.line.limits import TorqueRoom
 from tvist_controller.trajectory import JointStop, limiter, stream
 from tvist_plant.description import Payload, load
 
@@ -48,7 +48,7 @@ def test_a_stream_is_played_alike_in_python_to_the_bit(period, share, in_python)
         MotionLimits(share * PAPER.velocity, share * PAPER.acceleration, share * PAPER.jerk)
     )
     arrivals = network(wanted, period, 1.2, seed=3, jitter=1.2, loss=0.02)
-    room = StreamTorqueRoom(UR5E, InverseDynamics(UR5E, UR5E.payload))
+    room = TorqueRoom(UR5E, InverseDynamics(UR5E, UR5E.payload))
 
     def play():
         stream = SetpointStream(np.zeros(6), period, PAPER, H, reach=np.full(6, 6.28), torque=room)
@@ -65,8 +65,8 @@ def test_the_room_of_the_torque_is_that_of_numpy_to_the_bit(arm, in_python):
     dynamics, random = InverseDynamics(description, description.payload), np.random.default_rng(2)
     most, n = 0.9 * np.array(description.limits.torque), description.joints
     for room, beyond in (
-        (StreamTorqueRoom(description, dynamics), 0.0),
-        (GuidedTorqueRoom(description, dynamics), 1.0),
+        (TorqueRoom(description, dynamics), 0.0),
+        (TorqueRoom(description, dynamics, 1.0), 1.0),
     ):
         for q, qd, qdd in random.uniform(-3, 3, (300, 3, n)):
             still = dynamics.effort(q, qd, np.zeros(n))
@@ -89,7 +89,7 @@ def test_the_room_of_the_torque_is_that_of_numpy_to_the_bit(arm, in_python):
 
 def test_a_payload_that_is_phased_in_may_be_either():
     dynamics = InverseDynamics(UR5E, Payload())
-    room = StreamTorqueRoom(UR5E, dynamics)
+    room = TorqueRoom(UR5E, dynamics)
     q, still = np.array(UR5E.poses["Q1"]), np.zeros(6)
     empty = room.acceleration(q, still)
     dynamics.declare(UR5E.payload)

@@ -61,7 +61,7 @@ class Robot(ABC):
         self.counters = Counters()
         self.events: list[Event] = []
         """Events of the tick that is being computed, or of the next one between two ticks."""
-        self.plans = Plans(planner, self.snapshot, order)
+        self.plans = Plans(planner.plan, self.snapshot, order)
         """The way to plans."""
         first, timeouts, description = planner.filters.first(), setup.clock == "realtime", setup.description
         self.cycle = _cycle(setup, first, plant)

@@ -11,7 +11,7 @@ from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.limits import StreamTorqueRoom
+from tvist_controller.line.limits import TorqueRoom
 from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory import JointStop, PlannedMotion, Way
 from tvist_plant.description import Payload
@@ -25,7 +25,7 @@ class RemainingMotion:
     def __init__(self, cycle: ControlCycle, outlook: Stopper, collisions: CollisionModel) -> None:
         self._cycle, self._collisions = cycle, collisions
         self._outlook = outlook
-        room = StreamTorqueRoom(cycle.description, cycle.dynamics)
+        room = TorqueRoom(cycle.description, cycle.dynamics)
         self._guard = StreamGuard(collisions, outlook.stops, room)
         reach = np.array(cycle.description.limits.position)
         self._guide_guard = StreamGuard(collisions, outlook.stops, room, reach=reach)

@@ -6,7 +6,7 @@ from tvist_controller.foresight.collision import CollisionModel, Meeting
 from tvist_controller.foresight.stops import StopPlanner
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.guard import Guard, Obstacle
-from tvist_controller.line.limits import GENTLEST_STOP, StreamTorqueRoom
+from tvist_controller.line.limits import GENTLEST_STOP, TorqueRoom
 from tvist_controller.trajectory import JointStop, Way
 
 MARGIN = 0.8
@@ -30,7 +30,7 @@ class StreamGuard(Guard):
         self,
         collisions: CollisionModel,
         stops: StopPlanner,
-        room: StreamTorqueRoom,
+        room: TorqueRoom,
         *,
         reach: Floats | None = None,  # shape (n,) [rad]
     ) -> None:

@@ -17,7 +17,7 @@ from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.limits import StreamTorqueRoom
+from tvist_controller.line.limits import TorqueRoom
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.arm_power import ArmPower
@@ -210,7 +210,7 @@ class MotionControl:
             cycle.filter.spared(limits),
             PERIOD,
             reach=np.array(cycle.description.limits.position),
-            torque=StreamTorqueRoom(cycle.description, cycle.dynamics),
+            torque=TorqueRoom(cycle.description, cycle.dynamics),
         )
         return cycle.begin(stream, LineMode.GUARDED, self.ahead.guard_of_stream())
 
