@@ -6,7 +6,7 @@ import pytest
 from tests.plant.arms import frames
 
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.rotation import rotation_vector
+from tvist_controller.kinematics.pose import rotation_vector
 from tvist_controller.line.differentiator import Differentiator, Target
 from tvist_controller.line.drive_feed_forward import DriveFeedForward
 from tvist_controller.line.inverse_dynamics import InverseDynamics

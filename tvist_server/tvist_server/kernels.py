@@ -37,7 +37,7 @@ MOVE_TICKS = 1000
 """Longest time of a motion that uses kernels [ticks]."""
 LOOK = 0.5
 """Time between two looks at what is on disk [s]."""
-STUDIES = {"all_to_drives", "drive", "improved_postures", "mean_delay", "play", "product_taps", "shape_all"}
+STUDIES = {"all_to_drives", "drive", "mean_delay", "play", "product_taps", "shape_all"}
 """Kernels that no served robot calls."""
 KERNELS = tuple(kernel for kernel in kernels if kernel.name.rpartition(".")[2] not in STUDIES)
 """Kernels that a served robot may call."""

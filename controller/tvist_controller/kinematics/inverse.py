@@ -11,18 +11,14 @@ from tvist_controller.kinematics.choice import (
     NO_SOLUTION,
     ON_CURVE,
     closest,
-    improved_postures,
     search,
 )
-from tvist_controller.kinematics.geometry import ANY, arm_table
+from tvist_controller.kinematics.postures import ANY, arm_table
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 
 STARTS = 63
 """Postures, besides the given one, from which an arm without closed form is searched."""
-
-SAME = 1e-6
-"""Difference of angles [rad] below which two postures count as one."""
 
 
 class InverseKinematicsError(ValueError):
@@ -52,7 +48,7 @@ class InverseKinematicsError(ValueError):
 
 
 class InverseKinematics:
-    """All postures of an arm that have a pose of the flange, and the nearest of them.
+    """The nearest of all postures of an arm that have a pose of the flange.
 
     UR arms, and arms with a spherical wrist, are solved in closed form (`postures`), others by damped least squares
     from 64 starts, which are the same for every call. There, a posture that no start leads to is missed.
@@ -101,24 +97,6 @@ class InverseKinematics:
             raise self._none() if status == NO_SOLUTION else self._outside(q)
         return q
 
-    def all(self, rotation: Floats, position: Floats) -> Floats:
-        """Return the distinct postures that have a pose, whatever the joints' ranges, shape (k, n).
-
-        Each angle is within ±π [rad]; postures that differ by less than 1e-6 rad are one. Where a joint is
-        free, the postures next to zero stand for the curves of postures. For a redundant arm, the postures
-        are examples.
-        """
-        zero = np.zeros(len(self._limits))
-        unlimited = self._arm.copy()
-        unlimited[:-1, 4] = 2.0 * np.pi
-        if self._closed:
-            found = np.empty((8, 6))
-            improved_postures(unlimited, self._chain, rotation, position, zero, found)
-        else:
-            found = np.empty((2 * STARTS + 2, len(zero)))
-            search(unlimited, self._chain, self._starts, rotation, position, zero, found)
-        return _distinct(found[~np.isnan(found[:, 0])])
-
     def _search(self, rotation: Floats, position: Floats, near: Floats) -> Floats:
         found = np.empty((2 * STARTS + 2, len(near)))
         best = search(self._arm, self._chain, self._starts, rotation, position, near, found)
@@ -142,16 +120,6 @@ class InverseKinematics:
             value,
             limit,
         )
-
-
-def _distinct(found: Floats) -> Floats:
-    """Keep the first of each group of postures that are the same but for whole turns."""
-    kept: list[Floats] = []
-    for q in found:
-        differences = [np.abs(np.remainder(q - other + np.pi, 2.0 * np.pi) - np.pi).max() for other in kept]
-        if not differences or min(differences) > SAME:
-            kept.append(q)
-    return np.array(kept).reshape(len(kept), found.shape[1])
 
 
 _TABLE, _RESULT = types.Array(float64, 2, "C"), types.Array(float64, 1, "C")
