@@ -7,11 +7,12 @@ import pinocchio as pin
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import least_squares
 
-from tvist_controller.trajectory import Bends, Curve
+from tvist_controller.trajectory import Bends, Curve, MotionLimits, PlannedMotion, quickest_motion
+from tvist_controller.trajectory.path import kept_by
 from tvist_plant.description import Payload
 from tvist_plant.model import FLANGE, rigid_model
 
-from .robots import Q1, UR5E
+from .robots import Q1, UR5E, H
 
 BENT = np.array([0.2, -1.4, 1.7, -1.8, -1.5, 0.3])
 """A posture far from any singular one [rad]."""
@@ -60,6 +61,20 @@ class JointSpline(Curve):
     def derivatives(self, s):
         q, slope, second = (spline(s, extrapolate=True) for spline in self._splines)
         return q, slope, second
+
+
+def quickest_on(curve: Curve, limits: MotionLimits, speed: float = 1.0) -> PlannedMotion:
+    """A motion with one velocity for the whole curve; its tightest bend uses half of the joints' limits."""
+    slope, second, third = float(curve.bends.slope.max()), curve.bends.second, curve.bends.third
+    velocity = min(
+        limits.velocity / slope,
+        np.sqrt(0.5 * limits.acceleration / second),
+        np.cbrt(0.25 * limits.jerk / third),
+        0.25 * limits.jerk * slope / (3.0 * second * limits.acceleration),
+    )
+    kept = kept_by(curve.bends, limits, float(velocity))
+    assert kept is not None, "this velocity leaves room for acceleration and jerk"
+    return quickest_motion(curve, kept, H, speed)
 
 
 def random_arc(random, start=Q1) -> Arc:

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ LOOKS = 12
 """Number of times that the range of a stop is widened before the whole rest of the curve is taken."""
 
 
-@dataclass(frozen=True)
-class Way:
+class Way(NamedTuple):
     """Motion to be checked for collisions."""
 
     at: Callable[[float], Floats]
@@ -63,10 +62,6 @@ class Path(ABC):
         """
 
     @abstractmethod
-    def planned(self, limits: MotionLimits) -> MotionLimits:
-        """Return limits for the parameter of a motion that keep every joint within its own limits on the whole path."""
-
-    @abstractmethod
     def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits | None:
         """Return the parameter's limits in a stop; None if the curve alone uses up those of the joints.
 
@@ -108,10 +103,6 @@ class JointLine(Path):
         """Return the derivatives of the parameter."""
         return np.array((xd, xdd))
 
-    def planned(self, limits: MotionLimits) -> MotionLimits:
-        """Return the limits of the joints unchanged."""
-        return limits
-
     def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits:  # noqa: ARG002  no curvature
         """Return the limits of the joints unchanged."""
         return limits
@@ -122,8 +113,7 @@ class JointLine(Path):
         return Way(lambda share: start + share * way, way)
 
 
-@dataclass(frozen=True)
-class Bends:
+class Bends(NamedTuple):
     """Upper bounds of a curve's derivatives with respect to its parameter s, on a part of it."""
 
     slope: Floats
@@ -192,27 +182,13 @@ class Curve(Path):
         _, qd, qdd = self.states(x, xd, xdd)
         return np.concatenate((own, np.array((qd, qdd)) * (acceleration / self._most)), axis=1)
 
-    def planned(self, limits: MotionLimits) -> MotionLimits:
-        """Return limits with one velocity for the whole curve; its tightest bend then uses a share of the limits."""
-        slope = float(self.bends.slope.max())
-        second, third = max(self.bends.second, 1e-12), max(self.bends.third, 1e-12)
-        velocity = min(
-            limits.velocity / slope,
-            np.sqrt(CURVED_SHARE * limits.acceleration / second),
-            np.cbrt(0.5 * CURVED_SHARE * limits.jerk / third),
-            0.5 * CURVED_SHARE * limits.jerk * slope / (3.0 * second * limits.acceleration),
-        )
-        kept = _kept(self.bends, limits, float(velocity))
-        assert kept is not None, "this velocity leaves room for acceleration and jerk"
-        return kept
-
     def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits | None:
         """Return the limits that the curve leaves at this velocity, from x on for as far as a stop takes."""
         start, end = float(x[0]), float(self.end[0])
         span = 0.1 * velocity
         for look in range(LOOKS):
             to = start + span if look < LOOKS - 1 else end
-            kept = _kept(self.bends_within(start, to), limits, velocity)
+            kept = kept_by(self.bends_within(start, to), limits, velocity)
             if kept is None or to >= end:
                 return kept
             needed = velocity * (0.5 * velocity / kept.acceleration + 2.0 * kept.acceleration / kept.jerk)
@@ -228,7 +204,7 @@ class Curve(Path):
         return Way(lambda share: self.posture(start + share * along), abs(float(along[0])) * slope)
 
 
-def _kept(bends: Bends, limits: MotionLimits, velocity: float) -> MotionLimits | None:
+def kept_by(bends: Bends, limits: MotionLimits, velocity: float) -> MotionLimits | None:
     """Limits that a part of a curve leaves at a velocity; the acceleration leaves a share of the jerk."""
     slope, second, third = float(bends.slope.max()), bends.second, bends.third
     acceleration = (limits.acceleration - second * velocity**2) / slope
