@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from tvist_client.arguments import make_payload
     from tvist_client.arm import Arm
     from tvist_client.errors import (
         AnswerTimeoutError,
@@ -17,12 +18,10 @@ if TYPE_CHECKING:
         StreamStoppedError,
         UnexpectedReplyError,
     )
+    from tvist_client.feed import Stream
     from tvist_client.motion import Motion
-    from tvist_client.payload import make_payload
-    from tvist_client.robot import Robot
+    from tvist_client.robot import Robot, Stepper
     from tvist_client.servo import Servo
-    from tvist_client.stepper import Stepper
-    from tvist_client.stream import Stream
     from tvist_client.transports import InProcessRobot, LoopbackTransport, Transport, ZenohTransport
     from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
     from tvist_protocol.info import Info
@@ -64,8 +63,8 @@ _PLACES = {
     "Robot": "tvist_client.robot",
     "Servo": "tvist_client.servo",
     "State": "tvist_protocol.stream",
-    "Stepper": "tvist_client.stepper",
-    "Stream": "tvist_client.stream",
+    "Stepper": "tvist_client.robot",
+    "Stream": "tvist_client.feed",
     "StreamStoppedError": "tvist_client.errors",
     "Telemetry": "tvist_protocol.stream",
     "Transport": "tvist_client.transports",
@@ -73,7 +72,7 @@ _PLACES = {
     "TvistError": "tvist_protocol.errors",
     "UnexpectedReplyError": "tvist_client.errors",
     "ZenohTransport": "tvist_client.transports",
-    "make_payload": "tvist_client.payload",
+    "make_payload": "tvist_client.arguments",
 }
 """Module of each name, which is imported when the name is first used: a program pays only for what it uses."""
 

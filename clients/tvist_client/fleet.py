@@ -15,12 +15,12 @@ import zenoh
 from zenoh.handlers import Callback
 
 from tvist_client.across import Across
+from tvist_client.connection import understood
 from tvist_client.errors import ClientError, NotConnectedError
 from tvist_client.readiness import RELIEVE, readiness
 from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
-from tvist_client.understood import understood
 from tvist_protocol import keys
 from tvist_protocol.codec import decode_info, decode_reply, decode_telemetry, encode
 from tvist_protocol.commands import Stop

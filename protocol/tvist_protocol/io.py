@@ -151,7 +151,7 @@ class SetTcp(ClientMessage, frozen=True, kw_only=True, tag="set_tcp"):
 
     token: Token
     """Token of the lease."""
-    offset: tuple[Length, Length, Length, Turn, Turn, Turn]
+    offset: Annotated[tuple[Length, Length, Length, Turn, Turn, Turn], "x y z rx ry rz"]
     """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
 
 
