@@ -24,7 +24,7 @@ TICK = 0.002
 """Control period [s]."""
 Answer = Accepted | Done | Posture | ToolPose
 """Replies to a command that was not refused."""
-_ANSWER = re.compile(r"; answered (as|by) [^.]*")
+_ANSWER = re.compile(r"; (it is )?answered (as|by) [^.]*")
 """What a message's description says about its answer, which is the method's result here."""
 
 
