@@ -37,26 +37,13 @@ class Place(NamedTuple):
 
 
 def place_of(text: str) -> Place:
-    """Read `NAMESPACE/NAME`, or `NAME` alone.
-
-    Raises:
-        ProtocolError: It is neither.
-    """
+    """Read `NAMESPACE/NAME`, or `NAME` alone."""
     namespace, _, robot = text.rpartition("/")
     return Place(keys.check_namespace(namespace) if namespace else "", keys.check_robot_name(robot))
 
 
 class Across(ABC):
-    """A session without a namespace of its own. Use as an asynchronous context.
-
-    Args:
-        endpoint: Endpoint of a router, or of one server.
-        security: Folder with this client's certificate, for `tls/<host>:<port>`.
-        namespace: Namespace that the robots are in or below; empty: all namespaces.
-
-    Raises:
-        ProtocolError: The namespace is none.
-    """
+    """A session with the robots in or below a namespace, or in all of them. Use as an asynchronous context."""
 
     def __init__(
         self, endpoint: str = ENDPOINT, *, security: Folder | None = None, namespace: str = ""
@@ -67,11 +54,7 @@ class Across(ABC):
         self._loop: asyncio.AbstractEventLoop
 
     async def __aenter__(self) -> Self:
-        """Connect and subscribe.
-
-        Raises:
-            NotConnectedError: Nobody listens there, or the certificate is rejected.
-        """
+        """Connect and subscribe."""
         self._loop = asyncio.get_running_loop()
         self._session = await asyncio.to_thread(open_session, self._endpoint, self._security)
         await self._subscribe()

@@ -49,17 +49,7 @@ def arguments(kind: type[Struct]) -> dict[str, Argument]:
 
 
 def built(kind: type[S], values: Mapping[str, Any], place: str = "", **known: Any) -> S:
-    """Build a message, or a part of one, from users' values.
-
-    Args:
-        kind: Type of the message.
-        values: Values by the names of their fields.
-        place: What precedes the names in error messages, such as `segments[2].`.
-        known: Fields that need no conversion.
-
-    Raises:
-        ArgumentError: A value has the wrong type.
-    """
+    """Build a message, or a part of one, from users' values, whose names in error messages follow `place`."""
     taken = arguments(kind)
     known |= {field.name: only for field in fields(kind) if (only := _constant(field.type)) is not None}
     return kind(

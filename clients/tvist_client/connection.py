@@ -47,11 +47,7 @@ T = TypeVar("T")
 
 
 class Connection(Questions):
-    """A robot over an open transport.
-
-    Args:
-        transport: The transport.
-    """
+    """A robot over an open transport."""
 
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
@@ -282,16 +278,9 @@ class Connection(Questions):
 async def step(
     robot: Connection, token: str, ticks: int, setpoints: Sequence[StepSetpoint] | None = None
 ) -> int:
-    """Send one `simulation.step`, and wait for the state of its last tick.
+    """Send one `simulation.step`, wait for the state of its last tick, and return that tick.
 
-    Args:
-        robot: Robot to step.
-        token: Token of the lease; that of the clock is used instead if this client holds it.
-        ticks: Number of control periods, 1 to 100000.
-        setpoints: Set-points of a running stream in order, one per tick.
-
-    Returns:
-        The last tick that passed; its state has arrived.
+    The clock's token is used instead of that of the lease if this client holds the clock.
     """
     robot.watch()
     ticks = whole(ticks, "ticks", 1, LONGEST_STEP)
@@ -310,11 +299,7 @@ async def step(
 
 
 def understood(decode: Callable[[bytes], T], data: bytes) -> T:
-    """Decode an answer.
-
-    Raises:
-        UnexpectedReplyError: The answer is invalid.
-    """
+    """Decode an answer."""
     try:
         return decode(data)
     except ProtocolError as error:

@@ -32,9 +32,6 @@ class Stream(AsyncIterator[Item], Generic[Item]):
 
     If the reader is slower than the robot, the oldest messages are dropped and counted, so that messages are never
     older than the buffer. The iterator ends when the robot's connection is closed.
-
-    Args:
-        size: Number of messages that may wait.
     """
 
     def __init__(self, size: int) -> None:
@@ -82,12 +79,7 @@ class Stream(AsyncIterator[Item], Generic[Item]):
 class Feed(Generic[M]):
     """Messages of one topic. Subscribes with its first listener.
 
-    Args:
-        transport: Transport that delivers the messages.
-        topic: Topic to subscribe to.
-        decode: Converts bytes to a message.
-        once_a_tick: Whether there is one message per tick; a message that is not newer than the last is then dropped
-            as a repetition.
+    Where there is one message per tick (`once_a_tick`), one that is not newer than the last is dropped as a repetition.
     """
 
     def __init__(
@@ -108,11 +100,7 @@ class Feed(Generic[M]):
         self._waiting: dict[asyncio.Future[M], Callable[[M], bool]] = {}
 
     def subscribe(self) -> None:
-        """Subscribe to the topic; from then on `latest` is updated.
-
-        Raises:
-            NotConnectedError: The connection is closed.
-        """
+        """Subscribe to the topic; from then on `latest` is updated."""
         if self._finished:
             raise NotConnectedError("the connection is closed: open another one")
         if not self._subscribed:
@@ -120,12 +108,7 @@ class Feed(Generic[M]):
             self._subscribed = True
 
     def listen(self, callback: Callable[[M], object]) -> Callable[[], None]:
-        """Call a function with every message; the function returned ends that.
-
-        Raises:
-            ArgumentError: What is given is not a function.
-            NotConnectedError: The connection is closed.
-        """
+        """Call a function with every message; the function returned ends that."""
         if not callable(callback):
             raise ArgumentError(
                 "callback", f"callback is {quoted(callback)}: must be a function of one {self._topic} message"
@@ -135,15 +118,7 @@ class Feed(Generic[M]):
         return lambda: self._listeners.remove(callback)
 
     def stream(self, buffer: int) -> Stream[M]:
-        """Return an iterator over every message from now on; it is dropped when it is no longer referenced.
-
-        Args:
-            buffer: Number of messages that may wait, at least 1.
-
-        Raises:
-            ArgumentError: The buffer has no such number of places.
-            NotConnectedError: The connection is closed.
-        """
+        """Return an iterator over every message from now on; it is dropped when it is no longer referenced."""
         size = whole(buffer, "buffer", 1)
         self.subscribe()
         stream: Stream[M] = Stream(size)
@@ -151,12 +126,7 @@ class Feed(Generic[M]):
         return stream
 
     async def next(self, wanted: Callable[[M], bool], timeout_s: float) -> M:
-        """Return the next message that satisfies a condition.
-
-        Raises:
-            AnswerTimeoutError: No such message arrived in time.
-            NotConnectedError: The robot disconnected.
-        """
+        """Return the next message that satisfies a condition."""
         self.subscribe()
         message: asyncio.Future[M] = asyncio.get_running_loop().create_future()
         self._waiting[message] = wanted

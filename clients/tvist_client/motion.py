@@ -77,11 +77,7 @@ class Motion:
 
 
 class MotionsByNumber:
-    """The motions of one robot by number; each is created by its answer or its first event, whichever comes first.
-
-    Args:
-        pass_time: Steps time until a motion has ended.
-    """
+    """The motions of one robot by number; each is created by its answer or its first event, whichever comes first."""
 
     def __init__(self, pass_time: Callable[[Motion], Awaitable[None]]) -> None:
         self._pass_time = pass_time

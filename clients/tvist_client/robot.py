@@ -25,12 +25,7 @@ NAME = "ur5e"
 
 
 class Stepper(Leased):
-    """The clock of a simulated robot, which `Robot.clock_control` yields. It cannot move the robot.
-
-    Args:
-        robot: The robot it belongs to.
-        token: Token of the clock.
-    """
+    """The clock of a simulated robot, which `Robot.clock_control` yields. It cannot move the robot."""
 
     robot: Connection
 

@@ -15,14 +15,7 @@ from tvist_protocol.stream import Event
 
 
 class Servo:
-    """The stream that `Arm.servo` yields: numbers set-points from 0 and checks them, since a robot does not answer.
-
-    Args:
-        robot: Robot to stream to.
-        token: Token of the lease.
-        period: Time between two set-points [s].
-        joints: The joint angles that the robot accepts.
-    """
+    """The stream that `Arm.servo` yields: numbers set-points from 0 and checks them, since a robot does not answer."""
 
     period: float
     """Time between two set-points [s]."""

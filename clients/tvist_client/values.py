@@ -15,15 +15,7 @@ Joints = tuple[float, ...]
 
 
 def number(value: float, where: str) -> float:
-    """Convert a value to a float; its range is checked by the robot.
-
-    Args:
-        value: Anything that represents one number.
-        where: Name of the argument, for error messages.
-
-    Raises:
-        ArgumentError: The value has the wrong type or length.
-    """
+    """Convert a value to a float; its range is checked by the robot."""
     # `float` would also parse text, which cannot be intended here.
     if not isinstance(value, str | bytes):
         with contextlib.suppress(TypeError, ValueError, OverflowError):
@@ -32,11 +24,7 @@ def number(value: float, where: str) -> float:
 
 
 def positive(value: float, where: str) -> float:
-    """Convert a value to a finite float above 0.
-
-    Raises:
-        ArgumentError: The value is not such a number.
-    """
+    """Convert a value to a finite float above 0."""
     found = number(value, where)
     if not 0.0 < found < math.inf:
         raise ArgumentError(where, f"{where} is {found:g}: must be more than 0, and finite", 0.0)
@@ -44,17 +32,7 @@ def positive(value: float, where: str) -> float:
 
 
 def whole(value: int, where: str, low: int, high: int | None = None) -> int:
-    """Convert a value to an integer within bounds.
-
-    Args:
-        value: Anything that represents an integer.
-        where: Name of the argument, for error messages.
-        low: Smallest permitted value.
-        high: Largest permitted value; None for no bound.
-
-    Raises:
-        ArgumentError: The value is not a number, or out of range.
-    """
+    """Convert a value to an integer within bounds."""
     allowed = f"at least {low}" if high is None else f"from {low} to {high}"
     try:
         found = operator.index(value)
@@ -74,19 +52,7 @@ def listed(
     count: int | None = None,
     meaning: str | None = None,
 ) -> tuple[T, ...]:
-    """Convert the entries of a sequence.
-
-    Args:
-        values: List, tuple or array.
-        where: Name of the argument, for error messages.
-        convert: Converts an entry with a given name.
-        of: What the entries are, for error messages.
-        count: Number of entries, if it is known here; otherwise the robot checks it.
-        meaning: One word for each entry, for error messages.
-
-    Raises:
-        ArgumentError: There is no sequence, an entry is wrong, or their count is.
-    """
+    """Convert the entries of a sequence, whose count is checked here only if it is known, with a word for each."""
     entries = None
     if not isinstance(values, str | bytes):
         with contextlib.suppress(TypeError):
@@ -100,26 +66,14 @@ def listed(
 
 
 class JointRange:
-    """The joint angles that a robot accepts; set-points are checked here because the robot does not answer them.
-
-    Args:
-        info: Description of the robot.
-    """
+    """The joint angles that a robot accepts; set-points are checked here because the robot does not answer them."""
 
     def __init__(self, info: Info) -> None:
         self._joints = info.joints
         self._ranges = info.limits.position
 
     def check(self, q: Iterable[float], where: str = "q") -> Joints:
-        """Convert joint angles to floats, and check that the robot accepts them.
-
-        Args:
-            q: One angle per joint [rad].
-            where: Name of the argument, for error messages.
-
-        Raises:
-            ArgumentError: An angle is not a number, not finite or outside its joint's range, or their count is wrong.
-        """
+        """Convert joint angles to floats, and check that the robot accepts them."""
         angles = listed(q, where, number)
         joints, ranges = self._joints, self._ranges
         if len(angles) != len(joints):

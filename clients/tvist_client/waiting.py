@@ -24,11 +24,7 @@ M = TypeVar("M")
 
 
 class Waited(Described):
-    """A method that waits until one with `await` is done, which has the same arguments and description.
-
-    Args:
-        of: The method with `await`.
-    """
+    """A method that waits until one with `await` is done, which has the same arguments and description."""
 
     def __init__(self, of: Any) -> None:
         self._of = of
@@ -56,12 +52,7 @@ class Waited(Described):
 
 
 class Attribute:
-    """An attribute or a property of a class with `await`.
-
-    Args:
-        of: The class.
-        name: Name of the attribute.
-    """
+    """An attribute or a property of a class with `await`."""
 
     def __init__(self, of: type, name: str) -> None:
         self._part, self._name = next(p for p in of.__mro__ if name in vars(p) | get_annotations(p)), name
@@ -92,12 +83,7 @@ class Attribute:
 
 
 class Waiting:
-    """Base of the classes without `await`.
-
-    Args:
-        portal: The loop of `inner`.
-        inner: What does the work.
-    """
+    """Base of the classes without `await`."""
 
     twins: ClassVar[dict[Any, Any]] = {}
     """The classes without `await` by those with it."""
@@ -107,13 +93,7 @@ class Waiting:
 
 
 def without_await(of: type, *internal: str, base: type[Waiting] = Waiting) -> Any:
-    """Return a class with the public members of a class with `await`.
-
-    Args:
-        of: The class with `await`.
-        internal: Members that are for other modules of the client.
-        base: Base of the class, whose own members come first.
-    """
+    """Return a class with the public members of one with `await`, without those for other modules of the client."""
     members: dict[str, Any] = {
         "__module__": "tvist_client.blocking",
         "__doc__": inspect.cleandoc(of.__doc__ or "").partition("\n\nArgs:")[0],
