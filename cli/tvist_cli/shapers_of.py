@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @contextmanager
 def designing(code: int = 2) -> Iterator[None]:
     """Tell why a shaper cannot be made of a calibration for an arm."""
-    from tvist_controller.commands.refusal import RefusalError
+    from tvist_controller.refusal import RefusalError
     from tvist_lab.study.recipes import RecipeError
     from tvist_shaping.errors import ShapingError
 
@@ -91,8 +91,8 @@ def calibration_for(
         Failure: There is no such calibration or shaper.
     """
     from tvist_controller.calibrations import default_for, load
-    from tvist_controller.commands.refusal import RefusalError
     from tvist_controller.planning.choices import wanted_modes
+    from tvist_controller.refusal import RefusalError
     from tvist_controller.sources.mode_source import modal_source
     from tvist_protocol.calibration import CalibrationError
     from tvist_shaping import Registry

@@ -5,10 +5,10 @@ import numpy as np
 
 from tvist_controller.controller import Controller
 from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.instruments.sink import Sink
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.elastic_lead import loads_of
 from tvist_controller.line.limits import StreamTorqueRoom
-from tvist_controller.reporting.sink import Sink
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.trajectory import JointLine, MotionLimits, SetpointStream, quickest_motion
 from tvist_plant.description import RobotDescription, load

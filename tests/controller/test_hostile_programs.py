@@ -260,7 +260,7 @@ def test_what_has_ended_or_stopped_does_nothing_any_more(seed):
         """Look at what was written when the main program stops, still within the tick."""
         hear(event)
         if event.kind in {"program_stopped", "protective_stop"} and event.secondary is None and not at_stop:
-            at_stop.append((len(robot.controller._events), robot.controller.tick_number))
+            at_stop.append((len(robot.controller.events), robot.controller.tick_number))
             at_stop.append(written(robot, all_places=False))
 
     player.hear = watching

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tvist_controller import calibrations
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import body, paper_payload
 from tvist_lab.studies.evaluate import jobs, report
 from tvist_lab.study.case import Case

@@ -7,7 +7,6 @@ from tvist_controller.calibrations import available as calibrations
 from tvist_controller.calibrations import estimator_of
 from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.calibrations.modal import drivetrain, mass_matrix, modal_estimator
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
 from tvist_controller.foresight.line_copy import resting_after
 from tvist_controller.line.cycle import ControlCycle
@@ -18,6 +17,7 @@ from tvist_controller.line.limits import REBOUND, TORQUE_SHARE, acceleration_on_
 from tvist_controller.line.whole_motion import Driven, DrivenLine, respond
 from tvist_controller.planning.choices import choose_filter, wanted_modes
 from tvist_controller.planning.keeping import keeping_motion
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.sources.elastic_source import elastic_feed_forward
 from tvist_controller.sources.mode_source import ModeSource

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_controller.foresight.line_copy import resting_after
 from tvist_controller.foresight.stop_guard import LookAhead
@@ -13,6 +12,7 @@ from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import StreamTorqueRoom
+from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory import JointStop, PlannedMotion, Way
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.planning.course import Course
@@ -14,6 +13,7 @@ from tvist_controller.planning.fitting import Fitter, Slower
 from tvist_controller.planning.keeping import keeping_motion
 from tvist_controller.planning.slower import Limited, longer_joint_motion, slower_joint_motion
 from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import (
     JointLine,

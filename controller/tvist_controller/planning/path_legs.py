@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
 from tvist_controller.paths.pacing import timed
@@ -13,6 +12,7 @@ from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, To
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory.spline import Knots
 from tvist_plant.description import RobotDescription
 from tvist_protocol.motions import (

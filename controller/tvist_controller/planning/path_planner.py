@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import arm_limits, rate_of
@@ -21,6 +20,7 @@ from tvist_controller.planning.path_legs import PathLegs
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.slower import Limited, slower_path
 from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Way, at_least, quickest_motion
 from tvist_controller.trajectory.retiming import RetimedLaw

@@ -6,11 +6,12 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.planning.snapshot import FilterState, Snapshot
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command
+from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.replies import Posture, ToolPose
 from tvist_shaping.base import Filter
 from tvist_urscript import Script
@@ -69,6 +70,11 @@ Order = Callable[[Command, Snapshot], Callable[[], Plan]]
 
 class MakesPlans(Protocol):
     """A `Planner`, which lies above all that uses plans."""
+
+    filters: FilterPlanner
+
+    def for_lesson(self, lesson: PayloadLesson, present: FilterState) -> "Plan":
+        """Plan what the robot has learnt: the present filter for what it carries."""
 
     def plan(
         self, command: Command, now: Snapshot, *, within_tick: bool = False, checked: bool = False
