@@ -55,7 +55,10 @@ class Attribute:
     """An attribute or a property of a class with `await`."""
 
     def __init__(self, of: type, name: str) -> None:
-        self._part, self._name = next(p for p in of.__mro__ if name in vars(p) | get_annotations(p)), name
+        self._name = name
+        self._part = next(part for part in of.__mro__ if name in vars(part) | get_annotations(part))
+        self._getter = getattr(vars(self._part).get(name), "fget", None)
+        """None for an attribute that is only declared."""
 
     def __get__(self, owner: Any, kind: type | None = None) -> Any:
         return self if owner is None else getattr(owner._inner, self._name)  # noqa: SLF001  its attribute
@@ -66,18 +69,13 @@ class Attribute:
     @property
     def kind(self) -> Any:
         """Its type."""
-        found = vars(self._part).get(self._name)
-        return (
-            get_type_hints(found.fget)["return"]
-            if isinstance(found, property)
-            else get_type_hints(self._part)[self._name]
-        )
+        if self._getter is not None:
+            return get_type_hints(self._getter)["return"]
+        return get_type_hints(self._part)[self._name]
 
     def _description(self) -> str:
-        found = vars(self._part).get(self._name)
-        return (
-            inspect.getdoc(found) or "" if isinstance(found, property) else field_docs(self._part)[self._name]
-        )
+        own = inspect.getdoc(self._getter) if self._getter is not None else None
+        return own or field_docs(self._part)[self._name]
 
     __doc__ = property(_description)
 
