@@ -44,17 +44,15 @@ def arguments(kind: type[Struct]) -> dict[str, Argument]:
     return {
         field.name: Argument(field, given(field.type))
         for field in fields(kind)
-        if field.name not in {"token", "protocol"} and _constant(field.type) is None
+        if field.name not in {"token", "protocol", *_constants(kind)}
     }
 
 
 def built(kind: type[S], values: Mapping[str, Any], place: str = "", **known: Any) -> S:
     """Build a message, or a part of one, from users' values, whose names in error messages follow `place`."""
     taken = arguments(kind)
-    known |= {field.name: only for field in fields(kind) if (only := _constant(field.type)) is not None}
-    return kind(
-        **{name: taken[name].given.convert(value, place + name) for name, value in values.items()}, **known
-    )
+    converted = {name: taken[name].given.convert(value, place + name) for name, value in values.items()}
+    return kind(**_constants(kind), **converted, **known)
 
 
 def make_payload(mass: float, com: Iterable[float], inertia: Iterable[float]) -> Payload:
@@ -156,6 +154,12 @@ def _structs(hint: Any) -> tuple[type[Struct], ...]:
     """Return the structs that a value may be; empty if it may be something else."""
     kinds = get_args(hint) if get_origin(hint) in {Union, UnionType} else (hint,)
     return kinds if all(isinstance(kind, type) and issubclass(kind, Struct) for kind in kinds) else ()
+
+
+@cache
+def _constants(kind: type[Struct]) -> dict[str, Any]:
+    """Return the fields that have but one value."""
+    return {field.name: only for field in fields(kind) if (only := _constant(field.type)) is not None}
 
 
 def _constant(hint: Any) -> Any:

@@ -101,7 +101,7 @@ class Sent(Described):
         known = {"token": owner.token} if "token" in self._kind.__struct_fields__ else {}
         return await self._carry_out(owner, built(self._kind, of_message, **known), **extra)
 
-    @property
+    @cached_property
     def _extra(self) -> dict[str, Parameter]:
         """The parameters of the method that are not the message's."""
         return dict(list(inspect.signature(self._carry_out).parameters.items())[2:])
