@@ -6,12 +6,12 @@ from importlib.metadata import version
 import msgspec
 import numpy as np
 
-from tvist_controller.calibrations import available, fits
 from tvist_controller.controller import Controller
 from tvist_controller.foresight.stops import StopPlanner
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.setup import body, paper_payload
+from tvist_controller.sources.calibrations import available, fits
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD, Things
 from tvist_protocol.channels import COMMANDS, tag

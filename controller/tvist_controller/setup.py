@@ -71,7 +71,7 @@ class Setup:
     plant: OwnPlant | None = None
     """Plant other than the flexible arm of the description; None for that."""
     hidden: int | None = None
-    """Seed of a hidden robot, see `tvist_plant.hidden`; None for the robot of the description."""
+    """Seed of a hidden robot, see `tvist_plant.variants`; None for the robot of the description."""
     shape_servo: bool = False
     """Whether `servoj`, `speedj` and `speedl` of programs are shaped where they begin at rest."""
     cell: Cell | None = None
@@ -144,7 +144,7 @@ class Setup:
         """Make the plant; None for the flexible arm of the description.
 
         Raises:
-            OwnPlantError: It cannot be made.
+            OwnFileError: It cannot be made.
         """
         carried = body(self.carried or self.payload)
         if self.hidden is not None:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tvist_controller.calibrations import load
 from tvist_controller.setup import paper_payload
+from tvist_controller.sources.calibrations import load
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationReset

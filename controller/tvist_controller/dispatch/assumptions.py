@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-from tvist_controller.calibrations import fits
 from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.line.inverse_dynamics import SLEW
@@ -15,6 +14,7 @@ from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.motion_record import Beliefs
 from tvist_controller.safety.payload_monitor import PayloadMonitor
 from tvist_controller.setup import body
+from tvist_controller.sources.calibrations import fits
 from tvist_controller.sources.mode_source import ModeSource
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import SetPayload

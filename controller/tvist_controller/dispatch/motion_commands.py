@@ -1,5 +1,6 @@
 """Commands that move, guide, stop and power the arm, or let it give way to forces."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from tvist_protocol.motions import JointSegment, MoveC, MoveL, MovePath
 from tvist_protocol.replies import Accepted, Reply
 from tvist_protocol.transitions import Activity
 
-_STRAIGHT = Planning(MOTION, MovePlanner, MovePlanner.move, MovePlanner.move_within_tick)
+_STRAIGHT = Planning(MOTION, MovePlanner, MovePlanner.move, partial(MovePlanner.move, at_once=True))
 _ALONG_PATH = Planning(MOTION, PathPlanner, PathPlanner.plan)
 
 

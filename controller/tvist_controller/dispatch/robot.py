@@ -32,7 +32,7 @@ from tvist_controller.safety.own_controller import Supervision, Watching
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_controller.setup import Setup, body
-from tvist_plant.fingerprint import fingerprint
+from tvist_plant.description import fingerprint
 from tvist_plant.plant import PERIOD, Plant, PlantError, RealArm
 from tvist_protocol import commands as c
 from tvist_protocol.io import Io
@@ -61,7 +61,7 @@ class Robot(ABC):
         self.counters = Counters()
         self.events: list[Event] = []
         """Events of the tick that is being computed, or of the next one between two ticks."""
-        self.plans = Plans(planner, self.snapshot, order)
+        self.plans = Plans(planner.plan, self.snapshot, order)
         """The way to plans."""
         first, timeouts, description = planner.filters.first(), setup.clock == "realtime", setup.description
         self.cycle = _cycle(setup, first, plant)

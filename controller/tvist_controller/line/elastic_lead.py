@@ -68,18 +68,9 @@ class Lead(NamedTuple):
     """Bending at the last three ticks, the newest first, shape (3, m) [rad]."""
 
 
-def shapes(N: int, n: int, m: int) -> Lead:
-    """Shapes of the parts."""
-    sizes = (
-        (n,), (m,), (N + 1, WIDTH), (N + 1, SCRATCH), (2, N), (LAW + LAWS, n), (4, n), (2, 3, n), (N,), (3, N),
-        (3, N), (2, N), (3, m),
-    )  # fmt: skip
-    return Lead(*sizes)  # type: ignore[arg-type]
-
-
 def memory_for(N: int, n: int, m: int) -> Floats:
     """Return memory for an arm with N coordinates, n joints and m ways in which links bend, full of zeros."""
-    memory = np.zeros(HEAD + sum(int(np.prod(shape)) for shape in shapes(N, n, m)))
+    memory = np.zeros(HEAD + (N + 1) * (WIDTH + SCRATCH) + 11 * N + (LAW + LAWS + 11) * n + 4 * m)
     memory[COORDINATES], memory[JOINTS], memory[FLEXES] = N, n, m
     return memory
 

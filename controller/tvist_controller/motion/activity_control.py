@@ -11,13 +11,13 @@ from msgspec.structs import replace
 
 from tvist_controller.events import Emit, Told
 from tvist_controller.foresight.collision import CollisionModel
-from tvist_controller.foresight.rest_of_motion import WayAhead
-from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.foresight.rest_of_motion import RemainingMotion
+from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.limits import StreamTorqueRoom
+from tvist_controller.line.limits import TorqueRoom
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.arm_power import ArmPower
@@ -56,9 +56,9 @@ class MotionControl:
         self.safety = SafetySystem()
         """The safety system."""
         self._emit = emit
-        self.outlook = Outlook(cycle)
+        self.outlook = Stopper(cycle)
         """Forecast of the control line's motion."""
-        self.ahead = WayAhead(cycle, self.outlook, collisions)
+        self.ahead = RemainingMotion(cycle, self.outlook, collisions)
         """Collision check of that motion."""
         self.power = ArmPower.of(cycle.plant)
         """Power of an arm that has one."""
@@ -210,7 +210,7 @@ class MotionControl:
             cycle.filter.spared(limits),
             PERIOD,
             reach=np.array(cycle.description.limits.position),
-            torque=StreamTorqueRoom(cycle.description, cycle.dynamics),
+            torque=TorqueRoom(cycle.description, cycle.dynamics),
         )
         return cycle.begin(stream, LineMode.GUARDED, self.ahead.guard_of_stream())
 

@@ -13,9 +13,8 @@ from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.monitor import Finding, Monitor
 from tvist_controller.motion.task_frame import Feature, frame_of
 from tvist_controller.refusal import RefusalError
-from tvist_controller.trajectory import Compliant, ForceTask, Guided, Rest
-from tvist_controller.trajectory.compliant import CRAWL
-from tvist_controller.trajectory.force_law import FREE_DAMPING
+from tvist_controller.trajectory import Compliant, ForceTask
+from tvist_controller.trajectory.compliant import CRAWL, FREE_DAMPING
 from tvist_plant.plant import PERIOD
 
 SMOOTHED = 0.04
@@ -137,11 +136,8 @@ class ForceControl(Monitor):
         guidance = self._guidance
         state, present = guidance.state, guidance.guided
         self._smooth = self._forces.felt(self._cycle.sample)
-        inner: Guided | Rest
         if present is not None and not self._cycle.mode.shaped:
             inner = present
-        elif self._cycle.mode.at_rest:
-            inner = Rest(state[0])
         else:
             inner = guidance.halting(state, guidance.limits.acceleration)
         return Compliant(

@@ -7,7 +7,7 @@ import numpy as np
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.rotation import turn, turned
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.limits import GENTLEST_STOP, GuidedTorqueRoom, arm_limits
+from tvist_controller.line.limits import GENTLEST_STOP, REBOUND, TorqueRoom, arm_limits
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.refusal import RefusalError
@@ -33,7 +33,7 @@ class Guidance:
         """Limits of every joint."""
         self.reach = np.array(motion.cycle.description.limits.position)
         """Largest position of each joint in either direction, shape (n,) [rad]."""
-        self.torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.dynamics)
+        self.torque = TorqueRoom(motion.cycle.description, motion.cycle.dynamics, REBOUND)
         """Motion that the torque permits."""
         self._rehearse()
 

@@ -12,7 +12,7 @@ from tvist_controller.planning.snapshot import FilterState, Snapshot
 from tvist_controller.planning.surplus import surplus_of
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, paper_payload
-from tvist_controller.sources.elastic_source import elastic_feed_forward
+from tvist_controller.sources.calibrations import elastic_feed_forward
 from tvist_controller.sources.mode_source import ModeSource, modal_source
 from tvist_protocol.commands import SetEstimator
 from tvist_protocol.values import Payload

@@ -210,11 +210,11 @@ class PathPlanner:
 
 def _told(fitted: Fitted, run: Run, start: float = 0.0) -> Limited | None:
     """Say what made a motion slower, and on which part of a path; `start` is where its run begins on its curve [m]."""
-    told, need, path = fitted.limited(), fitted.need, fitted.motion.path
-    if told is None or need is None or not isinstance(path, SplineCurve) or not run[0].where:
+    told, q, path = fitted.limited, fitted.q, fitted.motion.path
+    if told is None or q is None or not isinstance(path, SplineCurve) or not run[0].where:
         return told
     s = np.linspace(start, float(path.end[0]), LOOKS)
-    at = float(s[int(np.argmin(np.abs(path.derivatives(s)[0] - need.q).max(axis=1)))])
+    at = float(s[int(np.argmin(np.abs(path.derivatives(s)[0] - q).max(axis=1)))])
     ends = start + np.cumsum([piece.knots.s[-1] for piece in run])
     piece = run[min(int(np.searchsorted(ends, at)), len(run) - 1)]
     return told[0], f"{told[1]}: on {piece.where}, {at:.3f} m from the start of this part of the path"

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from tvist_controller.calibrations import available, estimator_of, load
-from tvist_controller.calibrations.modal import Floats, friction_law, modal_estimator
-from tvist_plant.description import RobotDescription
-from tvist_plant.fingerprint import fingerprint
+from tvist_controller.sources.calibrations import available, estimator_of, friction_law, load, modal_estimator
+from tvist_plant.description import RobotDescription, fingerprint
+from tvist_plant.model import Floats
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.values import Payload
 from tvist_shaping.errors import EstimatorError
@@ -46,11 +45,7 @@ class ModeSource:
 
     @cached_property
     def friction(self) -> Floats | None:
-        """Identified friction of the joints, see `friction_law`; None if the calibration has none.
-
-        Raises:
-            EstimatorError: The calibration has it for some joints only, or more than the drives have torque.
-        """
+        """Identified friction of the joints, see `friction_law`; None if the calibration has none."""
         modal = None if self.calibration is None else self.calibration.modal
         return None if modal is None else friction_law(modal.parameters, self.description)
 
@@ -62,11 +57,7 @@ class ModeSource:
         return len(self.f_d) if self.name == "fixed" else 1
 
     def estimator(self, modes: int, payload: Payload) -> Estimator:
-        """Return an estimator of the lowest modes with a payload.
-
-        Raises:
-            EstimatorError: There are fewer modes, or the calibration belongs to another arm.
-        """
+        """Return an estimator of the lowest modes with a payload."""
         if modes > self.most:
             raise EstimatorError("modes", modes, f"at most {self.most}, which the estimator {self.name} has")
         if self.calibration is None:
