@@ -72,7 +72,8 @@ class Sent(Described):
 
     Args:
         kind: The command. Fields without a default are positional arguments, the others go by their names.
-        carry_out: Sends it for an owner of this method; its further arguments are arguments of the method, too.
+        carry_out: Sends it for an owner of this method. Its further arguments are arguments of the method, too, and its
+            docstring says what comes of it.
         positional: Number of positional arguments, if some of them have a default.
         returns: Type of the result, if `carry_out` does not say it.
     """
@@ -120,13 +121,14 @@ class Sent(Described):
         return Signature([*found, *self._extra.values()], return_annotation=returned)
 
     def _description(self) -> str:
-        """Return the docstring: what the message's and those of its fields say, and errors."""
+        """Return the docstring: what the message's, those of its fields and that of `carry_out` say, and errors."""
         docs, taken, extra = field_docs(self._kind), arguments(self._kind), self._extra
         lines = [f"{name}: {docs[name]}" for name in taken] + [f"{name}: {_EXTRA[name]}" for name in extra]
         errors = ["RefusedError: The robot refused it, which changed nothing."]
         errors += ["ArgumentError: An argument has the wrong type; nothing was sent."] if lines else []
         errors += ["MotionStoppedError: The motion ended before its target."] if "wait" in extra else []
         text = _ANSWER.sub("", cleandoc(self._kind.__doc__ or ""))
+        text += "" if self._carry_out.__doc__ is None else f"\n\n{self._carry_out.__doc__}"
         for title, listed in (("Args", lines), ("Raises", errors)):
             text += "".join([f"\n\n{title}:", *map(_filled, listed)]) if listed else ""
         return re.sub(r"\bnull\b", "None", text)
@@ -189,16 +191,19 @@ async def _send(arm: Leased, command: Command) -> None:
 
 
 async def _date(arm: Leased, command: Command) -> int | None:
+    """The result is the tick at which it was carried out."""
     reply = await arm.robot.request(command)
     return reply.tick if isinstance(reply, Done) else None
 
 
 async def _stop(arm: Leased, command: Command) -> None:
+    """This returns when the arm is at rest."""
     await arm.robot.request(command)
     await arm.robot.rest()
 
 
 async def _begin(arm: Leased, command: Command) -> Motion:
+    """The result is the motion, which `end_force_mode`, a stop or the end of control ends."""
     reply = await arm.robot.request(command)
     if not isinstance(reply, Accepted) or reply.id is None:
         raise UnexpectedReplyError(
@@ -210,11 +215,13 @@ async def _begin(arm: Leased, command: Command) -> Motion:
 
 
 async def _move(arm: Leased, command: Command, *, wait: bool = True) -> Motion:
+    """The result is the motion; `started` and `done` are ticks once they are known."""
     motion = await _begin(arm, command)
     return await motion.wait() if wait else motion
 
 
 async def _guide(arm: Leased, command: Command, *, duration: float | None = None) -> Motion:
+    """The arm keeps its speed, also after `duration`; such commands share one motion until it rests."""
     seconds = None if duration is None else positive(duration, "duration")
     motion = await _begin(arm, command)
     if seconds is not None:
