@@ -9,6 +9,7 @@ from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.least_squares import solve_in_place
 from tvist_controller.kinematics.pose import locate
+from tvist_kernels.compiling import inlined
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 from tvist_plant.plant import GRAVITY
@@ -71,7 +72,7 @@ def product(A: Floats, B: Floats) -> Floats:
     return found
 
 
-@compiled_for_ticks
+@inlined
 def force_at(chain: Floats, q: Floats, torque: Floats, force: Floats) -> None:
     """Compute force and torque [N, N m], shape (6,), at a chain's end that cause torques on the joints, shape (n,).
 

@@ -20,6 +20,7 @@ import math
 import numpy as np
 
 from tvist_controller._compiled import compiled
+from tvist_kernels.compiling import inlined
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 
@@ -89,7 +90,7 @@ def _form(dh: Floats) -> float:
     return ANY
 
 
-@compiled
+@inlined
 def representation(angle: float, near: float, limit: float) -> float:
     """Add the whole turns to an angle that bring it nearest to `near` within ± limit.
 
@@ -202,7 +203,7 @@ def postures(
     return freedom
 
 
-@compiled
+@inlined
 def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: float, rows: Floats) -> int:
     """Compute the four postures of an arm whose axes 2, 3 and 4 are parallel, at one position of its shoulder."""
     (px, py), (xx, xy, xu), (zx, zy, zu) = pose
@@ -242,7 +243,7 @@ def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: 
     return freedom
 
 
-@compiled
+@inlined
 def _spherical(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: float, rows: Floats) -> int:
     """Compute the four postures of an arm with a spherical wrist, at one position of its shoulder."""
     (px, py), (xx, xy, xu), (zx, zy, zu) = pose

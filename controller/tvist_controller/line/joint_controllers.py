@@ -6,6 +6,7 @@ import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.differentiator import Floats
+from tvist_kernels.compiling import inlined
 from tvist_plant.description import RobotDescription
 
 LAWS = 5
@@ -32,7 +33,7 @@ def friction_at(law: Floats, j: int, speed: float) -> float:
     return friction
 
 
-@compiled_for_ticks
+@inlined
 def command_drives(
     q: Floats,  # q*, shape (n,) [rad]
     rates: Floats,  # q̇* and q̈*, shape (2, n)

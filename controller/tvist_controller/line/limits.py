@@ -91,12 +91,11 @@ class TorqueRoom:
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
         """Return whether a state of motion keeps all torques, or is as gentle as any stop."""
-        if np.abs(qdd).max() <= GENTLEST_STOP:
-            return True
         swung = (1.0 + self._rebound) * qdd
-        return self._keeps(q, qd, qdd, self._most) and (
+        keeps = self._keeps(q, qd, qdd, self._most) and (
             self._rebound == 0.0 or self._keeps(q, qd, swung, self._limits)
         )
+        return keeps or bool(np.abs(qdd).max() <= GENTLEST_STOP)
 
     def acceleration(self, q: Floats, qd: Floats) -> float:
         """Largest a such that every q̈ with |q̈ᵢ| ≤ a is allowed [rad/s^2].

@@ -52,6 +52,26 @@ class Tracker:
         """Return the pose of the tool at joint positions, shape (n,) [rad]."""
         return Placement(*self._tool.pose(q))
 
+    def solve(self, goal: Placement, q: Floats) -> Floats | None:
+        """Return joint positions near q at which the tool has a pose, shape (n,) [rad]; None if Newton finds none."""
+        found = q
+        for _ in range(REFRESHED):
+            found, error = self._tool.near(goal, found)
+            if not np.abs(found - q).max() <= FARTHEST:
+                return None
+            if np.abs(error).max() <= ACCURATE:
+                return found
+        return None
+
+    def rates(self, q: Floats, state: ToolState) -> tuple[Floats, Floats] | None:
+        """Return dq/ds and d²q/ds² of a posture on a path, each of shape (n,); None in a singular posture."""
+        jacobian = self._tool.jacobian(q)
+        first = _solved(jacobian, state.first)
+        if first is None or np.abs(first).max() > STEEPEST:
+            return None
+        second = _solved(jacobian, state.second - self._tool.acceleration(q, first, np.zeros(len(q))))
+        return None if second is None else (first, second)
+
     def follow(self, curve: ToolCurve, q: Floats) -> Knots:
         """Return the joints' way along a path of the tool.
 
@@ -92,38 +112,24 @@ class Tracker:
 
     def _knot(self, curve: ToolCurve, s: float, guess: Floats) -> "Knot":
         state = curve.at(s)
-        try:
-            return s, *self._state(state, guess)
-        except np.linalg.LinAlgError as error:
-            raise WayError(s, state.pose, guess) from error
-
-    def _state(self, state: ToolState, near: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return joint positions near others on a path, dq/ds and d²q/ds², each of shape (n,).
-
-        Raises:
-            np.linalg.LinAlgError: Newton's method finds none, or the posture is singular.
-        """
-        q = near
-        for _ in range(REFRESHED):
-            q, error = self._tool.near(state.pose, q)
-            if np.abs(error).max() <= ACCURATE or not np.abs(q - near).max() <= FARTHEST:
-                break
-        if not (np.abs(q - near).max() <= FARTHEST and np.abs(error).max() <= ACCURATE):
-            raise np.linalg.LinAlgError("no posture nearby")
-        jacobian = self._tool.jacobian(q)
-        first = _solved(jacobian, state.first)
-        if np.abs(first).max() > STEEPEST:
-            raise np.linalg.LinAlgError("close to a singular posture")
-        bent = self._tool.acceleration(q, first, np.zeros(len(q)))
-        return q, first, _solved(jacobian, state.second - bent)
+        q = self.solve(state.pose, guess)
+        rates = None if q is None else self.rates(q, state)
+        if q is None or rates is None:
+            raise WayError(s, state.pose, guess)
+        return s, q, *rates
 
 
 Knot = tuple[float, Floats, Floats, Floats]
 """Place, joint positions and their first two derivatives."""
 
 
-def _solved(jacobian: Floats, wanted: Floats) -> Floats:
+def _solved(jacobian: Floats, wanted: Floats) -> Floats | None:
     """Solve J x = wanted, for other arms than those with six joints in the sense of least squares."""
-    six = jacobian.shape[1] == 6
-    found = np.linalg.solve(jacobian, wanted) if six else np.linalg.lstsq(jacobian, wanted, rcond=1e-9)[0]
-    return np.asarray(found, dtype=np.float64)
+    if jacobian.shape[1] == 6:
+        try:
+            exact: Floats = np.asarray(np.linalg.solve(jacobian, wanted), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            return None
+        return exact
+    least: Floats = np.asarray(np.linalg.lstsq(jacobian, wanted, rcond=1e-9)[0], dtype=np.float64)
+    return least

@@ -74,7 +74,8 @@ def passes(
     count, rows = p.shape
     begun = len(known)
     b = np.zeros(count + 1)
-    b[:begun] = known
+    for number in range(begun):
+        b[number] = known[number]
     for number in range(begun, count):
         b[number] = min(highest[number - 1], highest[number])
     for number in range(count - 1, begun - 1, -1):
