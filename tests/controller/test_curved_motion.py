@@ -5,7 +5,8 @@ import pytest
 from tests.search.draws import SHAPERS
 from tests.search.subject import Subject, torques
 
-from tvist_controller.trajectory import Bends, JointLine, MotionLimits, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
+from tvist_controller.trajectory.spline import Knots, SplineCurve
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
 
@@ -58,20 +59,12 @@ def test_a_motion_says_when_a_share_of_its_way_is_done(path):
 
 
 @pytest.mark.parametrize(
-    ("length", "bends"),
-    [
-        (0.0, Bends(np.ones(6), 1.0, 1.0)),
-        (1.0, Bends(np.zeros(6), 1.0, 1.0)),
-        (1.0, Bends(np.ones(6), np.inf, 1.0)),
-    ],
+    ("s", "slope", "second"), [((0.0, 0.0), 1.0, 0.0), ((0.0, 1.0), 0.0, 0.0), ((0.0, 1.0), 1.0, np.inf)]
 )
-def test_a_curve_whose_bounds_make_no_sense_is_refused(length, bends):
-    class Any(Arc):
-        def __init__(self):
-            super(Arc, self).__init__(length, bends)
-
-    with pytest.raises(ValueError, match=r"length|slope|second"):
-        Any()
+def test_a_curve_whose_knots_make_no_sense_is_refused(s, slope, second):
+    knots = Knots(np.array(s), np.zeros((2, 6)), np.full((2, 6), slope), np.full((2, 6), second))
+    with np.errstate(all="ignore"), pytest.raises(ValueError, match=r"length|slope|second"):
+        SplineCurve(knots)
 
 
 @pytest.mark.parametrize(
