@@ -142,10 +142,9 @@ def test_a_posture_out_of_range_is_told_from_none(description):
     with pytest.raises(InverseKinematicsError, match="outside its range") as refusal:
         InverseKinematics(narrow).solve(*pose, q)
     assert refusal.value.code == "limit_position"
-    assert refusal.value.joint == int(np.argmax(np.abs(q)))
     assert refusal.value.limit == 0.1
-    assert refusal.value.value == pytest.approx(q[refusal.value.joint], abs=1e-6)
-    assert narrow.robot.joints[refusal.value.joint] in str(refusal.value)
+    farthest = int(np.argmax(np.abs(q)))
+    assert f"{narrow.robot.joints[farthest]} would be at {q[farthest]:.4f} rad" in str(refusal.value)
 
 
 def test_a_posture_within_the_ranges_is_preferred_to_a_nearer_one_outside():

@@ -82,7 +82,7 @@ def test_the_border_of_the_reach_belongs_to_it_and_nothing_beyond(description, e
         assert not close(distance)
     with pytest.raises(InverseKinematicsError) as refusal:
         ik.solve(rotation, position + 10.0 * outwards, q)
-    assert (refusal.value.code, refusal.value.joint) == ("no_solution", None)
+    assert (refusal.value.code, refusal.value.limit) == ("no_solution", None)
 
 
 def uncompile(monkeypatch):

@@ -26,24 +26,13 @@ class InverseKinematicsError(ValueError):
     Attributes:
         code: "no_solution" if no posture has this pose; "limit_position" if every posture that has it is outside a
             joint's range.
-        joint: Index of the joint whose range is exceeded most, in the nearest posture; None without solution.
-        value: Position of that joint, in its representation nearest to zero [rad]; None without solution.
-        limit: Its largest distance from zero [rad]; None without solution.
+        limit: Largest distance of that joint from zero [rad]; None without solution.
     """
 
-    def __init__(
-        self,
-        message: str,
-        code: Literal["no_solution", "limit_position"] = "no_solution",
-        joint: int | None = None,
-        value: float | None = None,
-        limit: float | None = None,
-    ) -> None:
+    def __init__(self, message: str, limit: float | None = None) -> None:
         super().__init__(message)
-        self.code: Literal["no_solution", "limit_position"] = code
-        self.joint = joint
-        self.value = value
-        self.limit = limit
+        self.code: Literal["no_solution", "limit_position"]
+        self.code, self.limit = "no_solution" if limit is None else "limit_position", limit
 
 
 class InverseKinematics:
@@ -83,7 +72,7 @@ class InverseKinematics:
         self.searched = status >= ON_CURVE
         status %= ON_CURVE
         if status != FOUND:
-            raise self._none() if status == NO_SOLUTION else self._outside(q)
+            raise self._error(None if status == NO_SOLUTION else q)
         return q
 
     def _search(self, rotation: Floats, position: Floats, near: Floats) -> Floats:
@@ -92,20 +81,13 @@ class InverseKinematics:
         if best >= 0:
             return np.array(found[best])
         found = found[~np.isnan(found[:, 0])]
-        if not len(found):
-            raise self._none()
-        raise self._outside(found[np.argmin(np.linalg.norm(found - near, axis=1))])
+        raise self._error(found[np.argmin(np.linalg.norm(found - near, axis=1))] if len(found) else None)
 
-    def _none(self) -> InverseKinematicsError:
-        return InverseKinematicsError("no joint positions reach this pose")
-
-    def _outside(self, q: Floats) -> InverseKinematicsError:
+    def _error(self, q: Floats | None) -> InverseKinematicsError:
+        """Say that there is no posture, or which joint of the nearest one is outside its range most."""
+        if q is None:
+            return InverseKinematicsError("no joint positions reach this pose")
         joint = int(np.argmax(np.abs(q) - self._limits))
         value, limit = float(q[joint]), float(self._limits[joint])
-        return InverseKinematicsError(
-            f"{self._names[joint]} would be at {value:.4f} rad, outside its range of ±{limit:.4f} rad",
-            "limit_position",
-            joint,
-            value,
-            limit,
-        )
+        why = f"{self._names[joint]} would be at {value:.4f} rad, outside its range of ±{limit:.4f} rad"
+        return InverseKinematicsError(why, limit)
