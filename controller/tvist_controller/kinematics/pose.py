@@ -1,7 +1,7 @@
-"""Rotations, where the end of a chain of links is, and the joint positions near others that bring it to a pose.
+"""Rotations, where the end of a chain of links is, and joint positions nearby that bring it to a pose.
 
-Rotations are matrices, shape (3, 3), or vectors, shape (3,) [rad]. All kernels can be called from other compiled
-functions; their arrays are C-contiguous and of 64-bit floats.
+Rotations are matrices, shape (3, 3), or vectors, shape (3,) [rad]. All kernels can be called from other
+compiled functions; their arrays are C-contiguous and of 64-bit floats.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What the arm can reach: joint positions at a pose, the joints' way along parts of a path, and why there is none."""
+"""What the arm can reach: joint positions at a pose, the joints' way along parts of a path, or why not."""
 
 from collections.abc import Iterator, Sequence
 

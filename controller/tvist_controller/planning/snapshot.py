@@ -1,4 +1,4 @@
-"""The state between two ticks that plans depend on, and motions that may go on behind their end while they run."""
+"""The state between two ticks that plans depend on, and running motions that may go on behind their end."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple

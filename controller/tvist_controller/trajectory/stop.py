@@ -12,7 +12,7 @@ from tvist_controller.trajectory.path import Path
 
 
 class Slowing(Trajectory):
-    """The shortest way of several entries to rest, each as soon as it can within limits of acceleration and jerk."""
+    """The shortest way to rest of several entries, each within limits of acceleration and jerk."""
 
     def __init__(
         self,
