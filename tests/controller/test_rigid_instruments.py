@@ -17,7 +17,7 @@ from tvist_controller.instruments.wrench import (
     SHAPED_QDD,
 )
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.rotation import rotation_vector
+from tvist_controller.kinematics.pose import rotation_vector
 from tvist_plant.chain import chain_of
 from tvist_plant.description import Payload, load
 from tvist_plant.model import FLANGE, rigid_model

@@ -5,7 +5,7 @@ from msgspec import Struct
 
 from tvist_controller.instruments.state_layout import Layout, width, write_state
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.rotation import rotation_vector
+from tvist_controller.kinematics.pose import rotation_vector
 from tvist_controller.line.differentiator import Floats, middle_of
 from tvist_controller.line.sample import Sample
 from tvist_plant.plant import PERIOD, Plant, PlantTruth

@@ -13,8 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_controller._compiled import compiled, compiled_for_ticks
-from tvist_controller.kinematics.pose import locate, newton, pseudo_inverse
-from tvist_controller.kinematics.rotation import turned_by
+from tvist_controller.kinematics.pose import locate, newton, pseudo_inverse, turned_by
 from tvist_plant.chain import BODY, SCRATCH, SHIFT, TURN, chain_of, collect_inertia, sweep, torques
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, Floats, payload_inertia, rigid_model

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tvist_controller.instruments.tool_forces import ToolForces
-from tvist_controller.kinematics.rotation import turn
+from tvist_controller.kinematics.pose import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.force_sensing import SILENT, ContactWatch, ExternalSensor

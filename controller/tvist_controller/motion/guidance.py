@@ -5,7 +5,7 @@ from typing import TypeVar
 import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.rotation import turn, turned
+from tvist_controller.kinematics.pose import turn, turned
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import GENTLEST_STOP, REBOUND, TorqueRoom, arm_limits
 from tvist_controller.line.line_mode import LineMode
