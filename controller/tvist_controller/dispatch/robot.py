@@ -86,7 +86,7 @@ class Robot(ABC):
             self.watching = Watching(plant, self.peripherals, self.emit, self.cycle, self.modes)
         elif isinstance(plant, RealArm) and plant.supervised:
             self.supervision = Supervision(plant, self.peripherals, self.emit, motion, safety)
-        self.forces = ToolForces(description, self.peripherals, lambda: self.latest, lambda: self.declared)
+        self.forces = ToolForces(description, self.peripherals, lambda: self.report, lambda: self.declared)
         """Forces and torques on the arm."""
         self.cell = None
         """What stands around the robot; None for nothing."""
