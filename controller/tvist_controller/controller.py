@@ -128,20 +128,10 @@ class Controller(Robot):
         else:
             self.counters.setpoints_refused += 1
 
-    def refuse_setpoint(self, why: str) -> None:
-        """Count and drop a set-point of the client in control; if the stream falls silent, its end gives the reason."""
-        self.counters.setpoints_received += 1
-        self.counters.setpoints_refused += 1
-        self.motion.streams.refuse(why)
-
     def client_gone(self, client: str, session: str) -> None:
         """Handle the end of a client's session, which ends the rights it held."""
         self._look_again()
         self.session.end_rights(client, session)
-
-    def missed(self, ticks: int) -> None:
-        """Count ticks that began too late."""
-        self.counters.missed_ticks += ticks
 
     def fail(self, why: str) -> None:
         """Let the next tick deal with a failure of the plant that something outside the controller has seen."""

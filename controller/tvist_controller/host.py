@@ -23,6 +23,7 @@ from tvist_plant.user_file import named
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command, Forget, Setpoint
 from tvist_protocol.journal import Entry, entry_of
+from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event
@@ -115,7 +116,7 @@ class Host:
     def missed(self, ticks: int) -> None:
         """Count ticks that began too late."""
         self._note(Entry(tick=self._next, kind="missed", count=ticks))
-        self.controller.missed(ticks)
+        self.controller.counters.missed_ticks += ticks
 
     def info(self) -> bytes:
         """Return the encoded description of the controller, which is made at most once between two ticks."""
@@ -155,8 +156,8 @@ class Host:
         if experience is not None:
             experience.watch(
                 report.sample,
-                controller.assumed.beliefs,
-                held=controller.assumed.held,
+                controller.assumed.present,
+                held=controller.motion.robot_mode is RobotMode.RUNNING,
                 placements=controller.cycle.placements,
             )
         for sink in self._sinks:
@@ -172,7 +173,7 @@ class Host:
 
     def _learn(self, experience: Experience) -> None:
         for beliefs, lesson, plan in experience.lessons():
-            if beliefs.payload != self.controller.assumed.beliefs().payload:
+            if beliefs.declared != self.controller.assumed.assumed:
                 continue  # it is void: another payload was declared, learnt or forgotten since
             self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
             self.controller.assumed.learn(lesson, plan)

@@ -176,9 +176,8 @@ class Setup:
 
     def to_builtins(self) -> dict[str, Any]:
         """Convert the setup to maps and lists for a recording."""
-        content = {name: msgspec.to_builtins(getattr(self, name)) for name in _RECORDED}
-        content["own_shapers"] = [msgspec.to_builtins(own.recorded) for own in self.own_shapers]
-        content |= {name: getattr(self, name) for name in ("compensate_sag", "shape_servo")}
+        content = {name: getattr(self, name) for name in (*_RECORDED, "compensate_sag", "shape_servo")}
+        content["own_shapers"] = [own.recorded for own in self.own_shapers]
         optional = {
             "cell": self.cell,
             "plant": self.plant and self.plant.recorded,
@@ -186,9 +185,9 @@ class Setup:
             "instance": self.instance or None,
             "adapt": self.adapt,
         }
-        return content | {
-            name: msgspec.to_builtins(value) for name, value in optional.items() if value is not None
-        }
+        content |= {name: value for name, value in optional.items() if value is not None}
+        recorded: dict[str, Any] = msgspec.to_builtins(content)
+        return recorded
 
     @classmethod
     def from_builtins(

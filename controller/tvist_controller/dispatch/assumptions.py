@@ -11,7 +11,6 @@ from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.snapshot import FilterState
 from tvist_controller.refusal import RefusalError
-from tvist_controller.safety.motion_record import Beliefs
 from tvist_controller.safety.payload_monitor import PayloadMonitor
 from tvist_controller.setup import body
 from tvist_controller.sources.calibrations import fits
@@ -19,7 +18,6 @@ from tvist_controller.sources.mode_source import ModeSource
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.lessons import PayloadLesson
-from tvist_protocol.modes import RobotMode
 from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
 
@@ -66,9 +64,8 @@ class Assumptions:
         self._warn_of_payload()
         self._warn_of_arm()
 
-    @property
     def present(self) -> FilterState:
-        """The present state that a new filter depends on."""
+        """Return the present state that a new filter depends on: what the robot takes its arm for."""
         tvist = self._cycle.tvist
         return FilterState(tvist.name, tvist.estimator.modes, self.source, self.assumed, self.declared)
 
@@ -99,18 +96,9 @@ class Assumptions:
 
     # ------------------------------------------------------------------ payload
 
-    @property
-    def held(self) -> bool:
-        """Whether the drives hold or move the arm, so that a payload can be learnt from its motions."""
-        return self._motion.robot_mode is RobotMode.RUNNING
-
-    def beliefs(self) -> Beliefs:
-        """Return what the robot takes its arm for."""
-        return Beliefs(self.assumed, self.present)
-
     def learn(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
         """Take a lesson at rest; a plan that was made for it beforehand is used if it still holds."""
-        present = self.present
+        present = self.present()
         if plan is None or plan.state != {"filter": present}:
             plan = self._plan(lesson, present)
         found: Any = plan.found
@@ -141,7 +129,8 @@ class Assumptions:
 
     def _clear_with(self, payload: Payload, tvist: Filter | None) -> None:
         """Put a payload into the collision model, unless the rest of the motion would not be clear with it."""
-        self._motion.ahead.check_payload(body(payload), tvist, self._motion.motions.coming)
+        move = self._motion.motions.move
+        self._motion.ahead.check_payload(body(payload), tvist, () if move is None else move.coming)
 
     def _assume(self, payload: Payload, tvist: Filter | None, ticks: int, *, told: bool = False) -> None:
         """Compute dynamics and modes with a payload.

@@ -152,7 +152,7 @@ class Robot(ABC):
 
     def snapshot(self, time: float | None = None) -> Snapshot:
         """The present state that plans depend on; for a time, that of a path that goes on from the running motion."""
-        return self.motion.snapshot(self.assumed.present, self.programs.statements.last, time)
+        return self.motion.snapshot(self.assumed.present(), self.programs.statements.last, time)
 
     def io(self, *, wrench: bool = True) -> Io:
         """Return inputs, outputs and registers as they are for the next tick.

@@ -60,7 +60,7 @@ class RigidBody:
     def __init__(self, description: RobotDescription) -> None:
         self._arm = self._tool = Arm(description)
         self._payload: Payload | None = None
-        self._offset = AT_FLANGE
+        self._offset: tuple[float, ...] = AT_FLANGE
         drives = description.drives
         self._drives = np.array([drives.rotor_inertia, drives.coulomb_friction])
         self._width, self._linear = drives.friction_width, drives.linear_friction

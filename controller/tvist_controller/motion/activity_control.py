@@ -116,12 +116,18 @@ class MotionControl:
         )
         if time is None:
             return now
-        course, passed = self.motions.course
-        if course is None or self.activity not in {Activity.MOVING, Activity.PAUSED}:
+        move = self.motions.move
+        if move is None or move.course is None or self.activity not in {Activity.MOVING, Activity.PAUSED}:
             return replace(now, movable=False)
         # Its time runs at full rate, whatever the rate of the running motion is.
         return replace(
-            now, movable=True, q=course.end, speed=1.0, slowest=None, after=course, until=passed + time
+            now,
+            movable=True,
+            q=move.course.end,
+            speed=1.0,
+            slowest=None,
+            after=move.course,
+            until=move.passed + time,
         )
 
     def move(self, planned: PlannedMove) -> int:

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.motion.task_frame import Feature
+from tvist_controller.motion.force_control import Feature
 from tvist_controller.programs.arguments import (
     Flag,
     Target,
