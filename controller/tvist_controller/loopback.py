@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
-from tvist_controller.instruments.report import Report
-from tvist_controller.instruments.sink import Sink, Topic
-from tvist_controller.safety.experience import Experience, experience_of
+from tvist_controller.instruments.report import Report, Sink, Topic
+from tvist_controller.safety.experience import Experience
+from tvist_controller.safety.payload_student import experience_of
 from tvist_controller.setup import Setup
 from tvist_plant.plant import Plant
 from tvist_protocol.codec import encode

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.safety.experience import Experience
-from tvist_controller.safety.motion_record import AFTER, LONGEST
+from tvist_controller.safety.experience import AFTER, LONGEST, Experience
 from tvist_controller.setup import paper_payload
 from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay

@@ -11,8 +11,7 @@ from tests.controller.test_experience import Q1, Q2, ROBOT, Served
 
 from tvist_controller.planning.snapshot import FilterState
 from tvist_controller.safety import payload_monitor
-from tvist_controller.safety.experience import Taught
-from tvist_controller.safety.motion_record import MotionRecord
+from tvist_controller.safety.experience import MotionRecord, Taught
 from tvist_controller.safety.payload_student import DEAD, PayloadStudent
 from tvist_controller.setup import Setup, paper_payload
 from tvist_controller.sources.calibrations import load

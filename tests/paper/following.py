@@ -14,7 +14,7 @@ import numpy as np
 
 from tvist_controller.api.line import DrivenLine, body, load_calibration, paper_payload
 from tvist_controller.planning.snapshot import FilterState
-from tvist_controller.safety.motion_record import AFTER, MotionRecord
+from tvist_controller.safety.experience import AFTER, MotionRecord
 from tvist_controller.safety.payload_student import PayloadStudent
 from tvist_controller.sources.mode_source import first_source
 from tvist_lab.study.line import PAPER, RESTING, Unchanged

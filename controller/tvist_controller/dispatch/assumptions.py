@@ -12,7 +12,7 @@ from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.snapshot import FilterState
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.payload_monitor import PayloadMonitor
-from tvist_controller.setup import body
+from tvist_controller.setup import body, payload_of
 from tvist_controller.sources.calibrations import fits
 from tvist_controller.sources.mode_source import ModeSource
 from tvist_plant.plant import PERIOD
@@ -22,23 +22,8 @@ from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
 
 
-def payload_of(command: SetPayload) -> Payload:
-    """Return the payload that a command declares."""
-    return Payload(mass=command.mass, com=command.com, inertia=command.inertia)
-
-
 class Assumptions:
-    """The control line's payload and filter, whose changes must not spoil the robot's motion.
-
-    Args:
-        payload: Initial payload.
-        source: Source of the first filter's modes.
-        motion: The arm's motion, and with it the control line.
-        peripherals: Tells clients what is assumed.
-        plan: Plans what a lesson changes.
-        emit: Emits events.
-        follows: Whether the robot follows its payload.
-    """
+    """The control line's payload and filter, whose changes must not spoil the robot's motion."""
 
     def __init__(
         self,
@@ -46,10 +31,10 @@ class Assumptions:
         source: ModeSource,
         motion: MotionControl,
         peripherals: Peripherals,
-        plan: Callable[[PayloadLesson, FilterState], Plan],
+        plan: Callable[[PayloadLesson, FilterState], Plan],  # plans what a lesson changes
         emit: Emit,
         *,
-        follows: bool,
+        follows: bool,  # whether the robot follows its payload
     ) -> None:
         self.declared = payload
         """Declared payload."""
@@ -133,13 +118,10 @@ class Assumptions:
         self._motion.ahead.check_payload(body(payload), tvist, () if move is None else move.coming)
 
     def _assume(self, payload: Payload, tvist: Filter | None, ticks: int, *, told: bool = False) -> None:
-        """Compute dynamics and modes with a payload.
+        """Compute dynamics and modes with a payload, which is phased in.
 
-        Args:
-            payload: The payload.
-            tvist: Filter for it; None if its modes are not known to differ.
-            ticks: Number of ticks in which it is phased in.
-            told: Whether a warning tells that the arm carries more, which is above its rating.
+        The filter is None if its modes are not known to differ. `told` says whether a warning tells that the arm
+        carries more, which is above its rating.
         """
         self.assumed, carried = payload, body(payload)
         self._cycle.dynamics.declare(carried, ticks)

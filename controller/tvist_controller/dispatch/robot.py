@@ -42,17 +42,7 @@ from tvist_protocol.values import Payload
 
 
 class Robot(ABC):
-    """The parts of one robot, on which commands act.
-
-    Args:
-        setup: Initial setup, with the posture in which an arm stands that cannot be placed.
-        plant: Plant to control; None for the flexible arm that the setup describes.
-        planner: Plans what takes longer than a tick can wait.
-        order: Has commands of programs planned beside the ticks; None to plan them in the ticks.
-
-    Raises:
-        ValueError: The plant does not fit the setup.
-    """
+    """The parts of one robot, on which commands act; a `Controller` makes them."""
 
     def __init__(self, setup: Setup, plant: Plant | None, planner: MakesPlans, order: Order | None) -> None:
         self.setup = setup
@@ -157,8 +147,7 @@ class Robot(ABC):
     def io(self, *, wrench: bool = True) -> Io:
         """Return inputs, outputs and registers as they are for the next tick.
 
-        Args:
-            wrench: Whether to compute the wrench at the tool, which takes a third of a tick.
+        To compute the wrench at the tool takes a third of a tick.
         """
         said, payload = self.watching or self.supervision, self.assumed
         io = self.peripherals.io(

@@ -8,8 +8,8 @@ import numpy as np
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.instruments.wrench import ROWS, SHAPED_QD, estimate
 from tvist_controller.kinematics.arm import AT_FLANGE, Arm, end_motion
+from tvist_controller.setup import body
 from tvist_plant.chain import BODY, momentum, sweep
-from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 from tvist_protocol.values import Payload
@@ -29,13 +29,7 @@ def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
 
 
 def carried(omega: list[float], alpha: list[float], arm: list[float]) -> list[float]:
-    """Acceleration of one point of a body relative to another, α × r + ω × (ω × r) [m/s²].
-
-    Args:
-        omega: Angular velocity [rad/s].
-        alpha: Angular acceleration [rad/s²].
-        arm: r, from the other point to this one [m].
-    """
+    """Acceleration of one point of a body relative to another at r, the arm, α × r + ω × (ω × r) [m/s²]."""
     return add(cross(alpha, arm), cross(omega, cross(omega, arm)))
 
 
@@ -132,5 +126,4 @@ class RigidBody:
         if payload is self._payload or payload == self._payload:
             return
         self._payload = payload
-        body = Body(mass=payload.mass, com=payload.com, inertia=payload.inertia)
-        self._arm.chain[-2, BODY:] = self._arm.loaded(body)
+        self._arm.chain[-2, BODY:] = self._arm.loaded(body(payload))

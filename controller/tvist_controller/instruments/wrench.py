@@ -98,16 +98,14 @@ def force_at(chain: Floats, q: Floats, torque: Floats, force: Floats) -> None:
 
 
 @compiled_for_ticks
-def estimate(chain: Floats, motion: Floats, drives: Floats, slip: Floats, out: Floats) -> None:
-    """Estimate what acts on the arm from outside; see `RigidBody.external`.
-
-    Args:
-        chain: The links, the tool centre point being their end, see `tvist_plant.chain`, shape (n+1, 22).
-        motion: See `joint_lists`, shape (10, n).
-        drives: Inertia of the rotors [kg m²] and Coulomb friction [N m], shape (2, n).
-        slip: Share of the friction that acts, shape (n,) [-].
-        out: Result: force and torque at the point [N, N m], then torques on the joints [N m], shape (6 + n,).
-    """
+def estimate(
+    chain: Floats,  # its end is the tool centre point, see `tvist_plant.chain`, shape (n+1, 22)
+    motion: Floats,  # see `joint_lists`, shape (10, n)
+    drives: Floats,  # inertia of the rotors [kg m²] and Coulomb friction [N m], shape (2, n)
+    slip: Floats,  # share of the friction that acts, shape (n,) [-]
+    out: Floats,  # force and torque at the point [N, N m], then torques on the joints [N m], shape (6 + n,)
+) -> None:
+    """Estimate what acts on the arm from outside; see `RigidBody.external`."""
     for j in range(slip.shape[0]):
         expected = motion[SHAPED_MOMENT, j] + drives[0, j] * motion[SHAPED_QDD, j] + drives[1, j] * slip[j]
         out[6 + j] = expected - motion[ACTUAL_MOMENT, j]

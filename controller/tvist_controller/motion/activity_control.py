@@ -22,7 +22,7 @@ from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.arm_power import ArmPower
 from tvist_controller.motion.motions import Motions
-from tvist_controller.motion.safety_system import PUT, SafetySystem, runtime_of
+from tvist_controller.motion.safety_system import PUT, RUNTIME, SafetySystem
 from tvist_controller.motion.setpoints import Setpoints
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.snapshot import FilterState, Snapshot
@@ -155,8 +155,10 @@ class MotionControl:
 
     @property
     def runtime(self) -> RuntimeState:
-        """Whether something moves."""
-        return runtime_of(self.activity, slowing=self.motions.speed > 0.0 and not self.cycle.mode.at_rest)
+        """Whether something moves; a paused motion may still be slowing."""
+        if self.activity is Activity.PAUSED and self.motions.speed > 0.0 and not self.cycle.mode.at_rest:
+            return RuntimeState.PAUSING
+        return RUNTIME.get(self.activity, RuntimeState.STOPPED)
 
     @property
     def safety_mode(self) -> SafetyMode:

@@ -59,19 +59,14 @@ class ForceControl(Monitor):
         self._basis: object = None
 
     @property
-    def compliant(self) -> Compliant | None:
-        """The present motion that gives way; None without one."""
-        return self._guidance.compliant
-
-    @property
     def by_hand(self) -> bool:
         """Whether the arm can be moved by hand."""
-        return self._by_hand and self.compliant is not None
+        return self._by_hand and self._guidance.compliant is not None
 
     @property
     def hindrance(self) -> int:
         """0 if the arm can be moved by hand freely, 1 near a singular posture, 2 if that hardly lets it move."""
-        share = 1.0 if not self.by_hand or (lead := self.compliant) is None else lead.hindered
+        share = 1.0 if not self.by_hand or (lead := self._guidance.compliant) is None else lead.hindered
         return 0 if share == 1.0 else 1 if share > CRAWL else 2
 
     def begin(self, task: ForceTask, feature: Feature, kind: int, trigger: str = "force_mode") -> int:
@@ -89,7 +84,7 @@ class ForceControl(Monitor):
         self.check_sensor()
         self._guidance.check(trigger)
         self.awake = True
-        lead = self.compliant or self._new()
+        lead = self._guidance.compliant or self._new()
         lead.aim(task, frame_of(feature, kind))
         self._by_hand = trigger == "freedrive"
         return self._guidance.follow(trigger, lead)
@@ -103,7 +98,7 @@ class ForceControl(Monitor):
 
     def end(self) -> None:
         """Come to rest where the arm is, if force mode is on; a motion in the other axes ends, too."""
-        if self.compliant is not None:
+        if self._guidance.compliant is not None:
             self._guidance.stop_joints(GENTLE, "end_force_mode")
 
     def check_sensor(self) -> None:
@@ -146,8 +141,8 @@ class ForceControl(Monitor):
         else:
             inner = guidance.halting(state, guidance.limits.acceleration)
         return Compliant(
-            state, guidance.limits, guidance.reach, guidance.torque, PERIOD, tool=lambda: guidance.tool, inner=inner,
-            felt=self._felt,
+            state, guidance.limits, guidance.reach, guidance.torque, PERIOD, tool=lambda: self._motion.tool,
+            inner=inner, felt=self._felt,
         )  # fmt: skip
 
     def _felt(self) -> Floats:
@@ -211,14 +206,14 @@ class ForceControl(Monitor):
         why = f"forces are now those of {source}"
         if self.external.awaited:
             why = f"the external force sensor has told nothing for {1e3 * SILENT:g} ms: {why}"
-        if self.compliant is not None:
+        if self._guidance.compliant is not None:
             return Finding(why, then="interruption")
         return Finding(why) if self.external.awaited else None
 
     def _excess(self, sample: Sample, force: float) -> str | None:
         if not force <= MOST:
             return f"force at the tool is {force:.0f} N, above {MOST:g} N for more than 10 ms"
-        lead = self.compliant
+        lead = self._guidance.compliant
         if lead is None or self._by_hand:
             return None
         there, here = lead.kinematics.pose(sample.target.q), lead.kinematics.pose(sample.measured.q)

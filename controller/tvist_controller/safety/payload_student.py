@@ -15,7 +15,8 @@ import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.safety.motion_record import MotionRecord
+from tvist_controller.safety.experience import Experience, Later, MotionRecord, Plans, at_once
+from tvist_controller.setup import Setup
 from tvist_plant.chain import BODY
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
@@ -235,3 +236,10 @@ def _means(values: Floats) -> Floats:
 def _each(values: Floats) -> list[Floats]:
     """Return a column for each joint that has its values alone."""
     return [values * (np.arange(values.shape[1]) == joint) for joint in range(values.shape[1])]
+
+
+def experience_of(setup: Setup, later: Later = at_once, plan: Plans | None = None) -> Experience | None:
+    """Return what a robot makes of its motions; None if it learns nothing of them."""
+    if setup.adapt != "payload":
+        return None
+    return Experience(PayloadStudent(setup.description).study, later, plan)

@@ -122,7 +122,7 @@ class ForceFunctions(Family):
         sensor_cog: Place = NOWHERE,
     ) -> Turns:
         """Use the force sensor whose values clients write by RTDE; its mass is part of the payload to declare."""
-        if self._access.force.compliant is not None:
+        if self._access.guidance.compliant is not None:
             raise Fault(
                 "the force sensor stays the same in force mode and freedrive: call end_force_mode before"
             )
