@@ -129,7 +129,7 @@ class Equations:
 
 
 class PayloadStudent:
-    """Follows the payload from motion to motion; see `experience.Student`.
+    """Follows the payload from motion to motion; see `experience.Study`.
 
     A motion is first judged alone. If its mass is that of what was known before, both are combined, as a Kalman filter
     does; else the payload has changed, and what was known is void.
