@@ -11,7 +11,6 @@ from tvist_controller.line.differentiator import STILL
 from tvist_controller.line.limits import REDUCED_SHARE, acceleration_on_way, rate_of
 from tvist_controller.motion.safety_system import SafetySystem
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.planning.snapshot import Course
 from tvist_controller.trajectory import Guided, PlannedMotion
 from tvist_protocol.replies import Code
 
