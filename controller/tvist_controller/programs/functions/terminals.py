@@ -1,11 +1,12 @@
 """Functions for digital and analogue inputs and outputs, registers and flags."""
 
+from collections.abc import Callable
 from typing import Annotated
 
 from tvist_controller.instruments.peripherals import MAX_INTEGER, MIN_INTEGER
 from tvist_controller.programs.arguments import Bit, Flag, Number, Share, either, integer, shown, whole
-from tvist_controller.programs.functions.family import Family, Parts
-from tvist_protocol.io import BITS, NUMBERS
+from tvist_controller.programs.functions.family import Family, Parts, described
+from tvist_protocol.io import BITS, NUMBERS, Bank
 from tvist_urscript import Array, Fault, costs
 
 STANDARD, CONFIGURABLE, TOOL = range(8), range(8, 16), range(16, 18)
@@ -31,6 +32,36 @@ NumberPlace = Annotated[int, whole(0, NUMBERS - 1)]
 FlagPlace = Annotated[int, whole(0, FLAGS - 1)]
 
 
+def _register(what: str, place: object, bank: Bank) -> Callable[[Family, int], bool | float]:
+    def get(self: Family, address: int) -> bool | float:
+        registers = self._access.peripherals
+        return registers.bit(bank, address) if bank.endswith("bit") else registers.doubles(bank)[address]
+
+    return described(get, what, address=place)
+
+
+def _input(what: str, place: object) -> Callable[[Family, int], bool]:
+    def get(self: Family, n: int) -> bool:
+        return bool(self._access.peripherals.digital_inputs >> n & 1)
+
+    return described(get, what, n=place)
+
+
+def _output(what: str, place: object) -> Callable[[Family, int], bool]:
+    def get(self: Family, n: int) -> bool:
+        return bool(self._access.peripherals.digital_outputs >> n & 1)
+
+    return described(get, what, n=place)
+
+
+def _sets(what: str, place: object) -> Callable[[Family, int, Flag], None]:
+    @costs(10)
+    def set_one(self: Family, n: int, b: Flag) -> None:
+        self._arm.then(lambda: self._access.peripherals.set_digital_outputs(1 << n, b << n))
+
+    return described(set_one, what, n=place)
+
+
 class RegisterFunctions(Family):
     """Reads and writes the registers of one robot."""
 
@@ -41,29 +72,22 @@ class RegisterFunctions(Family):
         self._registers = on.access.peripherals
         self._flags = [False] * FLAGS
 
-    def read_input_boolean_register(self, address: BitPlace) -> bool:
-        """Read an input bit, which clients write."""
-        return self._registers.bit("input_bit", address)
-
-    def read_input_integer_register(self, address: NumberPlace) -> int:
-        """Read an input integer, which clients write."""
-        return self._registers.integers("input_int")[address]
-
-    def read_input_float_register(self, address: NumberPlace) -> float:
-        """Read an input number, which clients write."""
-        return self._registers.doubles("input_double")[address]
-
-    def read_output_boolean_register(self, address: BitPlace) -> bool:
-        """Read an output bit, which programs write."""
-        return self._registers.bit("output_bit", address)
-
-    def read_output_integer_register(self, address: NumberPlace) -> int:
-        """Read an output integer, which programs write."""
-        return self._registers.integers("output_int")[address]
-
-    def read_output_float_register(self, address: NumberPlace) -> float:
-        """Read an output number, which programs write."""
-        return self._registers.doubles("output_double")[address]
+    read_input_boolean_register = _register("Read an input bit, which clients write.", BitPlace, "input_bit")
+    read_input_integer_register = _register(
+        "Read an input integer, which clients write.", NumberPlace, "input_int"
+    )
+    read_input_float_register = _register(
+        "Read an input number, which clients write.", NumberPlace, "input_double"
+    )
+    read_output_boolean_register = _register(
+        "Read an output bit, which programs write.", BitPlace, "output_bit"
+    )
+    read_output_integer_register = _register(
+        "Read an output integer, which programs write.", NumberPlace, "output_int"
+    )
+    read_output_float_register = _register(
+        "Read an output number, which programs write.", NumberPlace, "output_double"
+    )
 
     @costs(8)
     def write_output_boolean_register(self, address: BitPlace, value: Flag) -> None:
@@ -107,57 +131,23 @@ class TerminalFunctions(Family):
 
     # ------------------------------------------------------------------ digital
 
-    @costs(10)
-    def set_digital_out(self, n: Old, b: Flag) -> None:
-        """Set a digital output: 0 to 7 standard, 8 and 9 those of the tool, as before configurable ones existed."""
-        self._set(n, b)
-
-    @costs(10)
-    def set_standard_digital_out(self, n: Standard, b: Flag) -> None:
-        """Set one of the eight standard digital outputs."""
-        self._set(n, b)
-
-    @costs(10)
-    def set_configurable_digital_out(self, n: Configurable, b: Flag) -> None:
-        """Set one of the eight configurable digital outputs."""
-        self._set(n, b)
-
-    @costs(10)
-    def set_tool_digital_out(self, n: Tool, b: Flag) -> None:
-        """Set one of the two digital outputs of the tool."""
-        self._set(n, b)
-
-    def get_digital_in(self, n: Old) -> bool:
-        """Return a digital input, numbered as in `set_digital_out`."""
-        return self._input(n)
-
-    def get_digital_out(self, n: Old) -> bool:
-        """Return a digital output, numbered as in `set_digital_out`."""
-        return self._output(n)
-
-    def get_standard_digital_in(self, n: Standard) -> bool:
-        """Return one of the eight standard digital inputs."""
-        return self._input(n)
-
-    def get_standard_digital_out(self, n: Standard) -> bool:
-        """Return one of the eight standard digital outputs."""
-        return self._output(n)
-
-    def get_configurable_digital_in(self, n: Configurable) -> bool:
-        """Return one of the eight configurable digital inputs."""
-        return self._input(n)
-
-    def get_configurable_digital_out(self, n: Configurable) -> bool:
-        """Return one of the eight configurable digital outputs."""
-        return self._output(n)
-
-    def get_tool_digital_in(self, n: Tool) -> bool:
-        """Return one of the two digital inputs of the tool."""
-        return self._input(n)
-
-    def get_tool_digital_out(self, n: Tool) -> bool:
-        """Return one of the two digital outputs of the tool."""
-        return self._output(n)
+    set_digital_out = _sets(
+        "Set a digital output: 0 to 7 standard, 8 and 9 those of the tool, as before configurable ones existed.",
+        Old,
+    )
+    set_standard_digital_out = _sets("Set one of the eight standard digital outputs.", Standard)
+    set_configurable_digital_out = _sets("Set one of the eight configurable digital outputs.", Configurable)
+    set_tool_digital_out = _sets("Set one of the two digital outputs of the tool.", Tool)
+    get_digital_in = _input("Return a digital input, numbered as in `set_digital_out`.", Old)
+    get_digital_out = _output("Return a digital output, numbered as in `set_digital_out`.", Old)
+    get_standard_digital_in = _input("Return one of the eight standard digital inputs.", Standard)
+    get_standard_digital_out = _output("Return one of the eight standard digital outputs.", Standard)
+    get_configurable_digital_in = _input("Return one of the eight configurable digital inputs.", Configurable)
+    get_configurable_digital_out = _output(
+        "Return one of the eight configurable digital outputs.", Configurable
+    )
+    get_tool_digital_in = _input("Return one of the two digital inputs of the tool.", Tool)
+    get_tool_digital_out = _output("Return one of the two digital outputs of the tool.", Tool)
 
     # ------------------------------------------------------------------ analogue, tool and run state
 
@@ -215,12 +205,3 @@ class TerminalFunctions(Family):
         return self._terminals.analog_shares[n]
 
     get_standard_analog_out = get_analog_out
-
-    def _set(self, bit: int, on: bool) -> None:
-        self._arm.then(lambda: self._terminals.set_digital_outputs(1 << bit, on << bit))
-
-    def _input(self, bit: int) -> bool:
-        return bool(self._terminals.digital_inputs >> bit & 1)
-
-    def _output(self, bit: int) -> bool:
-        return bool(self._terminals.digital_outputs >> bit & 1)
