@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.cell.description import Cell, Part, Tool, Wire, as_declared, bit_of
+from tvist_controller.cell.description import Cell, Part, Tool, Wire, bit_of
 from tvist_controller.cell.gripper import PORT, Gripper, answer
 from tvist_controller.events import Emit
 from tvist_controller.kinematics.arm import Arm
@@ -170,7 +170,7 @@ class LiveCell:
             self._put_down(q)
             self._share = 0  # it stays behind with the tool
         self._tool = tool
-        self._load = self._first_load if tool is self._cell.tools[0] else as_declared(tool)
+        self._load = self._first_load if tool is self._cell.tools[0] else _tool_body(tool)
         self._emit("text", why=f"cell: the tool {tool.name} ({tool.mass:g} kg) is on the flange")
 
     def _move_real_fingers(self, gripper: Gripper, hand: Plant) -> None:
@@ -243,6 +243,11 @@ class LiveCell:
             why=f"the gripper closed on nothing: {name} lies {1e3 * distance:.1f} mm and {angle:.2f} rad from the tool "
             f"centre point; it is gripped within {1e3 * limits.tolerance:g} mm and {limits.angle_tolerance:g} rad",
         )
+
+
+def _tool_body(tool: Tool) -> Payload:
+    """Return a tool as a payload."""
+    return Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
 
 
 def _part_body(part: Part, place: Placement) -> Payload:
