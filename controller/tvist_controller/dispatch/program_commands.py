@@ -67,7 +67,7 @@ def _stop(robot: Robot, _: Call[p.ProgramStop]) -> None:
 
 
 def _close_popup(robot: Robot, _: Call[p.ProgramClosePopup]) -> None:
-    robot.programs.popups.dismiss()
+    robot.programs.popups.close()
 
 
 def _interpret(robot: Robot, call: Call[p.ProgramInterpret]) -> Accepted:

@@ -305,10 +305,6 @@ class ProgramArm:
         """Whether a guided motion of the program is running."""
         return self._guided is not None
 
-    def slow_down(self) -> None:
-        """Let the guided motion come to rest until the next command."""
-        self._access.guidance.slow_down()
-
     def settle(self) -> None:
         """Stop a motion whose thread has ended without another that took it over; called at the end of each turn."""
         self._rate_limit.planning = max(self._rate_limit.planning - 1, 0)

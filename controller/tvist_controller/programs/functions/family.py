@@ -5,11 +5,10 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arm import ProgramArm
-from tvist_controller.programs.indicators import Popups, RunstateOutputs
+from tvist_controller.programs.indicators import Popups, RunstateOutputs, Watchdogs
 from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.programs.sockets import Sockets
-from tvist_controller.programs.watchdogs import Watchdogs
 from tvist_urscript import costs
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -40,6 +39,7 @@ class Family:
 
     def __init__(self, on: Parts) -> None:
         self._access, self._arm, self._kinematics, self._parts = on.access, on.arm, on.kinematics, on
+        self._peripherals = on.access.peripherals
 
     def _warn(self, why: str) -> None:
         self._access.emit("warning", why=why)

@@ -34,7 +34,7 @@ FlagPlace = Annotated[int, whole(0, FLAGS - 1)]
 
 def _register(what: str, place: object, bank: Bank) -> Callable[[Family, int], bool | float]:
     def get(self: Family, address: int) -> bool | float:
-        registers = self._access.peripherals
+        registers = self._peripherals
         return registers.bit(bank, address) if bank.endswith("bit") else registers.doubles(bank)[address]
 
     return described(get, what, address=place)
@@ -42,14 +42,14 @@ def _register(what: str, place: object, bank: Bank) -> Callable[[Family, int], b
 
 def _input(what: str, place: object) -> Callable[[Family, int], bool]:
     def get(self: Family, n: int) -> bool:
-        return bool(self._access.peripherals.digital_inputs >> n & 1)
+        return bool(self._peripherals.digital_inputs >> n & 1)
 
     return described(get, what, n=place)
 
 
 def _output(what: str, place: object) -> Callable[[Family, int], bool]:
     def get(self: Family, n: int) -> bool:
-        return bool(self._access.peripherals.digital_outputs >> n & 1)
+        return bool(self._peripherals.digital_outputs >> n & 1)
 
     return described(get, what, n=place)
 
@@ -57,7 +57,7 @@ def _output(what: str, place: object) -> Callable[[Family, int], bool]:
 def _sets(what: str, place: object) -> Callable[[Family, int, Flag], None]:
     @costs(10)
     def set_one(self: Family, n: int, b: Flag) -> None:
-        self._arm.then(lambda: self._access.peripherals.set_digital_outputs(1 << n, b << n))
+        self._arm.then(lambda: self._peripherals.set_digital_outputs(1 << n, b << n))
 
     return described(set_one, what, n=place)
 
@@ -69,7 +69,6 @@ class RegisterFunctions(Family):
 
     def __init__(self, on: Parts) -> None:
         super().__init__(on)
-        self._registers = on.access.peripherals
         self._flags = [False] * FLAGS
 
     read_input_boolean_register = _register("Read an input bit, which clients write.", BitPlace, "input_bit")
@@ -92,19 +91,19 @@ class RegisterFunctions(Family):
     @costs(8)
     def write_output_boolean_register(self, address: BitPlace, value: Flag) -> None:
         """Write an output bit, which clients read."""
-        self._arm.then(lambda: self._registers.write("output_bit", address, value))
+        self._arm.then(lambda: self._peripherals.write("output_bit", address, value))
 
     @costs(8)
     def write_output_integer_register(
         self, address: NumberPlace, value: Annotated[int, whole(MIN_INTEGER, MAX_INTEGER)]
     ) -> None:
         """Write an output integer of 32 bits, which clients read."""
-        self._arm.then(lambda: self._registers.write("output_int", address, value))
+        self._arm.then(lambda: self._peripherals.write("output_int", address, value))
 
     @costs(8)
     def write_output_float_register(self, address: NumberPlace, value: Number) -> None:
         """Write an output number, which clients read."""
-        self._arm.then(lambda: self._registers.write("output_double", address, value))
+        self._arm.then(lambda: self._peripherals.write("output_double", address, value))
 
     def get_flag(self, n: FlagPlace) -> bool:
         """Return one of 32 flags, which only programs can read and set."""
@@ -124,10 +123,6 @@ class TerminalFunctions(Family):
     """Reads and sets the terminals of one robot."""
 
     title = "Inputs and outputs"
-
-    def __init__(self, on: Parts) -> None:
-        super().__init__(on)
-        self._terminals = on.access.peripherals
 
     # ------------------------------------------------------------------ digital
 
@@ -154,32 +149,32 @@ class TerminalFunctions(Family):
     @costs(10)
     def set_analog_out(self, n: Bit, f: Share) -> None:
         """Set an analogue output to a share of its range."""
-        self._arm.then(lambda: self._terminals.set_analog_output(n, f))
+        self._arm.then(lambda: self._peripherals.set_analog_output(n, f))
 
     set_standard_analog_out = set_analog_out
 
     def set_analog_outputdomain(self, port: Bit, domain: Voltage) -> None:
         """Make an analogue output a current (0) or a voltage (1)."""
-        self._arm.then(lambda: self._terminals.choose_output(port, voltage=domain))
+        self._arm.then(lambda: self._peripherals.choose_output(port, voltage=domain))
 
     def set_analog_inputrange(self, port: AnalogPort, range: Annotated[int, whole(0, 2)]) -> None:
         """Make ports 0 and 1 a voltage by ranges 0 and 2; those of the tool, 2 and 3, by 0 and 1, or a current by 2."""
         if port > 1:
-            self._arm.then(lambda: self._terminals.choose_tool_input(port - 2, voltage=range < 2))
+            self._arm.then(lambda: self._peripherals.choose_tool_input(port - 2, voltage=range < 2))
         elif range == 1:
             raise Fault("range is 1: a range from -5 to 5 V exists no more, so it must be 0 or 2")
         else:
-            self._arm.then(lambda: self._terminals.choose_input(port, voltage=True))
+            self._arm.then(lambda: self._peripherals.choose_input(port, voltage=True))
 
     def set_standard_analog_input_domain(self, port: Bit, domain: Voltage) -> None:
         """Make an analogue input a current (0) or a voltage (1)."""
-        self._arm.then(lambda: self._terminals.choose_input(port, voltage=domain))
+        self._arm.then(lambda: self._peripherals.choose_input(port, voltage=domain))
 
     def set_tool_voltage(self, voltage: Annotated[int, whole(0, 24)]) -> None:
         """Set the supply of the tool: 0, 12 or 24 V."""
         if voltage not in {0, 12, 24}:
             raise Fault(f"voltage is {voltage}: it must be 0, 12 or 24")
-        self._arm.then(lambda: self._terminals.set_tool_voltage(voltage))
+        self._arm.then(lambda: self._peripherals.set_tool_voltage(voltage))
 
     def set_runstate_outputs(self, outputs: object) -> None:
         """Accept that no output shows whether a program runs."""
@@ -194,14 +189,14 @@ class TerminalFunctions(Family):
 
     def get_standard_analog_in(self, n: Bit) -> float:
         """Return an analogue input of the control box [A or V]."""
-        return self._terminals.analog_inputs[n]
+        return self._peripherals.analog_inputs[n]
 
     def get_tool_analog_in(self, n: Bit) -> float:
         """Return an analogue input of the tool [V]."""
-        return self._terminals.tool_analog_inputs[n]
+        return self._peripherals.tool_analog_inputs[n]
 
     def get_analog_out(self, n: Bit) -> float:
         """Return an analogue output as a share of its range."""
-        return self._terminals.analog_shares[n]
+        return self._peripherals.analog_shares[n]
 
     get_standard_analog_out = get_analog_out
