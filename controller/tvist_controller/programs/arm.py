@@ -108,7 +108,7 @@ class ProgramArm:
     def _led(self, journey: Journey) -> bool:
         """Whether another thread has let the arm give way meanwhile, so that force control has to lead the moves."""
         waits = journey.number is None and not journey.over
-        return waits and self._access.force.compliant is not None
+        return waits and self._access.guidance.compliant is not None
 
     def _present(self) -> Journey | None:
         """Return the moves of this thread that may be blended with a further one."""
@@ -193,7 +193,7 @@ class ProgramArm:
     @property
     def lost(self) -> bool:
         """Whether the program began a force mode that a stop has ended."""
-        return self._gives is self._thread()[0] and self._access.force.compliant is None
+        return self._gives is self._thread()[0] and self._access.guidance.compliant is None
 
     def give_way(self, start: Callable[[], int]) -> Turns:
         """Let the arm give way to forces, or change how; `start` begins that and returns its number."""
@@ -218,7 +218,7 @@ class ProgramArm:
     def hold_again(self, *, by_hand: bool) -> None:
         """End what `give_way` has begun: freedrive, or else force mode."""
         force, self._gives = self._access.force, None
-        if force.compliant is not None and force.by_hand == by_hand:
+        if force.by_hand == by_hand and self._access.guidance.compliant is not None:
             self.brake(force.end, wholly=True)
 
     def steer(self, start: Callable[[bool], int | None]) -> None:

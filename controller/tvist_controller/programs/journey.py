@@ -142,7 +142,8 @@ class Journey:
 
     def stop(self) -> None:
         """Note that a protective stop has begun: what it passes has been passed when the program is resumed."""
-        self.outcome, self._stops_at = "protective_stop", self._motion.motions.stops_at
+        move = self._motion.motions.move
+        self.outcome, self._stops_at = "protective_stop", None if move is None else move.stops_at
 
     # ------------------------------------------------------------------ in every tick
 
@@ -176,7 +177,8 @@ class Journey:
             self._start(legs, plan)
             while self.outcome is None:
                 yield
-                self._pass_blends(self._motion.motions.progress)
+                move = self._motion.motions.move
+                self._pass_blends(None if move is None else move.progress)
                 self._go_on()
             self._pass_blends(self._stops_at)
             self._marks, ended = [], len(self._marks)

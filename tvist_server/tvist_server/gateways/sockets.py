@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from typing import Final
 
-from tvist_controller.instruments.sink import Topic
+from tvist_controller.instruments.report import Topic
 from tvist_controller.programs.sockets import (
     Close,
     Expire,

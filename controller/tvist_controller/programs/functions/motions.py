@@ -144,7 +144,7 @@ class MotionFunctions(Family):
     def _follow(self, segment: Segment) -> Turns:
         if self._arm.lost:
             yield from self._arm.regain()
-        moves = self._arm if self._access.force.compliant is None else self._led
+        moves = self._arm if self._access.guidance.compliant is None else self._led
         yield from moves.follow(segment)
 
     # ------------------------------------------------------------------ guided motions

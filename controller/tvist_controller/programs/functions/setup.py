@@ -70,11 +70,11 @@ class SetupFunctions(Family):
 
     def set_tool_output_mode(self, mode: Bit) -> None:
         """Use the digital outputs of the tool as such (0), or as a second supply (1)."""
-        self._arm.then(lambda: self._peripherals.set_tool_output_mode(mode))
+        self._arm.then(lambda: self._peripherals.set_tool(tool_output_mode=mode))
 
     def set_tool_digital_output_mode(self, n: Bit, mode: Annotated[int, whole(1, 3)]) -> None:
         """Let a digital output of the tool sink (1), source (2), or both (3)."""
-        self._arm.then(lambda: self._peripherals.set_tool_digital_output_mode(n, mode))
+        self._arm.then(lambda: self._peripherals.set_tool(**{f"tool_digital_output{n}_mode": mode}))
 
     def set_tool_communication(
         self,

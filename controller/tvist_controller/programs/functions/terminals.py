@@ -155,7 +155,7 @@ class TerminalFunctions(Family):
 
     def set_analog_outputdomain(self, port: Bit, domain: Voltage) -> None:
         """Make an analogue output a current (0) or a voltage (1)."""
-        self._arm.then(lambda: self._peripherals.choose_output(port, voltage=domain))
+        self._arm.then(lambda: self._peripherals.choose(2 + port, voltage=domain))
 
     def set_analog_inputrange(self, port: AnalogPort, range: Annotated[int, whole(0, 2)]) -> None:
         """Make ports 0 and 1 a voltage by ranges 0 and 2; those of the tool, 2 and 3, by 0 and 1, or a current by 2."""
@@ -164,17 +164,17 @@ class TerminalFunctions(Family):
         elif range == 1:
             raise Fault("range is 1: a range from -5 to 5 V exists no more, so it must be 0 or 2")
         else:
-            self._arm.then(lambda: self._peripherals.choose_input(port, voltage=True))
+            self._arm.then(lambda: self._peripherals.choose(port, voltage=True))
 
     def set_standard_analog_input_domain(self, port: Bit, domain: Voltage) -> None:
         """Make an analogue input a current (0) or a voltage (1)."""
-        self._arm.then(lambda: self._peripherals.choose_input(port, voltage=domain))
+        self._arm.then(lambda: self._peripherals.choose(port, voltage=domain))
 
     def set_tool_voltage(self, voltage: Annotated[int, whole(0, 24)]) -> None:
         """Set the supply of the tool: 0, 12 or 24 V."""
         if voltage not in {0, 12, 24}:
             raise Fault(f"voltage is {voltage}: it must be 0, 12 or 24")
-        self._arm.then(lambda: self._peripherals.set_tool_voltage(voltage))
+        self._arm.then(lambda: self._peripherals.set_tool(tool_output_voltage=voltage))
 
     def set_runstate_outputs(self, outputs: object) -> None:
         """Accept that no output shows whether a program runs."""
