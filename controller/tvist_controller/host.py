@@ -16,7 +16,7 @@ from tvist_controller.dispatch.rights import Standing, is_holders, may_step
 from tvist_controller.instruments.report import Sink
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.planning.plan import Plan
-from tvist_controller.programs.socket_traffic import NoPorts, SocketNews, SocketPorts
+from tvist_controller.programs.sockets import SocketNews, SocketPorts
 from tvist_controller.safety.experience import Experience
 from tvist_plant.foreign import told
 from tvist_plant.user_file import named
@@ -53,7 +53,7 @@ class Host:
         survives: bool = False,
     ) -> None:
         self.controller, self._experience, self._survives = controller, experience, survives
-        self._ports = ports or NoPorts()
+        self._ports = ports or SocketPorts()
         self.failure: str | None = None
         """Why the controller has stopped ticking; None if it ticks."""
         self._sinks = sinks

@@ -10,7 +10,7 @@ from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
 from tvist_controller.instruments.report import Sink
-from tvist_controller.programs.socket_traffic import SocketNews
+from tvist_controller.programs.sockets import SocketNews
 from tvist_controller.safety.payload_student import experience_of
 from tvist_controller.setup import Setup
 from tvist_plant.plant import Plant, RealArm

@@ -11,7 +11,7 @@ from tvist_controller.instruments.report import Sink, truth_of
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.programs.compiling import ScriptCompiler
-from tvist_controller.programs.socket_traffic import SocketNews
+from tvist_controller.programs.sockets import SocketNews
 from tvist_controller.safety.payload_student import experience_of
 from tvist_controller.sources.own_plants import WORLD, OwnPlant, RecordedPlant, load_plant
 

@@ -80,7 +80,7 @@ ROWS: tuple[Row, ...] = (
     Row(p.ProgramPlay, _play, changes_io=True),
     Row(p.ProgramPause, _pause, changes_io=True),
     Row(p.ProgramStop, _stop, lease="if named", changes_io=True, stops=True),
-    Row(p.ProgramClosePopup, lambda robot, _: robot.programs.popups.dismiss(), lease="none"),
+    Row(p.ProgramClosePopup, lambda robot, _: robot.programs.popups.close(), lease="none"),
     Row(
         p.ProgramInterpret,
         lambda robot, call: Accepted(id=robot.programs.statements.interpret(call.planned())),

@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.plan import Plan
-from tvist_controller.programs.access import OWN_TOKEN, Access
+from tvist_controller.programs.access import OWN_TOKEN, Access, refusals_as_faults
 from tvist_controller.refusal import RefusalError
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
@@ -201,10 +201,8 @@ class Journey:
         )
 
     def _start(self, legs: list[Segment], plan: Plan) -> None:
-        try:
+        with refusals_as_faults():
             reply = self._access.send(self._command(legs), plan)
-        except RefusalError as refusal:
-            raise Fault(refusal.reply.why) from refusal
         assert isinstance(reply, Accepted)
         assert isinstance(plan.found, PlannedMove)
         self.number, self.outcome, self._stops_at = reply.id, None, None
@@ -280,10 +278,8 @@ class Journey:
         return self._access.latest().tick
 
     def _check_ready(self) -> None:
-        try:
+        with refusals_as_faults():
             self._motion.check("move_j")
-        except RefusalError as refusal:
-            raise Fault(refusal.reply.why) from refusal
 
     def _refused(self, refusal: RefusalError, legs: list[Segment]) -> None:
         """End a program whose move is impossible, or stop the robot if it is a line or path that leads nowhere."""
