@@ -151,14 +151,17 @@ class Controller(Robot):
             self.tick_number = max(self.tick_number, 0 if tick is None else tick - 1)
             self.counters.missed_ticks = self.watching.missed
             self.watching.tell_cycle()
-        try:
-            if self.supervision is not None:
+        if self.supervision is not None:
+            try:
                 self.supervision.look()
-                self.counters.missed_ticks = self.supervision.missed
-            if self.now >= self._next_timeout:
+            except PlantError as error:  # leases still end while it does not answer
+                self._failed = error
+            self.counters.missed_ticks = self.supervision.missed
+        if self.now >= self._next_timeout:
+            try:
                 self._watch_time()
-        except PlantError as error:  # it does not answer, or a push that ends fails
-            self._failed = error
+            except PlantError as error:  # a push that ends
+                self._failed = error
         if not self.programs.idle:
             self._look_again()
             self.programs.advance(self.tick_number + 1)
