@@ -1,9 +1,11 @@
 """The controller's programs as UR's interfaces present them: by path, key message, popup and runtime exception."""
 
 import re
+from collections.abc import Callable
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Final
+from typing import Final, Protocol
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.io import Io
 from tvist_protocol.programs import (
     Interpreter,
@@ -23,14 +25,18 @@ from tvist_server.gateways.ur import messages
 from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.lease import ConnectionControl
 
-if TYPE_CHECKING:
-    from tvist_server.gateways.ur.robot import UrRobot
-
 FOLDER: Final = "/programs"
 """Folder in which a controller keeps programs; every other folder is accepted too."""
 _SAVED: Final = (".urp", ".script")
 """How the names of files end. The name of a script that a client has sent has no ending."""
 _PLACE: Final = re.compile(r"text:(\d+):(\d+)")
+
+
+class Host(Protocol):
+    """The robot, as far as messages about its programs need it."""
+
+    latest: Snapshot | None
+    tell: Callable[[bytes], None]
 
 
 class Programs:
@@ -39,7 +45,7 @@ class Programs:
     It learns the program's state from replies and from `io`, which arrive in the controller's order.
     """
 
-    def __init__(self, host: "UrRobot", external: ExternalControl) -> None:
+    def __init__(self, host: Host, external: ExternalControl) -> None:
         self._host, self._external = host, external
         self.path: str | None = None
         """Path of the loaded program; only its name if a client has sent it as a script; None before the first."""
