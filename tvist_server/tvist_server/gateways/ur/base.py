@@ -78,7 +78,7 @@ class InTurnSession(PortSession, Generic[Item]):
         """Do one thing."""
 
     def _add(self, item: Item, *, stop: bool = False) -> None:
-        """Do something in its turn; if it stops the arm and others are before it, stop the arm also at once."""
+        """Do something in its turn; if it stops the arm and has to wait, stop the arm also at once."""
         if stop and self._busy:
             begin(self._robot.programs.stop(self._control))
         self._items.append(item)
@@ -102,11 +102,7 @@ class InTurnSession(PortSession, Generic[Item]):
 
 
 class Lines:
-    """Cuts a client's stream, which may be split anywhere, into lines.
-
-    Args:
-        longest: Bytes that are kept of a line.
-    """
+    """Cuts a client's stream, which may be split anywhere, into lines, of which `longest` bytes are kept."""
 
     def __init__(self, longest: int) -> None:
         self._longest = longest

@@ -49,13 +49,9 @@ MakeSession = Callable[[ConnectionControl, Send], PortSession]
 
 
 class Connection(asyncio.BufferedProtocol):
-    """One client at one interface.
+    """One client at one interface. It counts to the limit of the robot until it is closed.
 
-    Args:
-        make: Creates its session.
-        lease: Returns the lease of a host.
-        limit: Limit of the robot, to which the connection counts until it is closed.
-        lossless: Whether samples wait for a slow client, because a client advances time.
+    If it is lossless, samples wait for a slow client, because a client advances time.
     """
 
     def __init__(
@@ -244,11 +240,6 @@ class ConnectionLimit:
     client from its start to its pause, and during this time the client may only read. Clients that are being served
     stay connected, and so do those that read from the other interfaces. A new client is turned away only if such
     clients take all places, so a flood of new clients does not disturb those that are working.
-
-    Args:
-        now: Returns the time on the same clock as `Connection.heard` [s].
-        note: Takes a sentence for the server's console.
-        most: Largest number of connections.
     """
 
     def __init__(self, now: Callable[[], float], note: Callable[[str], None], most: int = MOST) -> None:

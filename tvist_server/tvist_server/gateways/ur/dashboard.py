@@ -64,7 +64,7 @@ def _changing(
     done: str,
     too_soon: str | None = None,
 ) -> Callable[[Request], Awaitable[str | None]]:
-    """Return what carries out a change and answers `done`, or `too_soon` if the robot's mode does not permit it."""
+    """Return what makes a change and answers `done`, or `too_soon` if the mode does not permit it."""
 
     async def carry_out(request: Request) -> str | None:
         refused = await change(request.robot, request.control)

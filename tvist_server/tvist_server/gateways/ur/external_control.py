@@ -22,13 +22,7 @@ Aside = Callable[[Callable[[], str | None]], Awaitable[str | None]]
 
 
 class ExternalControl:
-    """Completes such programs.
-
-    Args:
-        folder: Programs that clients load by their names; None if there is no such folder.
-        fetch: Asks a machine for its part.
-        aside: Reads the files of the folder.
-    """
+    """Completes such programs; `folder` has those that clients load by their names."""
 
     def __init__(self, folder: ProgramFolder | None, fetch: Fetch, aside: Aside) -> None:
         self._folder, self._fetch, self._aside = folder, fetch, aside
@@ -47,7 +41,7 @@ class ExternalControl:
         return text if text is not None and EXTERNAL_CONTROL in text else None
 
     async def complete(self, text: str, host: str) -> str | None:
-        """Complete a text for the machine that plays it; None if it does not answer, or the whole is too long."""
+        """Complete a text for the machine that plays it; None if it does not answer or the text is too long."""
         sent = await self._fetch(host)
         whole = None if sent is None else with_external_control(text, sent)
         return None if whole is None or len(whole) > MAX_SCRIPT else whole

@@ -12,12 +12,7 @@ AskGripper = Callable[[bytes, Callable[[bytes], None]], None]
 
 
 class GripperSession(PortSession):
-    """Passes requests to the gripper in the controller, one after the other.
-
-    Args:
-        ask: Has a request carried out.
-        soon: Schedules a call in the interfaces' thread.
-    """
+    """Passes requests to the gripper in the controller; `soon` brings the answers to the interfaces' thread."""
 
     client_begins = True
     waiting = 0

@@ -25,13 +25,7 @@ MakeCommand = Callable[[str], Command]
 
 
 class HostLease:
-    """Control for the clients of one host.
-
-    Args:
-        desk: The robot.
-        host: Address of the host.
-        soon: Schedules a call in the interfaces' thread; may be called from any thread.
-    """
+    """Control for the clients of one host; `soon` brings replies to the interfaces' thread."""
 
     def __init__(self, desk: Desk, host: str, soon: Callable[[Callable[[], None]], None]) -> None:
         self.client = f"ur-{host}"
@@ -114,13 +108,7 @@ class HostLease:
 
 
 class ConnectionControl:
-    """How one connection sends commands to the controller; `change` first takes control if it is free.
-
-    Args:
-        lease: Lease of the client's host.
-        hear: Has an answer handled, which is a function to call.
-        peer: The client and its interface, as a phrase for messages to people; by default its host.
-    """
+    """How one connection sends commands to the controller; `peer` names its client in messages to people."""
 
     def __init__(
         self,

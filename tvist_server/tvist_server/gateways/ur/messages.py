@@ -82,14 +82,7 @@ def key(time: int, title: str, what: str) -> bytes:
 
 
 def runtime_exception(time: int, line: int, column: int, what: str) -> bytes:
-    """Encode that a program cannot continue or cannot begin.
-
-    Args:
-        time: Time of the message [µs].
-        line: Line, 1 for the first.
-        column: Column in the line, 1 for the first.
-        what: Reason.
-    """
+    """Encode why a program cannot continue or cannot begin; line and column are 1 for the first."""
     return _message(time, MessageKind.RUNTIME_EXCEPTION, _PLACE.pack(line, column) + _text(what))
 
 
@@ -106,16 +99,7 @@ def safety_mode(time: int, mode: int) -> bytes:
 def popup(
     time: int, title: str, what: str, *, warning: bool = False, error: bool = False, blocking: bool = False
 ) -> bytes:
-    """Encode a pop-up window for the person at the robot; it asks for no value.
-
-    Args:
-        time: Time of the message [µs].
-        title: Title of the window.
-        what: Text for people.
-        warning: Whether it is a warning.
-        error: Whether it is an error.
-        blocking: Whether the program waits until it is closed.
-    """
+    """Encode a window for the person at the robot, for which the program waits if it is `blocking`."""
     head = _text(title, 255)
     body = _POPUP.pack(0, 0, warning, error, blocking, len(head)) + head + _text(what)
     return _message(time, MessageKind.POPUP, body)

@@ -84,7 +84,7 @@ class Programs:
     # ------------------------------------------------------------------ requests, each for a client
 
     async def load(self, path: str, control: ConnectionControl) -> Refused | None:
-        """Load a program by the path of its file, of which the folders are ignored, and stop the running one."""
+        """Load a program by its path, of which the folders are ignored, and stop the running one."""
         name, self._asked = PurePosixPath(path).name, None
         if not re.match(PROGRAM_NAME_PATTERN, name):
             why = f"the path does not name a file, which has {PATTERN_MEANINGS[PROGRAM_NAME_PATTERN]}"
@@ -98,7 +98,7 @@ class Programs:
         return None
 
     async def run(self, text: str, control: ConnectionControl, *, secondary: bool) -> Refused | None:
-        """Start a script that a client has sent, beside the program if it is secondary, else instead of it."""
+        """Start a client's script, beside the program if it is secondary, else instead of it."""
         lasting = control.lasting()
         reply = await lasting.change(lambda token: ProgramRun(token=token, text=text))
         if isinstance(reply, Refused):

@@ -43,12 +43,7 @@ _KEY: Final = "robot state"
 
 
 def robot_state(description: RobotDescription, snapshot: Snapshot) -> bytes:
-    """Return the package of a tick, which is created once for all clients of a robot.
-
-    Args:
-        description: The robot.
-        snapshot: Snapshot of the tick.
-    """
+    """Return the package of a tick, which is created once for all clients of a robot."""
     made: bytes | None = snapshot.shared.get(_KEY)
     if made is None:
         body = b"".join((

@@ -41,13 +41,7 @@ class Board:
             self._bytes = self._snapshot = None
 
     def package(self, recipe: OutputRecipe, snapshot: Snapshot, head: bytes) -> bytes:
-        """Return the data package of a tick.
-
-        Args:
-            recipe: A recipe that a client reads.
-            snapshot: Values of the tick.
-            head: Bytes in front of the variables: the recipe's id in protocol version 2, nothing in version 1.
-        """
+        """Return the package of a tick for a recipe that a client reads; `head` precedes the variables."""
         try:
             gathered = self._at(snapshot)
         except Exception:  # noqa: BLE001  what a variable raises concerns those alone who read it
@@ -77,12 +71,7 @@ def _package(head: bytes, data: bytes) -> bytes:
 
 
 class _Bytes:
-    """Bytes of the variables that some recipes name.
-
-    Args:
-        recipes: The recipes.
-        snapshot: Tells how many joints the arm has.
-    """
+    """Bytes of the variables that some recipes name; the snapshot tells how many joints the arm has."""
 
     def __init__(self, recipes: Iterable[OutputRecipe], snapshot: Snapshot) -> None:
         different = {recipe.text: recipe for recipe in recipes}.values()
@@ -148,13 +137,9 @@ class _Place(NamedTuple):
 
 
 class _Packing:
-    """Writes parts one behind the other, by one call.
+    """Writes parts one behind the other, by one call, from the place `first` on; adds the place of each to `places`.
 
-    Args:
-        parts: The parts.
-        snapshot: Tells the lengths of lists.
-        first: Place of the first byte.
-        places: Where each part is written is added here.
+    The snapshot tells the lengths of lists.
     """
 
     def __init__(self, parts: list[Part], snapshot: Snapshot, first: int, places: dict[Part, _Place]) -> None:

@@ -18,11 +18,7 @@ def split(names: bytes) -> tuple[str, ...]:
 
 
 class OutputRecipe:
-    """Variables that a client reads.
-
-    Args:
-        names: Names of output variables, as the client wrote them.
-    """
+    """Variables that a client reads, by their names as it wrote them."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self.words = [OUTPUTS[name].name if name in OUTPUTS else "NOT_FOUND" for name in names]
@@ -41,11 +37,7 @@ class OutputRecipe:
 
 
 class InputRecipe:
-    """Variables that a client writes.
-
-    Args:
-        names: Names of input variables, all of which exist.
-    """
+    """Variables that a client writes, all of which exist."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self._fields = [(name, INPUTS[name]) for name in names]

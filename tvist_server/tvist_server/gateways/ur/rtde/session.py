@@ -204,10 +204,9 @@ class RtdeSession(PortSession):
 
 
 def ticks_between(frequency: float) -> int:
-    """Return the number of ticks between two data packages: 500 Hz divided by the frequency, rounded down.
+    """Return the ticks between two data packages: 500 Hz divided by the frequency [Hz], rounded down.
 
-    Args:
-        frequency: Requested frequency [Hz], clipped to 1 to 500; zero, negative numbers and NaN stand for 500.
+    The frequency is clipped to 1 to 500; zero, negative numbers and NaN stand for 500.
     """
     if not frequency > 0.0:
         return 1

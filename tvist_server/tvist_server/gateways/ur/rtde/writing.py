@@ -25,11 +25,6 @@ class InputWriter:
 
     A variable that is not in a package keeps its last value on this connection. Until the first one a mask is 0, and
     any other variable is not set.
-
-    Args:
-        robot: Robot to write to.
-        control: Access to its controller.
-        complain: Sends the client a warning.
     """
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, complain: Callable[[str], None]) -> None:
