@@ -10,7 +10,6 @@ from tvist_controller.setup import Setup
 from tvist_plant.plant import PERIOD
 from tvist_server.clock import Clock, Lockstep, Realtime
 from tvist_server.config import ConfigError, ServeConfig
-from tvist_server.courier import Courier
 from tvist_server.fleet import recording_of
 from tvist_server.gateways.exposure import ExposureError, check_endpoints, guarded, guarded_interfaces
 from tvist_server.robot import ServedRobot
@@ -108,20 +107,12 @@ def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
         )
 
 
-def drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Courier], list[Clock]]:
-    """Create couriers and clocks: one of each for all robots in real time, one of each per robot in lockstep.
+def make_clocks(config: ServeConfig, robots: Sequence[ServedRobot]) -> list[Clock]:
+    """Create one clock for all robots in real time, one for each robot in lockstep.
 
-    In lockstep no message may be lost, so a courier waits for a slow client, and must not delay other robots.
+    In lockstep no message may be lost, so a robot waits for its slow clients, and must not delay other robots.
     """
     if config.clock == "realtime":
-        courier, driven = Courier([robot.publisher for robot in robots]), [robot.driven for robot in robots]
-        clock = Realtime(
-            driven,
-            courier.wake,
-            PERIOD,
-            config.speed,
-            priority=config.realtime_priority,
-        )
-        return [courier], [clock]
-    couriers = [Courier([robot.publisher]) for robot in robots]
-    return couriers, [Lockstep(robot.driven, robot.repeat) for robot in robots]
+        driven = [robot.driven for robot in robots]
+        return [Realtime(driven, PERIOD, config.speed, priority=config.realtime_priority)]
+    return [Lockstep(robot.driven, robot.repeat) for robot in robots]

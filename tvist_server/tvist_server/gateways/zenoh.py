@@ -133,7 +133,7 @@ class ZenohGateway(Gateway):
         if answer is not None:
             self._queried.info(answer)
 
-    def _answer(self, key: str, query: zenoh.Query) -> Callable[[Reply | bytes], None] | None:
+    def _answer(self, key: str, query: zenoh.Query) -> Callable[[Reply | Callable[[], bytes]], None] | None:
         """Return the function that answers a query; None if the gateway is closed."""
         if self._closed:
             query.drop()  # type: ignore[no-untyped-call]
