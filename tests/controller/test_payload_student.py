@@ -21,7 +21,7 @@ from tvist_lab.replay import replay
 from tvist_protocol.codec import decode_event
 from tvist_protocol.commands import Forget, SetPayload
 from tvist_protocol.simulation import SimulationReset
-from tvist_server.config import ConfigError
+from tvist_server.option_values import StartError
 
 MODAL = load("ur5e_modal")
 
@@ -168,7 +168,7 @@ def test_where_motions_do_not_tell_it_the_warning_still_comes(monkeypatch):
 
 
 def test_an_arm_that_carries_no_weight_cannot_follow_it():
-    with pytest.raises(ConfigError, match="no joint of a one-joint arm carries weight"):
+    with pytest.raises(StartError, match="no joint of a one-joint arm carries weight"):
         free_setup(robot="one-joint", adapt="payload")
 
 

@@ -13,8 +13,8 @@ from tvist_plant.user_file import UserFileError
 from tvist_protocol.codec import decode_info
 from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad, ProgramStop
 from tvist_protocol.replies import Done, Refused
-from tvist_server.config import ConfigError
-from tvist_server.config_file import from_mapping
+from tvist_server.config import from_mapping
+from tvist_server.option_values import StartError
 from tvist_server.polyscope import program, with_external_control
 from tvist_server.polyscope_nodes import EXTERNAL_CONTROL, Nodes
 from tvist_server.program_folder import ProgramFolder
@@ -272,6 +272,6 @@ def test_a_robot_has_the_folder_of_its_name_if_there_is_one(folder):
 
 def test_a_folder_that_does_not_exist_is_an_error_of_the_configuration(tmp_path):
     nowhere = from_mapping({"programs": str(tmp_path / "nowhere")}, "tvist.toml")
-    with pytest.raises(ConfigError, match=r"programs is .*nowhere.*: must be a folder"):
+    with pytest.raises(StartError, match=r"programs is .*nowhere.*: must be a folder"):
         nowhere.program_folder("ur5e")
     assert from_mapping({}, "tvist.toml").program_folder("ur5e") is None

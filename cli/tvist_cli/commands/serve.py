@@ -20,7 +20,8 @@ from tvist_cli.serving import (
     say_recorded,
     say_who_can_reach,
 )
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
+from tvist_server.option_values import StartError
 
 if TYPE_CHECKING:
     from tvist_controller.setup import Setup
@@ -61,7 +62,7 @@ def serve(
     gc.freeze()
     gc.enable()
     checked = configuration(given, config)
-    with told(ConfigError, code=2):
+    with told(StartError, code=2):
         ending = Ending()
         if checked.workers > 1:
             _several(checked, ending)
