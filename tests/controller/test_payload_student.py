@@ -1,6 +1,7 @@
 """A robot that follows its payload finds it after a motion, lets a right one be, and forgets it on command."""
 
 from dataclasses import replace
+from functools import partial
 
 import msgspec
 import numpy as np
@@ -18,9 +19,10 @@ from tvist_controller.sources.calibrations import load
 from tvist_controller.sources.mode_source import first_source
 from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay
-from tvist_protocol.codec import decode_event
+from tvist_protocol.codec import decode
 from tvist_protocol.commands import Forget, SetPayload
 from tvist_protocol.simulation import SimulationReset
+from tvist_protocol.stream import Event
 from tvist_server.option_values import StartError
 
 MODAL = load("ur5e_modal")
@@ -46,7 +48,7 @@ class Following(Served):
         return self.host.controller.assumed.assumed
 
     def told(self, kind):
-        return [event for event in map(decode_event, self.events) if event.kind == kind]
+        return [event for event in map(partial(decode, Event), self.events) if event.kind == kind]
 
 
 class Keeping:
