@@ -5,26 +5,20 @@ import logging
 import weakref
 from collections import deque
 from collections.abc import AsyncIterator, Callable
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 from tvist_client.errors import AnswerTimeoutError, ArgumentError, ClientError, NotConnectedError
 from tvist_client.transports.base import Topic, Transport
 from tvist_client.values import whole
 from tvist_protocol.codec import decode
 from tvist_protocol.errors import ProtocolError, quoted
+from tvist_protocol.io import Io
+from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 log = logging.getLogger(__name__)
 
 
-class Ticked(Protocol):
-    """A message that contains its tick."""
-
-    @property
-    def tick(self) -> int:
-        """Number of the control period."""
-
-
-M = TypeVar("M", bound=Ticked)
+M = TypeVar("M", bound=State | Event | Truth | Telemetry | Io)
 Item = TypeVar("Item")
 
 

@@ -40,8 +40,7 @@ def serve(
     """Run one or more robots on the network until Control+C, SIGTERM, SIGQUIT or the terminal closes.
 
     The first start after an installation or an update compiles what a robot computes at every tick and in its plans for
-    this processor. Machine code is kept beside the sources, or in the user's cache folder where those cannot be
-    written, or in the folder that NUMBA_CACHE_DIR names.
+    this processor. Machine code is kept in the user's cache folder, or in the folder that NUMBA_CACHE_DIR names.
 
     Args:
         compile_only: Only compile, so that no start has to, in as many processes as the number says [one on each
