@@ -57,12 +57,7 @@ class DistrustWarning(UserWarning):
 
 
 class KernelCache(_Cache):
-    """The machine code of one kernel, for numba's dispatcher.
-
-    Args:
-        function: The kernel's Python source.
-        dispatcher: numba's dispatcher of it, for `load_all`.
-    """
+    """The machine code of one kernel, for numba's dispatcher."""
 
     def __init__(self, function: Callable[..., Any], dispatcher: Any = None) -> None:
         self._function, self._dispatcher = function, dispatcher
