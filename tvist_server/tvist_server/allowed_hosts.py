@@ -13,7 +13,7 @@ IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 class AllowedHosts:
-    """The machines that the server allows, besides the one that sent a program: IP addresses, networks and names.
+    """IP addresses, networks and names that the server allows, besides the machine that sent a program.
 
     Raises:
         StartError: One is none of these.
@@ -31,8 +31,8 @@ class AllowedHosts:
     def allows(self, name: str, address: str, origin: str | None) -> bool:
         """Return whether a program may connect to an address, which stands for a machine that it names.
 
-        The program comes from `origin`; None if that is unknown. The loopback interface is open to programs that came
-        from there, and if it is given itself.
+        The program comes from `origin`; None if that is unknown. The loopback interface is open to programs
+        that came from there, and if it is given itself.
         """
         to, sender = _ip(address), None if origin is None else _ip(origin)
         if _is_here(to):  # a name or a wide network does not open it by the way

@@ -261,7 +261,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         return AllowedHosts(self.ur_allow)
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
-        """Return the address of UR's interfaces of the robot with this index, and the port of each, also of a gripper.
+        """Return address and ports of UR's interfaces, and of a gripper, of the robot with this index.
 
         Raises:
             StartError: `ur_address` is not an IP address, or too few addresses follow it.

@@ -28,8 +28,8 @@ MESSAGES = (
 def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: str = "") -> dict[str, Any]:
     """Return Zenoh's `access_control` settings for a server with certificates, which has at least one role.
 
-    The names are the common names of certificates. Everything else than what the roles allow is denied: to names
-    without a role, and to clients without a certificate.
+    The names are the common names of certificates. Names without a role, and clients without a certificate,
+    are denied everything.
     """
     robots = [_at(namespace, robot) for robot in robots]
     viewing, operating = _viewing(robots), _operating(robots)

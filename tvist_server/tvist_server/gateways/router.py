@@ -49,8 +49,8 @@ class Rate(NamedTuple):
 class Router:
     """A running router, which connects to other routers now or when they appear.
 
-    It limits the states of each of `robots` that leave, and those of all others together; an interface that is named
-    has its own rates.
+    It limits the states that leave: those of each of `robots`, and those of all others together. An interface
+    that is named has its own rates.
 
     Raises:
         StartError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
