@@ -4,8 +4,8 @@ from copy import copy
 
 from tests.controller.robots import Robot
 
-from tvist_protocol.codec import decode_event, decode_state
-from tvist_protocol.stream import Event
+from tvist_protocol.codec import decode
+from tvist_protocol.stream import Event, State
 from tvist_server.gateways.base import Gateway
 from tvist_server.publisher import Publisher
 
@@ -52,8 +52,8 @@ def test_messages_go_to_every_gateway_in_their_order():
     made.report(REPORT)
     assert one.published == other.published
     assert topics(one) == ["event", "state"]
-    assert decode_event(one.published[0][1]).tick == 1
-    assert decode_state(one.published[1][1]) == STATE
+    assert decode(Event, one.published[0][1]).tick == 1
+    assert decode(State, one.published[1][1]) == STATE
 
 
 def test_a_gateway_that_fails_is_logged_and_the_others_get_the_message(caplog):
@@ -86,4 +86,4 @@ def test_what_no_gateway_takes_is_not_made():
     assert report.written is None
     gateway.takes = {"event", "state"}
     made.report(report)
-    assert decode_state(gateway.published[-1][1]) == STATE
+    assert decode(State, gateway.published[-1][1]) == STATE
