@@ -112,12 +112,9 @@ def _list(parts: tuple[Any, ...], meaning: str | None, bounds: Meta) -> Given:
 def _choice(members: tuple[Any, ...]) -> Given:
     """Return how users give a value of one of several types: as None or a word if these are among them."""
     words = {word for member in members if get_origin(member) is Literal for word in get_args(member)}
-    others = [
-        given(member) for member in members if member is not NoneType and get_origin(member) is not Literal
-    ]
-    kinds = [other.kind for other in others] + [
-        m for m in members if m is NoneType or get_origin(m) is Literal
-    ]
+    constants = [member for member in members if member is NoneType or get_origin(member) is Literal]
+    others = [given(member) for member in members if member not in constants]
+    kinds = [other.kind for other in others] + constants
     inner = others[0].convert if len(others) == 1 else _unchanged
 
     def convert(value: Any, where: str) -> Any:

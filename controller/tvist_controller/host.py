@@ -62,7 +62,7 @@ class Host:
 
     def request(self, data: bytes, origin: str | None = None) -> Reply:
         """Admit and carry out an encoded command; `origin` is the IP address of the machine that sent it, if known."""
-        admitted = admit(data, self.standing.lease, self.standing.clock)
+        admitted = admit(data, *self.standing)
         if isinstance(admitted, Refused):
             return self._turned_away(admitted)
         return self.carry_out(admitted if origin is None else admitted._replace(origin=origin))
@@ -102,7 +102,7 @@ class Host:
 
     def setpoint(self, data: bytes) -> None:
         """Admit and take a set-point."""
-        self.receive_setpoint(admit_setpoint(data, self.standing.lease))
+        self.receive_setpoint(admit_setpoint(data, self.controller.session.lease))
 
     def client_gone(self, client: str, session: str) -> None:
         """Handle the end of a client's session; this matters only if it held control or the clock."""
@@ -179,7 +179,7 @@ class Host:
                 sink.raised(error)
 
     def _forgets(self, command: Command) -> bool:
-        """Whether a command that was carried out makes wrong what is being learnt."""
+        """Whether a command invalidates what the robot is learning of its motions."""
         if isinstance(command, SimulationReset):
             return command.payload is not None or self.controller.cell is not None
         return isinstance(command, Forget)

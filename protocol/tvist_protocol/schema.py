@@ -41,7 +41,7 @@ def components(
 
 @cache
 def field_docs(described: type) -> dict[str, str]:
-    """Return the docstring under each field of a struct, those of its base first, or member of an enumeration."""
+    """Return the docstrings of the fields of a struct, its base's first, or of the members of an enumeration."""
     base = described.__base__
     docs = {} if base is None or not base.__module__.startswith("tvist_") else dict(field_docs(base))
     body = _classes(described.__module__)[described.__name__]

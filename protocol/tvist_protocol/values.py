@@ -1,7 +1,8 @@
 """Types of the values in messages: SI units, radians, every number bounded.
 
 The bounds of the wire only exclude NaN, infinity and errors by orders of magnitude. The limits of the arm are in
-`info`, and the server checks them. An unbounded float would allow NaN. A text in a type has a word for each number.
+`info`, and the server checks them. An unbounded float would allow NaN. The text in an annotation names the numbers of a
+tuple.
 """
 
 from typing import Annotated, Literal

@@ -119,9 +119,9 @@ def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0, plant: Plant | 
 
 def stop(line: Line, deceleration: float | None):
     """Stop a line; what is done, or None where a stop goes on."""
-    if not hasattr(line, "outlook"):
-        line.outlook = Stopper(line)
-    return line.outlook.stop(deceleration)
+    if not hasattr(line, "stopper"):
+        line.stopper = Stopper(line)
+    return line.stopper.stop(deceleration)
 
 
 class NoArm:

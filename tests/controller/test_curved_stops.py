@@ -74,7 +74,7 @@ def test_a_stop_keeps_every_joint_within_the_deceleration_that_it_tells(wanted):
         cycle = robot.controller.cycle
         while cycle.trajectory.share < 0.5:
             robot.tick()
-        plan = robot.controller.motion.outlook.plan_stop(wanted)
+        plan = robot.controller.motion.stopper.plan_stop(wanted)
         x = [cycle.along.published.q, cycle.along.position]
         while not plan.trajectory.finished:
             x.append(plan.trajectory.next())

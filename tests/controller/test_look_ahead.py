@@ -48,7 +48,7 @@ def test_a_pause_and_a_change_of_the_filter_are_foreseen_too():
     robot.tick(20)
     robot.send(c.Pause)
     cycle_ = robot.controller.cycle
-    ahead = robot.controller.motion.outlook.foresee()
+    ahead = robot.controller.motion.stopper.foresee()
     for expected in ahead[2:]:
         robot.tick()
         assert cycle_.position == pytest.approx(expected, abs=1e-12)
@@ -69,7 +69,7 @@ def test_a_motion_that_will_get_stuck_is_not_foreseen_and_a_stop_on_it_is_report
             raise StuckError("near a singular posture")
 
     robot.controller.cycle.trajectory.__class__ = Stuck
-    assert robot.controller.motion.outlook.foresee() is None
+    assert robot.controller.motion.stopper.foresee() is None
     assert robot.send(SimulationInject, fault="safeguard_stop") == Done()
     robot.tick()
     (told,) = (event for event in robot.events if event.kind == "safety_stop")

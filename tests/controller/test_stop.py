@@ -240,7 +240,7 @@ def test_a_stop_is_not_ahead_of_a_motion_that_negative_impulses_let_turn_back(na
         robot.tick(moment)
         if robot.controller.cycle.mode.at_rest:
             break
-        free = robot.controller.motion.outlook.foresee()[2:, 0]
+        free = robot.controller.motion.stopper.foresee()[2:, 0]
         robot.send(c.Stop)
         stopped = []
         for _ in free:

@@ -159,10 +159,13 @@ def test_a_query_on_a_key_with_a_wildcard_is_refused(gateway, desk, session, key
 
 
 def test_a_setpoint_on_a_wildcard_key_or_too_large_is_counted_and_dropped(gateway, desk, session):
-    session.put("tvist/*/setpoint", b"wild")
-    session.put("tvist/**", b"wilder")
-    session.put("tvist/ur5e/setpoint", bytes(MAX_BYTES + 1))
-    session.put("tvist/ur5e/setpoint", b"good")
+    for key, payload in (
+        ("tvist/*/setpoint", b"wild"),
+        ("tvist/**", b"wilder"),
+        ("tvist/ur5e/setpoint", bytes(MAX_BYTES + 1)),
+        ("tvist/ur5e/setpoint", b"good"),
+    ):
+        session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
     assert desk.next() == ("setpoint", b"good")
     assert gateway.setpoints_refused == 3
 

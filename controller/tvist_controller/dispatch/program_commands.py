@@ -50,7 +50,7 @@ def _play(robot: Robot, call: Call[p.ProgramPlay]) -> None:
     if programs.state == "PAUSED":
         programs.go_on(call.tick)
     else:
-        # Whoever plays a program does not lend it what only their own programs may reach.
+        # If another machine plays the program than sent it, the program may reach neither.
         programs.play(call.origin if call.origin == programs.loaded.origin else None)
 
 

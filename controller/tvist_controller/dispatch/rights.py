@@ -116,7 +116,7 @@ def check_step(clock: Lease | None, lease: Lease | None, step: SimulationStep) -
 
 
 class Standing(NamedTuple):
-    """Who has rights between two ticks; a new one replaces it, so that any thread may read it."""
+    """Who holds control and the clock, as read at one moment."""
 
     lease: Lease | None
     """Lease of the client that has control."""

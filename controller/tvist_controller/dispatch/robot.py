@@ -126,7 +126,7 @@ class Robot(ABC):
 
     @property
     def declared(self) -> Payload:
-        """Declared payload; that of a robot that is watched, if it says so."""
+        """Declared payload; for a watched robot, the one that it reports, if it reports one."""
         declared = self.assumed.declared
         return declared if self.watching is None else self.watching.declared(declared)
 

@@ -22,13 +22,13 @@ from tvist_shaping.base import Filter
 class RemainingMotion:
     """Examines the future motion of the control line."""
 
-    def __init__(self, cycle: ControlCycle, outlook: Stopper, collisions: CollisionModel) -> None:
+    def __init__(self, cycle: ControlCycle, stopper: Stopper, collisions: CollisionModel) -> None:
         self._cycle, self._collisions = cycle, collisions
-        self._outlook = outlook
+        self._stopper = stopper
         room = TorqueRoom(cycle.description, cycle.dynamics)
-        self._guard = StreamGuard(collisions, outlook.stops, room)
+        self._guard = StreamGuard(collisions, stopper.stops, room)
         reach = np.array(cycle.description.limits.position)
-        self._guide_guard = StreamGuard(collisions, outlook.stops, room, reach=reach)
+        self._guide_guard = StreamGuard(collisions, stopper.stops, room, reach=reach)
 
     def guard_of_stream(self) -> StreamGuard:
         """Return the guard of a stream that begins from rest."""
@@ -41,7 +41,7 @@ class RemainingMotion:
         Raises:
             RefusalError: There is no clear stop from here, as on a narrow path; nothing has changed.
         """
-        cycle, guard, stops = self._cycle, self._guide_guard, self._outlook.stops
+        cycle, guard, stops = self._cycle, self._guide_guard, self._stopper.stops
         state = cycle.newest
         guard.begin(state)
         if not cycle.mode.at_rest:
@@ -60,7 +60,7 @@ class RemainingMotion:
         """
         if plan is not None:
             return plan.duration, plan.way
-        ahead = self._outlook.foresee()
+        ahead = self._stopper.foresee()
         if ahead is None:
             return None, None
         last = resting_after(ahead)
@@ -70,7 +70,7 @@ class RemainingMotion:
         """Return the meeting that would occur while the end of a stream runs through the filter, if any."""
         if self._tail_is_spacious(end):
             return None
-        return self._on(self._outlook.foresee(trajectory=end))
+        return self._on(self._stopper.foresee(trajectory=end))
 
     def rest_of_way(self, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> Meeting | None:
         """Return the meeting that would occur on the rest of the motion, if any; if that is unknown, in a stop.
@@ -84,10 +84,10 @@ class RemainingMotion:
         trajectory = cycle.trajectory
         if (forecast := trajectory.forecast) is not None:
             return self._first([forecast.path.way(cycle.along.position, forecast.end), *coming])
-        if trajectory.foreseeable and (ahead := self._outlook.foresee(tvist)) is not None:
+        if trajectory.foreseeable and (ahead := self._stopper.foresee(tvist)) is not None:
             return self._on(ahead)
         guard = self._guide_guard if cycle.guard is self._guide_guard else self._guard
-        stop = self._outlook.stops.by_joints(cycle.newest, None, guard.clear)
+        stop = self._stopper.stops.by_joints(cycle.newest, None, guard.clear)
         if stop is None:
             return guard.met
         guard.take(cycle.newest, stop)

@@ -26,7 +26,7 @@ def _anywhere(_: JointStop) -> bool:
 
 
 class Stopper:
-    """Looks ahead on a control line, and stops it."""
+    """Forecasts the motion of a control line, and stops it."""
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle

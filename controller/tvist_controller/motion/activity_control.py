@@ -51,14 +51,14 @@ class MotionControl:
         self.cycle = cycle
         self.collisions = collisions
         self.changed = True
-        """Whether activity or modes may have changed since somebody has set this to False."""
+        """True if activity or modes may have changed since `RobotModes.update` looked them up."""
         self.activity = PUT[mode]
         self.safety = SafetySystem()
         """The safety system."""
         self._emit = emit
-        self.outlook = Stopper(cycle)
-        """Forecast of the control line's motion."""
-        self.ahead = RemainingMotion(cycle, self.outlook, collisions)
+        self.stopper = Stopper(cycle)
+        """Forecast and stops of the control line's motion."""
+        self.ahead = RemainingMotion(cycle, self.stopper, collisions)
         """Collision check of that motion."""
         self.power = ArmPower.of(cycle.plant)
         """Power of an arm that has one."""
@@ -155,7 +155,7 @@ class MotionControl:
 
     @property
     def runtime(self) -> RuntimeState:
-        """Whether something moves; a paused motion may still be slowing."""
+        """Runtime state; a paused motion counts as pausing while it slows down."""
         if self.activity is Activity.PAUSED and self.motions.speed > 0.0 and not self.cycle.mode.at_rest:
             return RuntimeState.PAUSING
         return RUNTIME.get(self.activity, RuntimeState.STOPPED)
@@ -270,7 +270,7 @@ class MotionControl:
         if target is None:
             return
         self.activity = target
-        plan = None if self.cycle.mode.at_rest else self.outlook.stop(deceleration)
+        plan = None if self.cycle.mode.at_rest else self.stopper.stop(deceleration)
         if plan is not None and plan.limited:
             kept = "the motion's own" if plan.acceleration is None else f"{plan.acceleration:.3g} rad/s²"
             why = f"{why}; deceleration is {kept}, limited from {deceleration:.3g}"
@@ -336,7 +336,7 @@ class MotionControl:
 
     @property
     def steady(self) -> bool:
-        """Whether the target has been at rest for half a second since the arm was placed."""
+        """True if the target has rested for half a second since the arm was placed."""
         return min(self._still, len(self.past)) >= STEADY
 
     def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:

@@ -25,7 +25,7 @@ class Monitor(ABC):
     """When it looks: in every tick, while the drives hold the arm, or while no motion gives way to forces either."""
 
     awake = True
-    """Whether it looks in ticks in which the arm measures no force."""
+    """False to skip ticks in which the arm measures no force."""
 
     @abstractmethod
     def look(self, sample: Sample) -> Finding | None:

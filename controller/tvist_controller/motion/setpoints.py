@@ -32,6 +32,7 @@ class Setpoints:
         """The present stream."""
         self._heard = 0.0
         self._refused: str | None = None
+        """Why the latest set-point was rejected, to be reported if no valid one follows."""
         self._ended = 0, 0, 0
 
     def begin(self, stream: SetpointStream, now: float) -> None:
@@ -41,22 +42,18 @@ class Setpoints:
     def take(self, setpoint: Setpoint | Unreadable, now: float) -> bool:
         """Take a set-point of the client in control, and return whether the stream accepts it."""
         if isinstance(setpoint, Unreadable):
-            self.refuse(setpoint.why)
+            self._refused = setpoint.why
             return False
         try:
             check_joints(setpoint.q, self._description)
         except RefusalError as refusal:
-            self.refuse(refusal.reply.why)
+            self._refused = refusal.reply.why
             return False
         if self.stream is None:
             return False
         self._heard, self._refused = now, None
         self.stream.offer(setpoint.sequence, np.array(setpoint.q, dtype=float))
         return True
-
-    def refuse(self, why: str) -> None:
-        """Remember why a set-point was rejected, to be reported if no valid one follows."""
-        self._refused = why
 
     @property
     def silent_at(self) -> float:

@@ -31,7 +31,7 @@ class MotionRecord:
     stop: int
     """Number of ticks until the commands rested."""
     whole: bool
-    """Whether it went as planned: shaped from rest to rest, without stop, stream or bypass."""
+    """True if it went as planned: shaped from rest to rest, without a stop, a stream or a bypass of the filter."""
     beliefs: FilterState
     """What the controller took the arm for, and shaped with."""
 
@@ -167,7 +167,7 @@ class Experience:
                 if lesson is not None:
                     plan = None if self._plan is None else self._plan(lesson, motion.beliefs)
                     learnt.append(Taught(motion.beliefs, lesson, plan))
-            except Exception as error:  # noqa: BLE001  a robot goes on without the lesson, and says so
+            except Exception as error:  # noqa: BLE001  the robot goes on without the lesson, and `raised` reports it
                 self._raised.append(error)
 
         self._under_way.append((self._later(study), learnt))

@@ -147,7 +147,7 @@ class SafetyControl:
             stop = brake(cycle.description, cycle.plant.payload, cycle.newest, PERIOD)
             way = float(np.abs(stop.end - cycle.position).max())
             plan = StopPlan(None, None, limited=False, duration=stop.duration, way=way)
-            motion.outlook.brake(stop)
+            motion.stopper.brake(stop)
         motion.tell_end(plan, why, None, "safety_stop", 0)
 
     def unlock(self) -> None:

@@ -1,7 +1,8 @@
 """Functions for digital and analogue inputs and outputs, registers and flags."""
 
 from collections.abc import Callable
-from typing import Annotated
+from functools import partial
+from typing import Annotated, Literal
 
 from tvist_controller.instruments.peripherals import MAX_INTEGER, MIN_INTEGER
 from tvist_controller.programs.arguments import Bit, Flag, Number, Share, either, integer, shown, whole
@@ -35,23 +36,23 @@ FlagPlace = Annotated[int, whole(0, FLAGS - 1)]
 def _register(what: str, place: object, bank: Bank) -> Callable[[Family, int], bool | float]:
     def get(self: Family, address: int) -> bool | float:
         registers = self._peripherals
-        return registers.bit(bank, address) if bank.endswith("bit") else registers.doubles(bank)[address]
+        if bank.endswith("bit"):
+            return registers.bit(bank, address)
+        return registers.integers(bank)[address] if bank.endswith("int") else registers.doubles(bank)[address]
 
     return described(get, what, address=place)
 
 
-def _input(what: str, place: object) -> Callable[[Family, int], bool]:
+def _terminal(
+    bits: Literal["digital_inputs", "digital_outputs"], what: str, place: object
+) -> Callable[[Family, int], bool]:
     def get(self: Family, n: int) -> bool:
-        return bool(self._peripherals.digital_inputs >> n & 1)
+        return bool(getattr(self._peripherals, bits) >> n & 1)
 
     return described(get, what, n=place)
 
 
-def _output(what: str, place: object) -> Callable[[Family, int], bool]:
-    def get(self: Family, n: int) -> bool:
-        return bool(self._peripherals.digital_outputs >> n & 1)
-
-    return described(get, what, n=place)
+_input, _output = partial(_terminal, "digital_inputs"), partial(_terminal, "digital_outputs")
 
 
 def _sets(what: str, place: object) -> Callable[[Family, int, Flag], None]:
