@@ -155,9 +155,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """MCAP file to record into. It must not exist, unless --keep is given. With several robots, each records into a
     file of its own, FILE-NAME.mcap."""
     keep: str | None = None
-    """Let the recording keep the last 90s, 10min or 2h, and at most twice as much, and forget what was before [it keeps
-    all]. At a start, what an earlier run has left in FILE.mcap becomes FILE.earlier-1.mcap, FILE.earlier-2.mcap and so
-    on; the five latest stay."""
+    """Let the recording keep the last 90s, 10min or 2h, and at most a quarter more, and forget what was before [it
+    keeps all]. It then consists of complete files, FILE-1-0001.mcap, FILE-1-0002.mcap and so on, at the next start
+    FILE-2-0001.mcap and so on; those of the five latest runs before stay."""
     dump: str | None = None
     """Folder to save the last second before a failure of the simulated arm to [the system's temporary folder]."""
     truth: bool = False

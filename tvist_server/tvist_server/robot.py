@@ -277,8 +277,7 @@ class ServedRobot:
     def discard_recording(self) -> None:
         """Remove a recording that never began: the empty file would only block the next attempt."""
         if self.recorder is not None:
-            self.recorder.close()
-            self.recorder.path.unlink(missing_ok=True)
+            self.recorder.discard()
 
     def _hear(self, news: SocketNews) -> None:
         """Tell the controller what happened to a socket of a program."""

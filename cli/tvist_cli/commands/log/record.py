@@ -30,8 +30,8 @@ def record(
         namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         seconds: Stop this many seconds after the first state.
-        keep: Keep the last 90s, 10min or 2h, and at most twice as much, and forget what was before [keep all]. What is
-            in FILE already gets another name, as with tvist serve --keep.
+        keep: Keep the last 90s, 10min or 2h, and at most a quarter more, and forget what was before [keep all]. FILE
+            then names several files, as with tvist serve --keep.
         json: Print one JSON object at the end.
     """
     if seconds is not None and seconds <= 0.0:
