@@ -16,6 +16,7 @@ from tvist_protocol.programs import ProgramLoad
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.values import Payload
 from tvist_server.gateways.ur.interfaces import UrInterfaces
+from tvist_server.gateways.ur.later import Later
 
 from .desks import EVERYWHERE, Desk, until
 
@@ -40,17 +41,25 @@ class FakeControl:
         self.left = 0
         self._waiting = None
 
-    def change(self, command, then):
-        self.ask(command(TOKEN), then)
+    def change(self, command):
+        return self.ask(command(TOKEN))
 
-    def ask(self, command, then):
+    def ask(self, command):
         self.commands.append(command)
+        later = Later()
         if isinstance(command, ProgramLoad) and command.name == "nothing.urp":
-            then(Refused(code="out_of_range", where="name", why="there is no nothing.urp"))
+            later.come(Refused(code="out_of_range", where="name", why="there is no nothing.urp"))
         elif self._waiting is None:
-            then(self.reply)
+            later.come(self.reply)
         else:
-            self._waiting.append(then)
+            self._waiting.append(later)
+        return later
+
+    def asked(self, reply):
+        """A reply that comes at once."""
+        later = Later()
+        later.come(reply)
+        return later
 
     def refuse(self, code="no_control", why="another client has control: 'a'", where="", limit=None):
         self.reply = Refused(code=code, where=where, why=why, limit=limit)
@@ -61,8 +70,8 @@ class FakeControl:
     def answer(self, reply=None, *, keep=False):
         """Give every answer that is due; to one that asks again in it, too, unless further ones are kept back."""
         waiting, self._waiting = self._waiting or [], [] if keep else None
-        for then in waiting:
-            then(reply or self.reply)
+        for later in waiting:
+            later.come(reply or self.reply)
 
     def lasting(self):
         return self

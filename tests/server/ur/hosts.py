@@ -1,21 +1,38 @@
 """A robot as its interfaces see it, with programs."""
 
 from tvist_server.gateways.ur.external_control import ExternalControl
+from tvist_server.gateways.ur.later import begin
 from tvist_server.gateways.ur.programs import Programs
 from tvist_server.gateways.ur.robot import NO_MODE
 
 from .decoders import message
 
 
-def nobody(host, then):
+async def nobody(_host):
     """A machine that does not answer."""
-    del host
-    then(None)
+
+
+async def here(read):
+    """A file that is read at once."""
+    return read()
+
+
+def external(folder=None, fetch=nobody):
+    return ExternalControl(folder, fetch, here)
+
+
+def hear(request, answers):
+    """Begin a request, whose answer is added when it has come."""
+
+    async def hearing():
+        answers.append(await request)
+
+    begin(hearing())
 
 
 def host(robot):
     """The fixture `robot`, with programs and what else the text interfaces share."""
-    robot.programs = Programs(robot, ExternalControl(None, nobody))
+    robot.programs = Programs(robot, external())
     robot.operational_mode = NO_MODE
     return robot
 

@@ -11,11 +11,9 @@ from tests.controller.robots import UR5E
 from tvist_protocol import commands as c
 from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
-from tvist_server.gateways.ur.dashboard.commands import COMMANDS, find
-from tvist_server.gateways.ur.dashboard.lines import LONGEST
-from tvist_server.gateways.ur.dashboard.session import MAX_WAITING, DashboardSession
+from tvist_server.gateways.ur.dashboard import COMMANDS, LONGEST, DashboardSession, find
 
-from .conftest import io
+from .conftest import FakeControl, io
 from .decoders import message
 from .hosts import host, told
 
@@ -335,15 +333,14 @@ def test_answers_come_in_the_order_of_the_questions(client, control):
     assert heard[2:] == ["Powering off", "Robotmode: RUNNING"]
 
 
-def test_a_second_reply_changes_nothing(desk):
-    kept = []
-    control = SimpleNamespace(held_by_other=False, change=lambda _, then: kept.append(then))
-    client = Client(desk, control)
+def test_a_second_reply_changes_nothing(client, control):
+    control.wait()
     client.send("power on\npower off\n")
-    kept[0](Done())
-    kept[0](Done())
+    (first,) = control._waiting
+    first.come(Done())
+    first.come(Done())
     assert client.heard() == ["Powering on"]
-    kept[1](Done())
+    control._waiting[1].come(Done())
     assert client.heard() == ["Powering off"]
 
 
@@ -365,23 +362,19 @@ def test_a_reply_after_the_client_has_gone_is_nobodys(client, control):
     assert client.heard() == []
 
 
-def test_too_many_waiting_commands_are_declined_in_their_turn(client, control):
+def test_commands_that_wait_are_counted_and_all_answered_in_their_turn(client, control):
+    """A connection that has many reads no more."""
     control.wait()
-    count = MAX_WAITING + 50
-    client.send("power on\n" + "version\n" * count + "robotmode\n")
-    assert len(client.session._waiting) == MAX_WAITING
+    client.send("power on\n" + "version\n" * 1000 + "robotmode\n")
+    assert client.session.waiting == 1002
     control.answer()
     heard = client.heard()
-    assert len(heard) == count + 2
-    declined = [line for line in heard if line.startswith("could not understand")]
-    assert len(declined) == 51
-    assert heard[-51:] == declined
-    assert client.ask("robotmode") == "Robotmode: RUNNING"
+    assert (len(heard), heard[-1], client.session.waiting) == (1002, "Robotmode: RUNNING", 0)
 
 
 def test_a_line_that_is_too_long_is_one_line(client):
     client.session.receive(b"x" * (3 * LONGEST))
-    assert len(client.session._lines._rest) <= LONGEST
+    assert len(client.session._lines.rest) <= LONGEST
     first, second = client.send("y\nrobotmode\n")
     assert first.startswith("could not understand: 'xxx")
     assert len(first) < 300
@@ -414,12 +407,9 @@ def test_every_line_is_answered_with_one_line(lines, data):
     said = {"tell": message, "report_refusal": str}
     robot = host(SimpleNamespace(description=UR5E, name="a", serial="20245500001", latest=None, **said))
     replies = st.sampled_from([Done(), Accepted(id=1), Refused(code="no_control", where="", why="x")])
-    control = SimpleNamespace(
-        peer="x",
-        held_by_other=data.draw(st.booleans()),
-        change=lambda _, then: then(data.draw(replies)),
-        ask=lambda _, then: then(Done()),
-    )
+    control = FakeControl()
+    control.held_by_other = data.draw(st.booleans())
+    control.change = lambda _: control.asked(data.draw(replies))
     client = Client(robot, control)
     stream = b"".join(line + b"\n" for line in lines)
     cut = data.draw(st.integers(0, len(stream)))

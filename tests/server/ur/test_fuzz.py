@@ -16,9 +16,7 @@ from tvist_controller.host import Host
 from tvist_controller.instruments.report import Sink
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_protocol.codec import encode
-from tvist_server.gateways.ur.dashboard.commands import COMMANDS
-from tvist_server.gateways.ur.dashboard.session import DashboardSession
-from tvist_server.gateways.ur.external_control import ExternalControl
+from tvist_server.gateways.ur.dashboard import COMMANDS, DashboardSession
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.realtime import RealtimeSession
@@ -28,7 +26,7 @@ from tvist_server.gateways.ur.rtde.session import RtdeSession
 
 from . import rtde_client
 from .decoders import split
-from .hosts import nobody
+from .hosts import external
 
 INTERFACES = {
     "rtde": RtdeSession,
@@ -52,9 +50,7 @@ class House(Sink):
         self.host = Host(self.controller, self)
         self.instruments = Instruments(UR5E)
         self.boards = defaultdict(Board)
-        self.robot = UrRobot(
-            UR5E, "ur5e", self.tell, ExternalControl(None, nobody), lambda _: None, lambda _: None
-        )
+        self.robot = UrRobot(UR5E, "ur5e", self.tell, external(), lambda _: None, lambda _: None)
         self.leases = {host: HostLease(self, host, self.due_append) for host in ("127.0.0.1", "127.0.0.2")}
         self.due = deque()
         self.clients = []
@@ -137,7 +133,6 @@ class Client:
     def go(self):
         self.house.clients.remove(self)
         self.session.closed()
-        self.control.leave()
 
 
 # ---------------------------------------------------------------------- what is sent

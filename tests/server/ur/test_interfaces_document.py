@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tvist_server.gateways.ur.dashboard.commands import COMMANDS
+from tvist_server.gateways.ur.dashboard import COMMANDS
 from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.gateways.ur.realtime import LAYOUT
 

@@ -6,8 +6,7 @@ import struct
 
 import pytest
 
-from tvist_server.gateways.ur.connection import UNREAD_FOR
-from tvist_server.gateways.ur.places import MOST
+from tvist_server.gateways.ur.connection import MOST, UNREAD_FOR
 
 from .desks import PATIENCE, connect, lines, until
 

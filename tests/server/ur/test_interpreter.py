@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 
 from tvist_protocol.programs import Interpreter, ProgramInterpret, ProgramSkip
 from tvist_protocol.replies import Accepted, Done
-from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.interpreter import LONGEST, InterpreterSession
 from tvist_server.gateways.ur.programs import Programs
 
 from .conftest import FakeControl, io
 from .desks import PATIENCE, connect, lines, until
-from .hosts import nobody
+from .hosts import external
 
 TOKEN = "the-token"
 
@@ -33,7 +32,7 @@ class Client:
 
 @pytest.fixture
 def robot():
-    return SimpleNamespace(programs=Programs(None, ExternalControl(None, nobody)))
+    return SimpleNamespace(programs=Programs(None, external()))
 
 
 @pytest.fixture
@@ -134,7 +133,7 @@ def test_statements_are_passed_on_one_after_the_other(client, control):
 
 @given(data=st.binary(max_size=300), cut=st.integers(0, 300))
 def test_no_bytes_break_it(data, cut):
-    client = Client(SimpleNamespace(programs=Programs(None, ExternalControl(None, nobody))), FakeControl())
+    client = Client(SimpleNamespace(programs=Programs(None, external())), FakeControl())
     client.session.receive(data[:cut])
     client.session.receive(data[cut:])
     client.session.receive(b"\nstateunexecuted\n")

@@ -8,6 +8,8 @@ from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 
+from .hosts import hear
+
 
 class Desk:
     """A controller whose replies come when `answer` is called; other clients reach it directly."""
@@ -55,11 +57,11 @@ def test_control_is_taken_with_the_first_change_and_given_back_with_the_last_con
     desk, replies = Desk(), []
     host = lease(desk)
     first, second, watcher = (ConnectionControl(host) for _ in range(3))
-    watcher.ask(c.Stop(), replies.append)
+    hear(watcher.ask(c.Stop()), replies)
     desk.answer()
     assert desk.holder() is None
     for connection in (first, first, second):
-        connection.change(slow(0.5), replies.append)
+        hear(connection.change(slow(0.5)), replies)
     desk.answer()
     assert replies == [Done()] * 4
     assert desk.kinds.count("TakeControl") == 1
@@ -78,7 +80,7 @@ def test_commands_sent_while_control_is_being_taken_go_in_their_order():
     host = lease(desk)
     connection = ConnectionControl(host)
     for fraction in (0.1, 0.2, 0.3):
-        connection.change(slow(fraction), replies.append)
+        hear(connection.change(slow(fraction)), replies)
     desk.answer()
     assert desk.kinds == ["TakeControl", "SetSpeed", "SetSpeed", "SetSpeed"]
     assert desk.controller.motion.motions.wanted_speed == 0.3
@@ -90,12 +92,12 @@ def test_where_somebody_else_has_control_the_refusal_comes_back_each_time():
     token = desk.take("anna").token
     assert connection.held_by_other
     for _ in range(2):
-        connection.change(slow(0.5), replies.append)
+        hear(connection.change(slow(0.5)), replies)
         desk.answer()
     assert [(reply.code, "anna" in reply.why) for reply in replies] == [("no_control", True)] * 2
     desk.controller.receive(c.ReleaseControl(token=token))
     assert not connection.held_by_other
-    connection.change(slow(0.5), replies.append)
+    hear(connection.change(slow(0.5)), replies)
     desk.answer()
     assert replies[-1] == Done()
 
@@ -105,7 +107,7 @@ def test_who_was_refused_is_not_kept_in_mind():
     desk.take("anna")
     for last in range(10):
         connection = ConnectionControl(lease(desk, f"127.0.0.{last}"))
-        connection.change(slow(0.5), replies.append)
+        hear(connection.change(slow(0.5)), replies)
         desk.answer()
         connection.leave()
     assert len(replies) == 10
@@ -115,9 +117,9 @@ def test_who_was_refused_is_not_kept_in_mind():
 def test_another_host_is_somebody_else():
     desk, replies = Desk(), []
     here, there = (ConnectionControl(lease(desk, host)) for host in ("127.0.0.1", "10.0.0.2"))
-    here.change(slow(0.5), replies.append)
+    hear(here.change(slow(0.5)), replies)
     desk.answer()
-    there.change(slow(0.5), replies.append)
+    hear(there.change(slow(0.5)), replies)
     desk.answer()
     assert replies[0] == Done()
     assert isinstance(replies[1], Refused)
@@ -127,10 +129,10 @@ def test_another_host_is_somebody_else():
 def test_control_that_was_lost_is_taken_again():
     desk, replies = Desk(), []
     connection = ConnectionControl(lease(desk))
-    connection.change(slow(0.5), replies.append)
+    hear(connection.change(slow(0.5)), replies)
     desk.answer()
     desk.controller.session.release()
-    connection.change(slow(0.4), replies.append)
+    hear(connection.change(slow(0.4)), replies)
     desk.answer()
     assert replies == [Done(), Done()]
     assert desk.kinds == ["TakeControl", "SetSpeed", "SetSpeed", "TakeControl", "SetSpeed"]
@@ -140,7 +142,7 @@ def test_control_that_was_lost_is_taken_again():
 def test_control_that_comes_when_everybody_has_gone_is_given_back():
     desk = Desk()
     connection = ConnectionControl(lease(desk))
-    connection.change(slow(0.5), lambda reply: None)  # noqa: ARG005
+    connection.change(slow(0.5))
     connection.leave()
     desk.answer()
     assert desk.holder() is None
@@ -151,7 +153,7 @@ def test_a_lease_is_kept_alive_while_there_is_one():
     desk = Desk()
     host = lease(desk)
     host.keep_alive()
-    ConnectionControl(host).change(slow(0.5), lambda reply: None)  # noqa: ARG005
+    ConnectionControl(host).change(slow(0.5))
     desk.answer()
     host.keep_alive()
     desk.answer()
@@ -165,7 +167,7 @@ def test_control_that_somebody_holds_for_a_host_is_shared_and_not_given_back_wit
     host.adopt(token, "the program")
     connection = ConnectionControl(host)
     assert not connection.held_by_other
-    connection.change(slow(0.5), replies.append)
+    hear(connection.change(slow(0.5)), replies)
     desk.answer()
     assert replies == [Done()]
     assert "TakeControl" not in desk.kinds

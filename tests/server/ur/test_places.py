@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_server.gateways.ur.connection import _is_loopback
-from tvist_server.gateways.ur.places import KEPT, MOST, Places
+from tvist_server.gateways.ur.connection import KEPT, MOST, ConnectionLimit, _is_loopback
 
 
 @dataclass(eq=False)
@@ -17,12 +16,12 @@ class Client:
     peer: str = "x"
     gone: bool = False
 
-    def cut_off(self):
+    def disconnect(self):
         self.gone = True
 
 
 def places(*clients, said=None):
-    made = Places(lambda: 100.0, (said if said is not None else []).append)
+    made = ConnectionLimit(lambda: 100.0, (said if said is not None else []).append)
     made.taken.update(clients)
     return made
 

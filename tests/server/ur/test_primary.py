@@ -20,6 +20,7 @@ from tvist_server.gateways.ur.primary.packages import robot_state, robot_type
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Intake
 from tvist_server.gateways.ur.primary.session import PrimarySession
 
+from .conftest import FakeControl
 from .decoders import Cursor, message, parts, split
 from .hosts import host, told
 
@@ -564,14 +565,9 @@ def test_no_bytes_break_a_session(data):
     reported = []
     said = {"tell": message, "report": reported.append, "report_refusal": reported.append}
     robot = host(SimpleNamespace(description=UR5E, latest=None, **said))
-    control = SimpleNamespace(
-        peer="x",
-        held_by_other=True,
-        lasting=lambda: control,
-        leave=lambda: None,
-        ask=lambda _, then: then(Refused(code="malformed", where="", why="")),
-        change=lambda _, then: then(Refused(code="no_control", where="", why="")),
-    )
+    control = FakeControl()
+    control.held_by_other = True
+    control.refuse()
     interface = PrimarySession(robot, control, message)
     interface.opened()
     interface.receive(data)

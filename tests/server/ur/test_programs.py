@@ -18,24 +18,14 @@ from tvist_protocol.stream import Event
 
 from .conftest import FakeControl, io
 from .decoders import message
-from .hosts import host, told
+from .hosts import hear, host, told
 
 STARTED, STOPPED = (7, "PROGRAM_XXX_STARTED"), (7, "PROGRAM_XXX_STOPPED")
 
 
-class Answers:
-    """Hears whether it was done."""
-
-    def __init__(self):
-        self.heard = []
-
-    def __call__(self, done):
-        self.heard.append(done)
-
-
 @pytest.fixture
 def answers():
-    return Answers()
+    return []
 
 
 @pytest.fixture
@@ -45,7 +35,7 @@ def programs(robot):
 
 def load(programs, path, control):
     heard = []
-    programs.load(path, control, heard.append)
+    hear(programs.load(path, control), heard)
     return heard == [None]
 
 
@@ -55,14 +45,14 @@ def titles(robot):
 
 def test_what_is_asked_for_reaches_the_controller_as_a_command(programs, control, answers):
     assert load(programs, "/ursim/programs/paper.urp", control)
-    programs.play(control, answers)
-    programs.pause(control, answers)
-    programs.play(control, answers)
-    programs.stop(control, answers)
+    hear(programs.play(control), answers)
+    hear(programs.pause(control), answers)
+    hear(programs.play(control), answers)
+    hear(programs.stop(control), answers)
     kinds = [type(command) for command in control.commands]
     assert kinds == [ProgramLoad, ProgramPlay, ProgramPause, ProgramPlay, ProgramStop]
     assert control.of(ProgramLoad)[0].name == "paper.urp"
-    assert answers.heard == [True] * 4
+    assert answers == [True] * 4
 
 
 def started(name, **fields):
@@ -85,9 +75,9 @@ def test_clients_are_told_that_a_program_has_started_and_that_it_has_stopped(pro
 
 def test_the_state_is_the_controllers(programs, control, answers):
     load(programs, "paper.urp", control)
-    programs.play(control, answers)
+    hear(programs.play(control), answers)
     assert programs.playing
-    programs.pause(control, answers)
+    hear(programs.pause(control), answers)
     assert programs.state == "PAUSED"
     programs.io(io(program="paper.urp", program_state="PLAYING", program_line=1))
     assert programs.playing
@@ -133,7 +123,7 @@ def test_folders_do_not_matter(programs, control):
 
 
 def test_a_file_that_is_not_there_and_a_load_that_is_refused_are_told_apart(robot, control):
-    from tvist_server.gateways.ur.dashboard.session import DashboardSession
+    from tvist_server.gateways.ur.dashboard import DashboardSession
 
     said = []
     dashboard = DashboardSession(host(robot), control, said.append)
@@ -166,7 +156,7 @@ def test_what_programs_write_and_show_is_told_once_to_all_clients(programs, robo
 
 def run(programs, control, text="def f():\nend\n", *, secondary=False):
     heard = []
-    programs.run(text, control, heard.append, secondary=secondary)
+    hear(programs.run(text, control, secondary=secondary), heard)
     return heard
 
 
@@ -217,29 +207,29 @@ def test_a_script_that_is_refused_for_another_reason_gives_control_back(programs
 
 
 def test_a_popup_can_be_closed_by_anybody(programs, control, answers):
-    programs.close_popup(control, answers)
+    hear(programs.close_popup(control), answers)
     assert control.commands == [ProgramClosePopup()]
-    assert answers.heard == [True]
+    assert answers == [True]
 
 
 def test_without_control_nothing_is_asked_for_but_a_stop(programs, control, answers):
     load(programs, "wait_program.urp", control)
     control.held_by_other = True
-    programs.play(control, answers)
-    programs.pause(control, answers)
-    programs.stop(control, answers)
-    assert answers.heard == [False, False, True]
+    hear(programs.play(control), answers)
+    hear(programs.pause(control), answers)
+    hear(programs.stop(control), answers)
+    assert answers == [False, False, True]
     assert [type(command) for command in control.commands] == [ProgramLoad, ProgramStop]
 
 
 def test_what_the_controller_refuses_has_failed(programs, robot, control, answers):
     load(programs, "wait_program.urp", control)
     control.refuse("wrong_mode")
-    programs.play(control, answers)
-    programs.pause(control, answers)
-    programs.stop(control, answers)
+    hear(programs.play(control), answers)
+    hear(programs.pause(control), answers)
+    hear(programs.stop(control), answers)
     assert not load(programs, "Q1.urp", control)
-    assert answers.heard == [False] * 3
+    assert answers == [False] * 3
     assert (programs.name, programs.state) == ("wait_program.urp", "STOPPED")
     assert not robot.told
     assert control.left == 1
@@ -247,11 +237,11 @@ def test_what_the_controller_refuses_has_failed(programs, robot, control, answer
 
 def test_control_is_held_as_long_as_the_program_plays(programs, control, answers):
     load(programs, "Q2.urp", control)
-    programs.play(control, answers)
-    programs.pause(control, answers)
+    hear(programs.play(control), answers)
+    hear(programs.pause(control), answers)
     assert control.left == 0
     other = FakeControl()
-    programs.play(other, answers)
+    hear(programs.play(other), answers)
     assert (control.left, other.left) == (1, 0)
     programs.io(io(program="Q2.urp"))
     assert (control.left, other.left) == (1, 1)
@@ -270,16 +260,16 @@ def test_whatever_happens_each_request_is_answered_once(steps):
         tell = staticmethod(message)
 
     programs = host(Bare()).programs
-    control, answers, asked = FakeControl(), Answers(), 0
+    control, answers, asked = FakeControl(), [], 0
     for step in steps:
         if step == "load":
-            programs.load("paper.urp", control, lambda _: None)
+            hear(programs.load("paper.urp", control), [])
         elif step == "run":
             asked += 1
-            programs.run("def f():\nend\n", control, answers, secondary=False)
+            hear(programs.run("def f():\nend\n", control, secondary=False), answers)
         elif step in {"play", "pause", "stop"}:
             asked += 1
-            getattr(programs, step)(control, answers)
+            hear(getattr(programs, step)(control), answers)
         elif step == "ended":
             programs.io(io(program="paper.urp"))
         elif step == "keep":
@@ -289,8 +279,8 @@ def test_whatever_happens_each_request_is_answered_once(steps):
         else:
             control.reply = Refused(code="no_control", where="", why="") if step == "refuse" else Done()
     control.answer()
-    assert len(answers.heard) == asked
+    assert len(answers) == asked
     control.reply = Done()
-    programs.stop(control, answers)
+    hear(programs.stop(control), answers)
     assert programs.state == "STOPPED"
     assert programs._control is None

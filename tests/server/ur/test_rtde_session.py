@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tvist_protocol.commands import SetSpeed
 from tvist_protocol.io import Registers, SetIo, SetRegisters
 from tvist_server.gateways.ur import version
-from tvist_server.gateways.ur.input_owners import InputOwners
+from tvist_server.gateways.ur.robot import InputOwners
 from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.inputs import matching
 from tvist_server.gateways.ur.rtde.session import RtdeSession, ticks_between

@@ -1,48 +1,19 @@
 """Common parts of UR's interfaces. A session is one client's connection to one interface, without its socket."""
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable
-from typing import Protocol
+from typing import Generic, TypeVar
 
 from tvist_controller.instruments.snapshot import Snapshot
-from tvist_protocol.commands import Command
-from tvist_protocol.replies import Reply
 from tvist_protocol.stream import Event
+from tvist_server.gateways.ur.later import begin
+from tvist_server.gateways.ur.lease import ConnectionControl
+from tvist_server.gateways.ur.robot import UrRobot
 
 Send = Callable[[bytes], None]
 """Sends an answer; answers are never dropped."""
-Then = Callable[[Reply], None]
-"""Takes the controller's reply to a command, at a later time."""
-
-
-class ControllerAccess(Protocol):
-    """How one connection sends commands to the controller; `change` first takes control if it is free."""
-
-    peer: str
-    """The client and its interface, as a phrase for messages to people."""
-    host: str
-    """IP address of the client."""
-
-    def change(self, command: Callable[[str], Command], then: Then) -> None:
-        """Send a command that needs control; take control first if no client has it.
-
-        Args:
-            command: Creates the command from the token of the lease.
-            then: Called exactly once; with a refusal if another client has control.
-        """
-
-    def ask(self, command: Command, then: Then) -> None:
-        """Send a command that does not need control."""
-
-    def lasting(self) -> "ControllerAccess":
-        """Return another access for the same host, which lasts until its own `leave`, not only for the connection."""
-
-    def leave(self) -> None:
-        """Give back control, if this access held it."""
-
-    @property
-    def held_by_other(self) -> bool:
-        """Whether another client is known to have control, so that commands that change something are refused."""
+Item = TypeVar("Item")
 
 
 class PortSession(ABC):
@@ -52,19 +23,19 @@ class PortSession(ABC):
     """
 
     over = False
-    """Whether the client has asked to end the connection, which is then closed."""
+    """Whether the client has asked to end the connection, which is then closed; or it is closed."""
     client_begins = False
     """Whether nothing is sent to a client that requests nothing, so that it may be disconnected to make room."""
-
-    @property
-    def served(self) -> bool:
-        """Whether the client is being sent what it requested; it may then be silent for any time, but has to read."""
-        return False
+    served = False
+    """Whether the client is being sent what it requested; it may then be silent for any time, but has to read."""
 
     @property
     def waiting(self) -> int:
-        """Number of received requests that wait for others to be carried out; many of them pause reading."""
+        """Number of received requests that are not answered; many of them pause reading."""
         return 0
+
+    def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
+        self._robot, self._control, self._send = robot, control, send
 
     def opened(self) -> None:  # noqa: B027  not every session has to
         """Send the greeting, if any, to a client that has just connected."""
@@ -80,5 +51,78 @@ class PortSession(ABC):
     def event(self, event: Event) -> None:  # noqa: B027  not every session has to
         """Handle an event of the robot."""
 
-    def closed(self) -> None:  # noqa: B027  not every session has to
+    def closed(self) -> None:
         """Give back what the connection held, after it was closed."""
+        self.over = True
+        self._control.leave()
+
+
+class InTurnSession(PortSession, Generic[Item]):
+    """Does what its client sends one after the other: the next begins when the previous one is done.
+
+    What has arrived is done even if the client disconnects, which keeps its control until then.
+    """
+
+    def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
+        super().__init__(robot, control, send)
+        self._items = deque[Item]()
+        self._busy = False
+        """Whether something is being done."""
+
+    @property
+    def waiting(self) -> int:
+        return len(self._items) + self._busy
+
+    @abstractmethod
+    async def _do(self, item: Item) -> None:
+        """Do one thing."""
+
+    def _add(self, item: Item, *, stop: bool = False) -> None:
+        """Do something in its turn; if it stops the arm and others are before it, stop the arm also at once."""
+        if stop and self._busy:
+            begin(self._robot.programs.stop(self._control))
+        self._items.append(item)
+        if not self._busy:
+            begin(self._work())
+
+    async def _work(self) -> None:
+        self._busy = True
+        try:
+            while self._items:
+                await self._do(self._items.popleft())
+        finally:
+            self._busy = False
+        if self.over:
+            self._control.leave()
+
+    def closed(self) -> None:
+        self.over = True
+        if not self._busy:
+            self._control.leave()
+
+
+class Lines:
+    """Cuts a client's stream, which may be split anywhere, into lines.
+
+    Args:
+        longest: Bytes that are kept of a line.
+    """
+
+    def __init__(self, longest: int) -> None:
+        self._longest = longest
+        self.rest = bytearray()
+        """Beginning of an incomplete line."""
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Take a piece and return the lines that it completes, without their line feeds."""
+        lines: list[bytes] = []
+        *whole, rest = data.split(b"\n")
+        for piece in whole:
+            self._keep(piece)
+            lines.append(bytes(self.rest))
+            self.rest.clear()
+        self._keep(rest)
+        return lines
+
+    def _keep(self, piece: bytes) -> None:
+        self.rest += piece[: self._longest - len(self.rest)]

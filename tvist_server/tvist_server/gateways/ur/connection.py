@@ -1,4 +1,4 @@
-"""One client's socket, and the session behind it."""
+"""One client's socket with the session behind it, and how many clients may be connected."""
 
 import asyncio
 import contextlib
@@ -7,13 +7,12 @@ import logging
 import os
 import socket
 from collections.abc import Callable
-from typing import cast
+from typing import Final, cast
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
-from tvist_server.gateways.ur.places import Places
 
 log = logging.getLogger(__name__)
 
@@ -38,6 +37,13 @@ LAST_WORDS = 65_536
 UNREAD_FOR = 10.0
 """Time after which a client is disconnected, in real time, to which no sample of what it requested can be sent [s]."""
 
+MOST: Final = 256
+"""Largest number of connections to all interfaces of a robot together."""
+KEPT: Final = 8
+"""Number of places kept for clients on this machine, so that a local user can always connect."""
+SCARCE: Final = 0.9
+"""Share of the places above which each new client displaces another [-]."""
+
 MakeSession = Callable[[ConnectionControl, Send], PortSession]
 """Creates an interface's session from its access to the controller and the function that sends to the client."""
 
@@ -48,7 +54,7 @@ class Connection(asyncio.BufferedProtocol):
     Args:
         make: Creates its session.
         lease: Returns the lease of a host.
-        places: Places of the robot; the connection occupies one until it is closed.
+        limit: Limit of the robot, to which the connection counts until it is closed.
         lossless: Whether samples wait for a slow client, because a client advances time.
     """
 
@@ -56,13 +62,13 @@ class Connection(asyncio.BufferedProtocol):
         self,
         make: MakeSession,
         lease: Callable[[str], HostLease],
-        places: "Places[Connection]",
+        limit: "ConnectionLimit",
         *,
         lossless: bool,
     ) -> None:
         self._make = make
         self._lease = lease
-        self._places = places
+        self._limit = limit
         self._lossless = lossless
         self._most_unread = MAX_UNREAD_LOCKSTEP if lossless else MAX_UNREAD
         self._transport: asyncio.Transport | None = None
@@ -84,7 +90,7 @@ class Connection(asyncio.BufferedProtocol):
         stream = cast("asyncio.Transport", transport)
         (host, port), (own, own_port) = (stream.get_extra_info(end)[:2] for end in ("peername", "sockname"))
         self.peer = f"the client {host}:{port} of port {own_port}"
-        if not self._places.make_room(self.peer, local=host == own or _is_loopback(host)):
+        if not self._limit.make_room(self.peer, local=host == own or _is_loopback(host)):
             stream.abort()
             return
         self._transport = stream
@@ -93,7 +99,7 @@ class Connection(asyncio.BufferedProtocol):
             stream.set_write_buffer_limits(ANSWERS)
         self._control = ConnectionControl(self._lease(host), self._hear, self.peer)
         self.session = self._make(self._control, self.send)
-        self._places.taken.add(self)
+        self._limit.taken.add(self)
         self.heard = asyncio.get_running_loop().time()
         self._guarded(self.session.opened)
 
@@ -144,7 +150,7 @@ class Connection(asyncio.BufferedProtocol):
             left = _left_in(transport)
             self._guarded(lambda: session.receive(left))
         self.session = self._transport = None
-        self._places.taken.discard(self)
+        self._limit.taken.discard(self)
         if self.dropped:
             log.warning("a client of a UR interface read too slowly: %d samples were dropped", self.dropped)
         if session is not None:
@@ -152,7 +158,7 @@ class Connection(asyncio.BufferedProtocol):
                 session.closed()
             except Exception:
                 log.exception("a UR interface could not close a session")
-            self._control.leave()
+                self._control.leave()
 
     def send(self, data: bytes) -> None:
         """Send an answer; disconnect a client that leaves too many bytes unread."""
@@ -196,7 +202,7 @@ class Connection(asyncio.BufferedProtocol):
             self.dropped += 1
             if self.session is not None and self.session.served and now - self._took > UNREAD_FOR:
                 log.warning("%s was disconnected: it has not read for %.0f s", self.peer, UNREAD_FOR)
-                self.cut_off()
+                self.disconnect()
 
     def event(self, event: Event) -> None:
         """Pass an event to the session."""
@@ -210,7 +216,7 @@ class Connection(asyncio.BufferedProtocol):
         session = self.session
         return session is not None and session.client_begins and not session.served
 
-    def cut_off(self) -> None:
+    def disconnect(self) -> None:
         """Close the connection at once, even if the client has yet to read something."""
         if self._transport is not None:
             self._transport.abort()
@@ -228,6 +234,58 @@ class Connection(asyncio.BufferedProtocol):
             log.exception("a UR interface failed and disconnected its client")
             if self._transport is not None:
                 self._transport.abort()
+
+
+class ConnectionLimit:
+    """Decides which clients may connect.
+
+    When nine places of ten are taken, each new client displaces the dispensable client that has been silent for
+    longest. Dispensable are clients of the dashboard, and clients of RTDE that are not being served: RTDE serves a
+    client from its start to its pause, and during this time the client may only read. Clients that are being served
+    stay connected, and so do those that read from the other interfaces. A new client is turned away only if such
+    clients take all places, so a flood of new clients does not disturb those that are working.
+
+    Args:
+        now: Returns the time on the same clock as `Connection.heard` [s].
+        note: Takes a sentence for the server's console.
+        most: Largest number of connections.
+    """
+
+    def __init__(self, now: Callable[[], float], note: Callable[[str], None], most: int = MOST) -> None:
+        self.taken: set[Connection] = set()
+        """Clients that have a place; each adds and removes itself."""
+        self._now = now
+        self._note = note
+        self._most = most
+
+    def make_room(self, peer: str, *, local: bool) -> bool:
+        """Return whether a new client, on this machine or another, may connect; disconnect one for it if necessary."""
+        if len(self.taken) >= SCARCE * self._most:
+            self._send_one_away(peer)
+        kept = 0 if local else KEPT
+        if len(self.taken) < self._most - kept:
+            return True
+        self._note(
+            f"{peer} was refused: {len(self.taken)} of {self._most} connections are in use"
+            + (f", and {KEPT} are kept for this machine" if kept else "")
+        )
+        return False
+
+    def _send_one_away(self, newcomer: str) -> None:
+        silent = min(
+            (one for one in self.taken if one.dispensable),
+            key=lambda one: one.heard,
+            default=None,
+        )
+        if silent is None:
+            return
+        taken = len(self.taken)
+        silent.disconnect()
+        self.taken.discard(silent)
+        self._note(
+            f"{silent.peer}, silent for {self._now() - silent.heard:.0f} s, was closed to make room for {newcomer}: "
+            f"{taken} of {self._most} connections were in use"
+        )
 
 
 def _left_in(transport: asyncio.Transport) -> bytes:

@@ -1,6 +1,6 @@
 """Programs with a node External Control, which get a part of their text from the client that plays them."""
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from functools import partial
 from typing import Final
@@ -15,11 +15,10 @@ FILE: Final = "external_control.urp"
 """Program that consists of the node alone, which exists without a file."""
 ALONE: Final = program("external_control", EXTERNAL_CONTROL)
 
-Then = Callable[[str | None], None]
-Fetch = Callable[[str, Then], None]
-"""Asks a machine for its part of the program, and calls back with it; with None if it does not answer."""
-Aside = Callable[[Callable[[], str | None], Then], None]
-"""Reads a text beside the thread that calls it, which serves all clients, and calls back there."""
+Fetch = Callable[[str], Awaitable[str | None]]
+"""Asks a machine for its part of the program; returns None if it does not answer."""
+Aside = Callable[[Callable[[], str | None]], Awaitable[str | None]]
+"""Reads a text beside the thread that calls it, which serves all clients."""
 
 
 class ExternalControl:
@@ -31,13 +30,12 @@ class ExternalControl:
         aside: Reads the files of the folder.
     """
 
-    def __init__(self, folder: ProgramFolder | None, fetch: Fetch, aside: Aside | None = None) -> None:
-        self._folder, self._fetch = folder, fetch
-        self._aside = aside or (lambda read, then: then(read()))
+    def __init__(self, folder: ProgramFolder | None, fetch: Fetch, aside: Aside) -> None:
+        self._folder, self._fetch, self._aside = folder, fetch, aside
 
-    def find(self, name: str, then: Then) -> None:
-        """Call back with the text of a program that has to be completed; with None if there is none of this name."""
-        self._aside(partial(self._text, name), then)
+    async def find(self, name: str) -> str | None:
+        """Return the text of a program that has to be completed; None if there is none of this name."""
+        return await self._aside(partial(self._text, name))
 
     def _text(self, name: str) -> str | None:
         text = None
@@ -48,17 +46,8 @@ class ExternalControl:
             return ALONE
         return text if text is not None and EXTERNAL_CONTROL in text else None
 
-    def complete(self, text: str, host: str, then: Then) -> None:
-        """Complete the text of a program.
-
-        Args:
-            text: Its text.
-            host: Address of the machine that plays it.
-            then: Called once with the complete text; with None if the machine does not answer, or if it is too long.
-        """
-
-        def fetched(sent: str | None) -> None:
-            whole = None if sent is None else with_external_control(text, sent)
-            then(None if whole is None or len(whole) > MAX_SCRIPT else whole)
-
-        self._fetch(host, fetched)
+    async def complete(self, text: str, host: str) -> str | None:
+        """Complete a text for the machine that plays it; None if it does not answer, or the whole is too long."""
+        sent = await self._fetch(host)
+        whole = None if sent is None else with_external_control(text, sent)
+        return None if whole is None or len(whole) > MAX_SCRIPT else whole

@@ -4,6 +4,8 @@ from collections.abc import Callable
 
 from tvist_controller.cell.gripper import Requests
 from tvist_server.gateways.ur.base import PortSession, Send
+from tvist_server.gateways.ur.lease import ConnectionControl
+from tvist_server.gateways.ur.robot import UrRobot
 
 AskGripper = Callable[[bytes, Callable[[bytes], None]], None]
 """Has a request carried out between two ticks; the answer comes in another thread."""
@@ -14,32 +16,31 @@ class GripperSession(PortSession):
 
     Args:
         ask: Has a request carried out.
-        send: Sends data to the client.
-        soon: Has an answer handled in the interfaces' thread, where the client may go on sending.
+        soon: Schedules a call in the interfaces' thread.
     """
 
     client_begins = True
+    waiting = 0
 
-    def __init__(self, ask: AskGripper, send: Send, soon: Callable[[Callable[[], None]], None]) -> None:
-        self._ask, self._send, self._soon = ask, send, soon
+    def __init__(
+        self,
+        robot: UrRobot,
+        control: ConnectionControl,
+        send: Send,
+        ask: AskGripper,
+        soon: Callable[[Callable[[], None]], None],
+    ) -> None:
+        super().__init__(robot, control, send)
+        self._ask, self._soon = ask, soon
         self._requests = Requests()
-        self._unanswered = 0
-
-    @property
-    def waiting(self) -> int:
-        """Number of requests that have not been answered."""
-        return self._unanswered
 
     def receive(self, data: bytes) -> None:
         """Pass on the requests that are complete with these bytes."""
         for request in self._requests.cut(data):
-            self._unanswered += 1
+            self.waiting += 1
             self._ask(request, lambda answer: self._soon(lambda: self._answered(answer)))
 
     def _answered(self, answer: bytes) -> None:
-        self._unanswered -= 1
+        self.waiting -= 1
         if not self.over:
-            self._send(answer)
-
-    def closed(self) -> None:
-        self.over = True
+            self._control.hear(lambda: self._send(answer))

@@ -6,7 +6,7 @@ import logging
 import socket
 import threading
 from collections import defaultdict, deque
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Coroutine, Mapping, Sequence
 from functools import partial
 from weakref import WeakValueDictionary
 
@@ -18,17 +18,17 @@ from tvist_protocol.io import Io
 from tvist_protocol.stream import Event
 from tvist_server.gateways.base import Desk, Gateway, Message
 from tvist_server.gateways.ur.base import PortSession, Send
-from tvist_server.gateways.ur.connection import Connection
-from tvist_server.gateways.ur.dashboard.session import DashboardSession
+from tvist_server.gateways.ur.connection import Connection, ConnectionLimit
+from tvist_server.gateways.ur.dashboard import DashboardSession
 from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.gripper import AskGripper, GripperSession
 from tvist_server.gateways.ur.interpreter import InterpreterSession
+from tvist_server.gateways.ur.later import Later
 from tvist_server.gateways.ur.lease import ALIVE, ConnectionControl, HostLease
 from tvist_server.gateways.ur.listening import listen
 from tvist_server.gateways.ur.notices import Notices
-from tvist_server.gateways.ur.places import Places
 from tvist_server.gateways.ur.primary.session import PrimarySession
-from tvist_server.gateways.ur.program_request import ProgramRequests
+from tvist_server.gateways.ur.program_request import program_of
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.board import Board
@@ -89,8 +89,7 @@ class UrInterfaces(Gateway):
         self._scripts, self._refusals, self._coming_and_going = (
             Notices(lambda line: log.warning("robot %s: %s", name, line)) for _ in range(3)
         )
-        self._requests = ProgramRequests()
-        external = ExternalControl(programs, self._requests.fetch, self._aside)
+        external = ExternalControl(programs, self._fetch, self._aside)
         self.robot = UrRobot(description, name, self._tell, external, self._scripts.tell, self._refusals.tell)
         self.robot.inputs.take(reserved, self)
         self._instruments, self._boards = Instruments(description), defaultdict[int, Board](Board)
@@ -113,7 +112,7 @@ class UrInterfaces(Gateway):
         self._room = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._servers: list[asyncio.Server] = []
-        self._alive: asyncio.Task[None] | None = None
+        self._tasks = set[asyncio.Task[None]]()
         self._sockets: dict[InterfaceName, socket.socket] = {}
         try:
             for interface, port in ports.items():
@@ -147,27 +146,18 @@ class UrInterfaces(Gateway):
         # One event loop beside the tick thread serves all clients: a process of its own would be a millisecond late and
         # decode everything twice, and a thread for each client would compete with the tick (decision 12).
         self._loop = asyncio.get_running_loop()
-        places = Places[Connection](self._loop.time, self._coming_and_going.tell)
-        self._connections = places.taken
+        limit = ConnectionLimit(self._loop.time, self._coming_and_going.tell)
+        self._connections = limit.taken
         if self._io is not None:
             self.robot.programs.io(self._io)
         while self._early:
             self._see(self._early.popleft())
         self._look()
         for interface, bound in self._sockets.items():
-            self._servers.append(
-                await self._loop.create_server(
-                    partial(
-                        Connection,
-                        partial(self._session, interface),
-                        self._lease,
-                        places,
-                        lossless=self._lockstep,
-                    ),
-                    sock=bound,
-                )
-            )
-        self._alive = asyncio.create_task(self._keep_alive())
+            session = partial(self._session, interface)
+            connection = partial(Connection, session, self._lease, limit, lossless=self._lockstep)
+            self._servers.append(await self._loop.create_server(connection, sock=bound))
+        self._run(self._keep_alive())
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  not MessagePack here
         """Pass a message to the interfaces' thread; states come by `report`."""
@@ -207,9 +197,8 @@ class UrInterfaces(Gateway):
 
     async def shut(self) -> None:
         """Let no more clients in, and disconnect the present ones."""
-        if self._alive is not None:
-            self._alive.cancel()
-        self._requests.end()
+        for task in self._tasks:
+            task.cancel()
         for server in self._servers:
             server.close()
         for connection in tuple(self._connections):
@@ -278,24 +267,27 @@ class UrInterfaces(Gateway):
                 connection.tell(message)
 
     def adopt(self, host: str, token: str) -> None:
-        """Let the clients of a host act with control that this process holds in its name; before `open`.
-
-        Args:
-            host: Address of the host.
-            token: Token of the lease.
-        """
+        """Let the clients of a host act with a lease that this process holds in its name; before `open`."""
         self._adopted = self._lease(host)
         self._adopted.adopt(token, self)
 
     def _session(self, interface: InterfaceName, control: ConnectionControl, send: Send) -> PortSession:
         self._look()  # the client has to find the robot as it is now
-        if interface == "gripper" and self._gripper is not None:
-            return GripperSession(
-                self._gripper, send, lambda answer: self._soon(lambda: control.hear(answer))
-            )
-        if interface == "rtde":
-            return RtdeSession(self.robot, control, send, self._boards)
-        return _session(interface, self.robot, control, send)
+        robot, read_only = self.robot, interface.endswith("read_only")
+        match interface:
+            case "gripper":
+                assert self._gripper is not None
+                return GripperSession(robot, control, send, self._gripper, self._soon)
+            case "rtde":
+                return RtdeSession(robot, control, send, self._boards)
+            case "dashboard":
+                return DashboardSession(robot, control, send)
+            case "interpreter":
+                return InterpreterSession(robot, control, send)
+            case "realtime" | "realtime_read_only":
+                return RealtimeSession(robot, control, send, read_only=read_only)
+        informed = interface.startswith("primary")
+        return PrimarySession(robot, control, send, read_only=read_only, informed=informed)
 
     def _lease(self, host: str) -> HostLease:
         lease = self._leases.get(host)
@@ -309,8 +301,9 @@ class UrInterfaces(Gateway):
             with contextlib.suppress(RuntimeError):  # the loop is closed at shutdown
                 loop.call_soon_threadsafe(action)
 
-    def _aside(self, read: Callable[[], str | None], then: Callable[[str | None], None]) -> None:
-        """Read a file in a thread of its own, for which nobody waits, and call back in the interfaces' thread."""
+    def _aside(self, read: Callable[[], str | None]) -> Later[str | None]:
+        """Read a file in a thread of its own, for which nobody waits at the end."""
+        later = Later[str | None]()
 
         def reading() -> None:
             text = None
@@ -318,9 +311,26 @@ class UrInterfaces(Gateway):
                 text = read()
             except Exception:
                 log.exception("a program could not be read")
-            self._soon(lambda: then(text))
+            self._soon(lambda: later.come(text))
 
         threading.Thread(target=reading, name="tvist-ur-file", daemon=True).start()
+        return later
+
+    def _fetch(self, host: str) -> Later[str | None]:
+        """Ask a machine for its part of a program."""
+        later = Later[str | None]()
+
+        async def fetching() -> None:
+            later.come(await program_of(host))
+
+        self._run(fetching())
+        return later
+
+    def _run(self, work: Coroutine[object, object, None]) -> None:
+        """Run a task until `shut`."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     async def _keep_alive(self) -> None:
         while True:
@@ -332,21 +342,3 @@ class UrInterfaces(Gateway):
         for bound in self._sockets.values():
             bound.close()
         self._sockets.clear()
-
-
-def _session(interface: InterfaceName, robot: UrRobot, control: ConnectionControl, send: Send) -> PortSession:
-    match interface:
-        case "dashboard":
-            return DashboardSession(robot, control, send)
-        case "interpreter":
-            return InterpreterSession(robot, control, send)
-        case "realtime" | "realtime_read_only":
-            return RealtimeSession(robot, control, send, read_only=interface == "realtime_read_only")
-        case _:
-            return PrimarySession(
-                robot,
-                control,
-                send,
-                read_only=interface.endswith("read_only"),
-                informed=interface.startswith("primary"),
-            )

@@ -4,12 +4,12 @@ All connections of a host share the lease, because a client opens several: one f
 listen. Control is given back when the last connection that used it is closed.
 """
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 from tvist_protocol.commands import Command, KeepAlive, ReleaseControl, TakeControl
 from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_server.gateways.base import Desk
-from tvist_server.gateways.ur.base import ControllerAccess, Then
+from tvist_server.gateways.ur.later import Later, begin
 
 # The longest that the protocol allows, since the control of a host ends with its connections and not with time
 # (decision 12). ALIVE is wall time, the lease robot's time, which may pass many times faster in lockstep.
@@ -20,8 +20,8 @@ ALIVE = 10.0
 _LOST = {"no_control", "stale_token"}
 _NO_TOKEN = ""
 
-Soon = Callable[[Callable[[], None]], None]
-"""Schedules a call in the interfaces' thread; may be called from any thread."""
+MakeCommand = Callable[[str], Command]
+"""Creates a command from the token of the lease."""
 
 
 class HostLease:
@@ -30,135 +30,133 @@ class HostLease:
     Args:
         desk: The robot.
         host: Address of the host.
-        soon: Schedules a call in the interfaces' thread.
+        soon: Schedules a call in the interfaces' thread; may be called from any thread.
     """
 
-    def __init__(self, desk: Desk, host: str, soon: Soon) -> None:
+    def __init__(self, desk: Desk, host: str, soon: Callable[[Callable[[], None]], None]) -> None:
         self.client = f"ur-{host}"
         """Name under which the lease is held."""
         self._desk, self.host = desk, host
         self._soon = soon
         self._token = _NO_TOKEN
-        self._waiting: list[tuple[Callable[[str], Command], Then]] = []
-        self._taking = False
+        self._taking: Later[Reply] | None = None
+        """Reply to a request for control that is under way."""
         self._users: set[object] = set()
 
-    def change(self, connection: object, command: Callable[[str], Command], then: Then) -> None:
+    async def change(self, connection: object, command: MakeCommand) -> Reply:
         """Send a command that needs control, on behalf of a connection."""
         self._users.add(connection)
-        if self._token == _NO_TOKEN:
-            self._wait(command, then)
-            return
-
-        def again(reply: Reply) -> None:
+        if self._token != _NO_TOKEN:
+            reply = await self.ask(command(self._token))
+            if not (isinstance(reply, Refused) and reply.code in _LOST and reply.where == "token"):
+                return reply
             # The lease has been lost since, through another client's power command or a reset. Control may be free
             # again.
-            if isinstance(reply, Refused) and reply.code in _LOST and reply.where == "token":
-                self._token = _NO_TOKEN
-                self._wait(command, then)
-            else:
-                then(reply)
+            self._token = _NO_TOKEN
+        taken = await self._take()
+        if not isinstance(taken, Accepted) or taken.token is None:
+            return taken
+        return await self.ask(command(taken.token))
 
-        self.ask(command(self._token), again)
-
-    def ask(self, command: Command, then: Then) -> None:
+    def ask(self, command: Command) -> Later[Reply]:
         """Send a command as it is; it needs no control, or has its token already."""
-        self._desk.command(command, lambda reply: self._soon(lambda: then(reply)), self.host)
+        later = Later[Reply]()
+        self._desk.command(command, lambda reply: self._soon(lambda: later.come(reply)), self.host)
+        return later
 
     def leave(self, connection: object) -> None:
         """Note that a connection is closed; give back control if it was the last one that used it."""
         self._users.discard(connection)
         if not self._users and self._token != _NO_TOKEN:
-            self.ask(ReleaseControl(token=self._token), self._gone)
-            self._token = _NO_TOKEN
+            token, self._token = self._token, _NO_TOKEN
+            begin(self._release(token))
 
-    def _gone(self, _: Reply) -> None:
-        """After control was given back, report the client as gone, unless a connection has begun to use it again."""
+    async def _release(self, token: str) -> None:
+        """Give back control, and report the client as gone unless a connection has begun to use it again."""
+        await self.ask(ReleaseControl(token=token))
         if not self._users:
             self._desk.client_gone(self.client)
 
     def adopt(self, token: str, holder: object) -> None:
-        """Act with control that this host holds already, and do not give it back.
-
-        Args:
-            token: Token of the lease.
-            holder: Who holds it for the host.
-        """
+        """Act with control that this host holds already by somebody else, and do not give it back."""
         self._token = token
         self._users.add(holder)
 
     def keep_alive(self) -> None:
         """Renew the lease, if there is one."""
         if self._token != _NO_TOKEN:
-            self.ask(KeepAlive(token=self._token), _nothing)
+            self.ask(KeepAlive(token=self._token))
 
     @property
     def held_by_other(self) -> bool:
         """Whether another client has control."""
         return self._desk.holder() not in {None, self.client}
 
-    def _wait(self, command: Callable[[str], Command], then: Then) -> None:
-        """Send a command as soon as the host has control."""
-        self._waiting.append((command, then))
-        if not self._taking:
-            self._taking = True
+    def _take(self) -> Later[Reply]:
+        """Take control, once for all connections that need it."""
+        taking = self._taking
+        if taking is None:
+            taking = self._taking = Later[Reply]()
             self._desk.client_seen(self.client)
-            self.ask(TakeControl(client=self.client, lease_s=LEASE), self._taken)
+            begin(self._taken(taking))
+        return taking
 
-    def _taken(self, reply: Reply) -> None:
-        self._taking = False
-        waiting, self._waiting = self._waiting, []
+    async def _taken(self, taking: Later[Reply]) -> None:
+        reply = await self.ask(TakeControl(client=self.client, lease_s=LEASE))
+        self._taking = None
         if isinstance(reply, Accepted) and reply.token is not None:
             self._token = reply.token
-            for command, then in waiting:
-                self.ask(command(self._token), then)
-            if not self._users:  # all of them have disconnected since
-                self.leave(None)
         else:
             self._desk.client_gone(self.client)
-            for _, then in waiting:
-                then(reply)
+        taking.come(reply)
+        if not self._users:  # all of them have disconnected since
+            self.leave(None)
 
 
-class ConnectionControl(ControllerAccess):
-    """One connection's access to the controller.
+class ConnectionControl:
+    """How one connection sends commands to the controller; `change` first takes control if it is free.
 
     Args:
         lease: Lease of the client's host.
-        hear: Called with each answer, as a function to call.
-        peer: Name of the client in messages to people; by default its host.
+        hear: Has an answer handled, which is a function to call.
+        peer: The client and its interface, as a phrase for messages to people; by default its host.
     """
 
     def __init__(
         self,
         lease: HostLease,
-        hear: Callable[[Callable[[], None]], None] | None = None,
+        hear: Callable[[Callable[[], None]], None] = lambda answer: answer(),
         peer: str | None = None,
     ) -> None:
         self.peer, self.host = peer or lease.client, lease.host
         self._lease = lease
-        self.hear = hear or _at_once
+        self.hear = hear
         """Has an answer handled, which is a function to call."""
         self.unanswered = 0
         """Number of commands that are not yet answered."""
 
-    def change(self, command: Callable[[str], Command], then: Then) -> None:
-        self._lease.change(self, command, self._counted(then))
+    def change(self, command: MakeCommand) -> Later[Reply]:
+        """Send a command that needs control; it is refused if another client has control."""
+        return self._heard(self._lease.change(self, command))
 
-    def ask(self, command: Command, then: Then) -> None:
-        self._lease.ask(command, self._counted(then))
+    def ask(self, command: Command) -> Later[Reply]:
+        """Send a command that does not need control."""
+        return self._heard(self._lease.ask(command))
 
-    def _counted(self, then: Then) -> Then:
+    def _heard(self, reply: Awaitable[Reply]) -> Later[Reply]:
+        heard = Later[Reply]()
+        begin(self._hear(reply, heard))
+        return heard
+
+    async def _hear(self, awaited: Awaitable[Reply], heard: Later[Reply]) -> None:
         self.unanswered += 1
-
-        def counted(reply: Reply) -> None:
-            self.unanswered -= 1
-            self.hear(lambda: then(reply))
-
-        return counted
+        reply = await awaited
+        self.unanswered -= 1
+        self.hear(lambda: heard.come(reply))
 
     @property
     def held_by_other(self) -> bool:
+        """Whether another client is known to have control, so that commands that change something are refused."""
         return self._lease.held_by_other
 
     def lasting(self) -> "ConnectionControl":
@@ -168,11 +166,3 @@ class ConnectionControl(ControllerAccess):
     def leave(self) -> None:
         """Give back control, when the connection or what outlasted it has ended."""
         self._lease.leave(self)
-
-
-def _at_once(action: Callable[[], None]) -> None:
-    action()
-
-
-def _nothing(reply: Reply) -> None:
-    """Ignore the reply."""

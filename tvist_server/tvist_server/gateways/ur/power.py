@@ -1,69 +1,74 @@
-"""Power, brakes and protective stops, as requested on the dashboard and the primary interface."""
+"""Power, brakes and protective stops, as requested on the dashboard and the primary interface.
+
+Each function returns the refusal, or None if the robot is in the requested mode.
+"""
 
 from collections.abc import Callable
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.commands import Command, PowerOff, PowerOn, RestartSafety, UnlockProtectiveStop
 from tvist_protocol.modes import RobotMode, SafetyMode
-from tvist_protocol.replies import Refused, Reply
-from tvist_server.gateways.ur.base import ControllerAccess
+from tvist_protocol.replies import Refused
+from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import UrRobot
 
-Outcome = Callable[[Refused | None], None]
-"""Takes the refusal, or None if the robot is in the requested mode."""
+POWERED = (RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING)
 
 
-def power_on(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
+async def power_on(robot: UrRobot, control: ConnectionControl) -> Refused | None:
     """Power on an arm that is off; its brakes stay closed."""
-    there = (RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING)
-    _change(
+    return await _unless_there(
+        robot,
         control,
         lambda token: PowerOn(token=token, release_brakes=False),
-        outcome,
-        lambda: robot.latest is not None and robot.latest.robot_mode in there,
+        lambda latest: latest.robot_mode in POWERED,
     )
 
 
-def release_brakes(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
+async def release_brakes(robot: UrRobot, control: ConnectionControl) -> Refused | None:
     """Make the arm ready to move, from any mode."""
-    _change(
+    return await _unless_there(
+        robot,
         control,
         lambda token: PowerOn(token=token),
-        outcome,
-        lambda: robot.latest is not None and robot.latest.robot_mode == RobotMode.RUNNING,
+        lambda latest: latest.robot_mode == RobotMode.RUNNING,
     )
 
 
-def power_off(control: ControllerAccess, outcome: Outcome) -> None:
+async def power_off(_robot: UrRobot, control: ConnectionControl) -> Refused | None:
     """Power off the arm once it stands still; this ends any program."""
-    _change(control, lambda token: PowerOff(token=token), outcome, lambda: False)
+    reply = await control.change(lambda token: PowerOff(token=token))
+    return reply if isinstance(reply, Refused) else None
 
 
-def restart_safety(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
+async def restart_safety(robot: UrRobot, control: ConnectionControl) -> Refused | None:
     """Restart the safety system after a violation or a fault; otherwise power off the arm, as a restart does."""
     latest = robot.latest
-    if latest is not None and latest.safety_mode in (SafetyMode.VIOLATION, SafetyMode.FAULT):
-        _change(control, lambda token: RestartSafety(token=token), outcome, lambda: False)
-    else:
-        power_off(control, outcome)
+    if latest is None or latest.safety_mode not in (SafetyMode.VIOLATION, SafetyMode.FAULT):
+        return await power_off(robot, control)
+    reply = await control.change(lambda token: RestartSafety(token=token))
+    return reply if isinstance(reply, Refused) else None
 
 
-def unlock(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
+async def unlock(robot: UrRobot, control: ConnectionControl) -> Refused | None:
     """Unlock a protective stop; without one, there is nothing to do."""
-    _change(
+    return await _unless_there(
+        robot,
         control,
         lambda token: UnlockProtectiveStop(token=token),
-        outcome,
-        lambda: robot.latest is not None and robot.latest.safety_mode != SafetyMode.PROTECTIVE_STOP,
+        lambda latest: latest.safety_mode != SafetyMode.PROTECTIVE_STOP,
     )
 
 
-def _change(
-    control: ControllerAccess, command: Callable[[str], Command], outcome: Outcome, there: Callable[[], bool]
-) -> None:
+async def _unless_there(
+    robot: UrRobot,
+    control: ConnectionControl,
+    command: Callable[[str], Command],
+    there: Callable[[Snapshot], bool],
+) -> Refused | None:
     """Request a change; a refusal counts as success if the robot is already in the requested mode."""
-
-    def then(reply: Reply) -> None:
-        refused = reply if isinstance(reply, Refused) else None
-        outcome(None if refused is not None and refused.code == "wrong_mode" and there() else refused)
-
-    control.change(command, then)
+    reply = await control.change(command)
+    if not isinstance(reply, Refused):
+        return None
+    latest = robot.latest
+    return None if reply.code == "wrong_mode" and latest is not None and there(latest) else reply

@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable
 from typing import Final
 
 from tvist_protocol.programs import MAX_SCRIPT
@@ -21,40 +20,14 @@ SILENCE: Final = 0.1
 """Time without more data after which a program with the line `ENDS` is complete [s]; the library sends no end."""
 
 
-class ProgramRequests:
-    """Asks for programs; the requests run in the present event loop."""
-
-    def __init__(self) -> None:
-        self._tasks: set[asyncio.Task[None]] = set()
-
-    def fetch(self, host: str, then: Callable[[str | None], None]) -> None:
-        """Ask a machine for its program.
-
-        Args:
-            host: Its address.
-            then: Called once with the text; with None if the machine does not answer.
-        """
-        task = asyncio.ensure_future(self._fetch(host, then))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-
-    def end(self) -> None:
-        """End the requests under way."""
-        for task in self._tasks:
-            task.cancel()
-
-    async def _fetch(self, host: str, then: Callable[[str | None], None]) -> None:
-        text = None
-        try:
-            text = await asyncio.wait_for(_requested(host), 3 * WITHIN)
-        except (OSError, TimeoutError, UnicodeDecodeError) as error:
-            log.warning(
-                "%s port %d did not send the program for External Control: %s",
-                host,
-                PORT,
-                str(error) or "no answer",
-            )
-        then(text)
+async def program_of(host: str) -> str | None:
+    """Ask a machine for its program; return None if it does not answer."""
+    try:
+        return await asyncio.wait_for(_requested(host), 3 * WITHIN)
+    except (OSError, TimeoutError, UnicodeDecodeError) as error:
+        why = str(error) or "no answer"
+        log.warning("%s port %d did not send the program for External Control: %s", host, PORT, why)
+        return None
 
 
 async def _requested(host: str) -> str:

@@ -22,8 +22,8 @@ from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event
 from tvist_protocol.values import PATTERN_MEANINGS, PROGRAM_NAME_PATTERN
 from tvist_server.gateways.ur import messages
-from tvist_server.gateways.ur.base import ControllerAccess
 from tvist_server.gateways.ur.external_control import ExternalControl
+from tvist_server.gateways.ur.lease import ConnectionControl
 
 FOLDER: Final = "/programs"
 """Folder in which a controller keeps programs; every other folder is accepted too."""
@@ -31,34 +31,21 @@ _SAVED: Final = (".urp", ".script")
 """How the names of files end. The name of a script that a client has sent has no ending."""
 _PLACE: Final = re.compile(r"text:(\d+):(\d+)")
 
-Heard = Callable[[bool], None]
-"""Takes whether the request succeeded."""
-Outcome = Callable[[Refused | None], None]
-"""Takes the refusal, or None if the request succeeded."""
 
+class Host(Protocol):
+    """The robot, as far as messages about its programs need it."""
 
-class ProgramRobot(Protocol):
-    """Access to the robot, as far as the program's messages need it."""
-
-    @property
-    def latest(self) -> Snapshot | None:
-        """Snapshot of the last tick; None before the first."""
-
-    def tell(self, message: bytes) -> None:
-        """Send a robot message to all clients that get them."""
+    latest: Snapshot | None
+    tell: Callable[[bytes], None]
 
 
 class Programs:
     """Asks the controller to load, run, play, pause and stop programs, and reports to clients what they do.
 
     It learns the program's state from replies and from `io`, which arrive in the controller's order.
-
-    Args:
-        host: Access to the robot.
-        external: Completes programs that get a part of their text from the client that plays them.
     """
 
-    def __init__(self, host: ProgramRobot, external: ExternalControl) -> None:
+    def __init__(self, host: Host, external: ExternalControl) -> None:
         self._host, self._external = host, external
         self.path: str | None = None
         """Path of the loaded program; only its name if a client has sent it as a script; None before the first."""
@@ -67,13 +54,13 @@ class Programs:
         """Statements of the interpreter mode, with those that were accepted since the robot has told of them."""
         self._label: ProgramLabel | None = None
         """Label that the clients were told last."""
-        self._control: ControllerAccess | None = None
+        self._control: ConnectionControl | None = None
         """Access of the client that plays the program. It lasts as long as the program, even after the client
         disconnects.
         """
-        self._beginning: list[ControllerAccess] = []
+        self._beginning: list[ConnectionControl] = []
         """Accesses of clients whose secondary programs were accepted, before `program_started` tells of them."""
-        self._beside: list[ControllerAccess] = []
+        self._beside: list[ConnectionControl] = []
         """Accesses of clients whose secondary programs run. They last until no secondary program runs."""
         self._running_beside = 0
         self._asked: object | None = None
@@ -94,139 +81,80 @@ class Programs:
         """Whether a program runs and is not paused."""
         return self.state == "PLAYING"
 
-    # ------------------------------------------------------------------ requests
+    # ------------------------------------------------------------------ requests, each for a client
 
-    def load(self, path: str, control: ControllerAccess, outcome: Outcome) -> None:
-        """Load a program, and stop the running one.
-
-        Args:
-            path: Path of the file; its folders are ignored.
-            control: Access of the client that loads it.
-            outcome: Called once.
-        """
+    async def load(self, path: str, control: ConnectionControl) -> Refused | None:
+        """Load a program by the path of its file, of which the folders are ignored, and stop the running one."""
         name, self._asked = PurePosixPath(path).name, None
-
-        def then(reply: Reply) -> None:
-            refused = reply if isinstance(reply, Refused) else None
-            if refused is None:
-                self._become("STOPPED")
-                self.path = path if "/" in path else _path_of(name)
-            outcome(refused)
-
-        if re.match(PROGRAM_NAME_PATTERN, name):
-            self._external.find(name, lambda text: control.ask(ProgramLoad(name=name, text=text), then))
-        else:
+        if not re.match(PROGRAM_NAME_PATTERN, name):
             why = f"the path does not name a file, which has {PATTERN_MEANINGS[PROGRAM_NAME_PATTERN]}"
-            outcome(Refused(code="out_of_range", where="name", why=why))
+            return Refused(code="out_of_range", where="name", why=why)
+        text = await self._external.find(name)
+        reply = await control.ask(ProgramLoad(name=name, text=text))
+        if isinstance(reply, Refused):
+            return reply
+        self._become("STOPPED")
+        self.path = path if "/" in path else _path_of(name)
+        return None
 
-    def run(self, text: str, control: ControllerAccess, outcome: Outcome, *, secondary: bool) -> None:
-        """Start a script that a client has sent.
-
-        Args:
-            text: Its text in URScript.
-            control: Access of the client, which has to last until the reply.
-            outcome: Called once, as soon as the script has started or was refused.
-            secondary: Whether it runs beside the program, and does not replace it.
-        """
+    async def run(self, text: str, control: ConnectionControl, *, secondary: bool) -> Refused | None:
+        """Start a script that a client has sent, beside the program if it is secondary, else instead of it."""
         lasting = control.lasting()
+        reply = await lasting.change(lambda token: ProgramRun(token=token, text=text))
+        if isinstance(reply, Refused):
+            lasting.leave()
+            self._except(reply)
+            return reply
+        if secondary:
+            self._beginning.append(lasting)
+        else:
+            self._hold(lasting)
+        return None
 
-        def then(reply: Reply) -> None:
-            refused = reply if isinstance(reply, Refused) else None
-            if refused is not None:
-                lasting.leave()
-                self._except(refused)
-            elif secondary:
-                self._beginning.append(lasting)
-            else:
-                self._hold(lasting)
-            outcome(refused)
-
-        lasting.change(lambda token: ProgramRun(token=token, text=text), then)
-
-    def play(self, control: ControllerAccess, heard: Heard) -> None:
-        """Start the loaded program, or resume a paused one.
-
-        Args:
-            control: Access of the client that plays it.
-            heard: Called once, as soon as the program runs or has failed to start.
-        """
+    async def play(self, control: ConnectionControl) -> bool:
+        """Start the loaded program, or resume a paused one; return whether it runs."""
         name, state, asked = self.name, self.state, object()
         if name is None or control.held_by_other:
-            heard(False)
-            return
+            return False
         self._asked = asked
 
         def wanted() -> bool:
             """Return False if it was stopped meanwhile, or another program was loaded or started."""
             return self._asked is asked and (self.name, self.state) == (name, state)
 
-        def found(text: str | None) -> None:
-            if not wanted():
-                heard(False)
-            elif text is None or state != "STOPPED":
-                self._play(control, heard)
-            else:
-                self._external.complete(text, control.host, completed)
-
-        def completed(whole: str | None) -> None:
+        text = await self._external.find(name)
+        if text is not None and state == "STOPPED" and wanted():
+            whole = await self._external.complete(text, control.host)
             if whole is None or not wanted():
-                heard(False)
-            else:
-                control.ask(ProgramLoad(name=name, text=whole), loaded)
-
-        def loaded(reply: Reply) -> None:
+                return False
+            reply = await control.ask(ProgramLoad(name=name, text=whole))
             if isinstance(reply, Refused):
                 self._except(reply)
-                heard(False)
-            else:
-                found(None)
-
-        self._external.find(name, found)
-
-    def _play(self, control: ControllerAccess, heard: Heard) -> None:
+                return False
+        if not wanted():
+            return False
         lasting = control.lasting()
+        if isinstance(await lasting.change(lambda token: ProgramPlay(token=token)), Refused):
+            lasting.leave()
+            return False
+        self._hold(lasting)
+        self._become("PLAYING")
+        return True
 
-        def then(reply: Reply) -> None:
-            played = not isinstance(reply, Refused)
-            if played:
-                self._hold(lasting)
-                self._become("PLAYING")
-            else:
-                lasting.leave()
-            heard(played)
-
-        lasting.change(lambda token: ProgramPlay(token=token), then)
-
-    def pause(self, control: ControllerAccess, heard: Heard) -> None:
-        """Pause the running program.
-
-        Args:
-            control: Access of the client that pauses it.
-            heard: Called once.
-        """
+    async def pause(self, control: ConnectionControl) -> bool:
+        """Pause the running program; return whether it was."""
         if not self.playing or control.held_by_other:
-            heard(False)
-        else:
-            control.change(lambda token: ProgramPause(token=token), self._changed("PAUSED", heard))
+            return False
+        return self._changed("PAUSED", await control.change(lambda token: ProgramPause(token=token)))
 
-    def stop(self, control: ControllerAccess, heard: Heard) -> None:
-        """Stop all programs and any motion; no control is needed.
-
-        Args:
-            control: Access of the client that stops it.
-            heard: Called once.
-        """
+    async def stop(self, control: ConnectionControl) -> bool:
+        """Stop all programs and any motion, for which no control is needed; return whether that was accepted."""
         self._asked = None
-        control.ask(ProgramStop(), self._changed("STOPPED", heard))
+        return self._changed("STOPPED", await control.ask(ProgramStop()))
 
-    def close_popup(self, control: ControllerAccess, heard: Heard) -> None:
-        """Close the popup of a program, which may be waiting for that; no control is needed.
-
-        Args:
-            control: Access of the client that closes it.
-            heard: Called once.
-        """
-        control.ask(ProgramClosePopup(), lambda reply: heard(not isinstance(reply, Refused)))
+    async def close_popup(self, control: ConnectionControl) -> bool:
+        """Close the popup of a program, which may be waiting for that; no control is needed."""
+        return not isinstance(await control.ask(ProgramClosePopup()), Refused)
 
     # ------------------------------------------------------------------ what the robot tells
 
@@ -278,21 +206,18 @@ class Programs:
 
     # ------------------------------------------------------------------ state and control
 
-    def _changed(self, state: ProgramState, heard: Heard) -> Callable[[Reply], None]:
-        def then(reply: Reply) -> None:
-            done = not isinstance(reply, Refused)
-            if done:
-                self._become(state)
-            heard(done)
-
-        return then
+    def _changed(self, state: ProgramState, reply: Reply) -> bool:
+        done = not isinstance(reply, Refused)
+        if done:
+            self._become(state)
+        return done
 
     def _become(self, state: ProgramState) -> None:
         self.state = state
         if state == "STOPPED":
             self._hold(None)
 
-    def _hold(self, control: ControllerAccess | None) -> None:
+    def _hold(self, control: ConnectionControl | None) -> None:
         before, self._control = self._control, control
         if before is not None:
             before.leave()

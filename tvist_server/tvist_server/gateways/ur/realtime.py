@@ -7,10 +7,7 @@ from struct import Struct
 from typing import Final
 
 from tvist_controller.instruments.snapshot import Snapshot
-from tvist_server.gateways.ur.base import ControllerAccess, PortSession, Send
-from tvist_server.gateways.ur.primary.orders import Orders
-from tvist_server.gateways.ur.primary.scripts import Intake
-from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.primary.session import ScriptSession
 
 LAYOUT: Final[tuple[tuple[str | None, int], ...]] = (
     ("timestamp", 1),
@@ -79,42 +76,16 @@ def package(snapshot: Snapshot) -> bytes:
     return made
 
 
-class RealtimeSession(PortSession):
-    """One client of the real-time interface. What it sends is treated as URScript, as on the primary interface.
+class RealtimeSession(ScriptSession):
+    """One client of the real-time interface.
 
-    Args:
-        robot: The robot.
-        control: Access to its controller.
-        send: Not used, since scripts are answered on the primary interface.
-        read_only: Whether what the client sends is dropped.
+    What it sends is treated as URScript, and answered on the primary interface; what comes over the read-only port is
+    ignored.
     """
 
-    def __init__(
-        self,
-        robot: UrRobot,
-        control: ControllerAccess,
-        send: Send,  # noqa: ARG002
-        *,
-        read_only: bool = False,
-    ) -> None:
-        self._intake = Intake()
-        self._orders = None if read_only else Orders(robot, control, robot.tell)
-
     def receive(self, data: bytes) -> None:
-        """Take a piece of a script."""
-        if self._orders is not None:
-            for unit in self._intake.feed(data):
-                self._orders.carry_out(unit)
-
-    def closed(self) -> None:
-        """Report what the client leaves unfinished, and carry out what it has finished."""
-        if self._orders is not None:
-            self._orders.leave(self._intake.unfinished)
-
-    @property
-    def waiting(self) -> int:
-        """Number of units of its text that wait to be carried out."""
-        return 0 if self._orders is None else self._orders.waiting
+        if not self._read_only:
+            super().receive(data)
 
     def sample(self, snapshot: Snapshot) -> bytes:
         """Return the package of the tick."""

@@ -1,12 +1,11 @@
-"""State that all interfaces of one robot share."""
+"""State that all interfaces of one robot share, and which connection may write each input variable."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Sequence
 from zlib import crc32
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_plant.description import RobotDescription
 from tvist_server.gateways.ur.external_control import ExternalControl
-from tvist_server.gateways.ur.input_owners import InputOwners
 from tvist_server.gateways.ur.programs import Programs
 
 NO_MODE = "NONE"
@@ -21,8 +20,8 @@ class UrRobot:
         name: Name of the robot on the network.
         tell: Sends a robot message to all clients that get them.
         external: Completes programs with a node External Control.
-        report: Takes a sentence for the server's console.
-        report_refusal: Takes one that says why something was refused.
+        report: Writes a sentence to the server's console.
+        report_refusal: Writes a sentence about a refusal to it, which no other sentence displaces.
     """
 
     def __init__(
@@ -34,8 +33,8 @@ class UrRobot:
         report: Callable[[str], None],
         report_refusal: Callable[[str], None],
     ) -> None:
-        self.description = description
-        self.name = name
+        self.description, self.name = description, name
+        self.tell, self.report, self.report_refusal = tell, report, report_refusal
         self.serial = f"2024550{crc32(name.encode()) % 10_000:04d}"
         """Serial number: UR's begin with the year; the last digits are derived from the name."""
         self.latest: Snapshot | None = None
@@ -44,12 +43,55 @@ class UrRobot:
         """Operational mode set by the dashboard."""
         self.inputs = InputOwners()
         self.programs = Programs(self, external)
-        self._tell = tell
-        self.report = report
-        """Writes a sentence to the server's console."""
-        self.report_refusal = report_refusal
-        """Writes a sentence about a refusal to it, which no other sentence displaces."""
 
-    def tell(self, message: bytes) -> None:
-        """Send a robot message to all clients that get them."""
-        self._tell(message)
+
+class InputOwners:
+    """Each variable belongs to the first connection that asked for it, until that connection is closed."""
+
+    def __init__(self) -> None:
+        self._owners: dict[str, object] = {}
+        self.pending = PendingWrites()
+        """Values that were written, by any connection."""
+
+    def is_free(self, name: str, connection: object) -> bool:
+        """Return whether no other connection owns the variable."""
+        return self._owners.get(name, connection) is connection
+
+    def take(self, names: Sequence[str], connection: object) -> None:
+        """Make a connection the owner of variables, which must be free."""
+        for name in names:
+            self._owners[name] = connection
+
+    def release(self, connection: object) -> None:
+        """Release all variables that a connection owns."""
+        self._owners = {name: owner for name, owner in self._owners.items() if owner is not connection}
+
+
+class PendingWrites:
+    """Values requested from the controller, so that no value is requested twice.
+
+    Clients repeat their values five hundred times a second, and the robot publishes its terminals and registers some
+    ticks after they were set. A value is therefore news if it differs from the last one requested, or if that request
+    has been answered and the robot shows another value, because another client has set it since.
+    """
+
+    def __init__(self) -> None:
+        self._asked: dict[Hashable, object] = {}
+        self._waiting: dict[Hashable, object] = {}
+
+    def changed(self, key: Hashable, value: object, present: object) -> bool:
+        """Return whether to request a value; the robot published `present` last, or None so far."""
+        if key in self._waiting:
+            return self._waiting[key] != value
+        return value != present or self._asked.get(key, value) != value
+
+    def ask(self, values: dict[Hashable, object]) -> None:
+        """Note that these values were requested."""
+        self._asked |= values
+        self._waiting |= values
+
+    def answered(self, values: dict[Hashable, object]) -> None:
+        """Note that the controller has accepted or refused these values."""
+        for key, value in values.items():
+            if self._waiting.get(key) == value:
+                del self._waiting[key]

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from tvist_protocol.programs import MAX_SCRIPT
+from tvist_server.gateways.ur.base import Lines
 
 LONGEST: Final = MAX_SCRIPT
 """Longest unit with its line feeds [bytes]: twenty times the longest program that a known client sends."""
 GLIMPSE: Final = 200
-"""Characters that are kept of a unit that is too long."""
+"""Bytes that are kept of a unit that is too long."""
 TITLE: Final = 60
 """Longest title [characters]."""
 
@@ -73,8 +74,7 @@ class Intake:
     """One client's stream of script text, which may be split anywhere."""
 
     def __init__(self) -> None:
-        self._rest = bytearray()
-        """Beginning of an incomplete line."""
+        self._lines = Lines(LONGEST)
         self._unit = bytearray()
         """Lines of an incomplete unit. They are kept as bytes, since a string for each line takes twenty times the
         memory.
@@ -89,7 +89,7 @@ class Intake:
     @property
     def held(self) -> int:
         """Number of bytes kept for an incomplete unit."""
-        return len(self._unit) + len(self._rest)
+        return len(self._unit) + len(self._lines.rest)
 
     @property
     def unfinished(self) -> Unit | None:
@@ -97,39 +97,27 @@ class Intake:
         if self._skipping:  # it was returned when it became too long
             return None
         line, column = self._start or (self._unit.count(b"\n") + 1, 1)
-        begun = self._start is not None or _code(self._rest.decode(errors="replace"))
-        return Unit((self._unit + self._rest).decode(errors="replace"), line, column) if begun else None
+        rest = self._lines.rest
+        begun = self._start is not None or _code(rest.decode(errors="replace"))
+        return Unit((self._unit + rest).decode(errors="replace"), line, column) if begun else None
 
     def feed(self, data: bytes) -> list[Unit]:
-        """Take a piece and return the units that it completes."""
-        units: list[Unit] = []
-        *lines, rest = data.split(b"\n")
-        for piece in lines:
-            self._keep(piece, units)
-            line = bytes(self._rest).removesuffix(b"\r")
-            self._rest.clear()
-            self._take(line, units)
-        self._keep(rest, units)
-        return units
+        """Take a piece and return the units that it completes, and one that has become too long."""
+        return [unit for line in self._lines.feed(data) if (unit := self._take(line.removesuffix(b"\r")))]
 
-    def _keep(self, piece: bytes, units: list[Unit]) -> None:
-        """Append to the incomplete line; of a unit longer than LONGEST only the beginning is kept."""
-        if self.held + len(piece) >= LONGEST:  # the line feed is still to come
-            if not self._skipping:
-                seen = (self._unit + self._rest + piece).decode(errors="replace")
-                units.append(Unit(seen[:GLIMPSE], *(self._start or (1, 1)), too_long=True))
+    def _take(self, whole: bytes) -> Unit | None:
+        """Add a complete line to the present unit, which ends with the line on which all blocks are closed."""
+        unit = None
+        if not self._skipping and len(self._unit) + len(whole) >= LONGEST:
+            seen = bytes(self._unit + whole)[:GLIMPSE].decode(errors="replace")
+            unit = Unit(seen, *(self._start or (1, 1)), too_long=True)
             self._skipping = True
             self._unit.clear()
-            del self._rest[GLIMPSE:]  # the beginning of a line determines what it opens
-            piece = piece[:GLIMPSE]
-        self._rest += piece
-
-    def _take(self, whole: bytes, units: list[Unit]) -> None:
-        """Add a complete line to the present unit, which ends with the line on which all blocks are closed."""
+            whole = whole[:GLIMPSE]  # the beginning of a line determines what it opens
         line = whole.decode(errors="replace")
         code = _code(line)
         if not line.strip() and not self._unit and not self._skipping:
-            return
+            return None
         if code and self._start is None:
             self._start = self._unit.count(b"\n") + 1, len(line) - len(line.lstrip()) + 1
         if not self._skipping:
@@ -137,10 +125,10 @@ class Intake:
         self._depth = max(self._depth + len(_OPENS.findall(code)) - len(_CLOSES.findall(code)), 0)
         if self._depth == 0 and (self._start is not None or self._skipping):
             if not self._skipping:
-                line_number, column = self._start or (1, 1)
-                units.append(Unit(self._unit.decode(errors="replace"), line_number, column))
+                unit = Unit(self._unit.decode(errors="replace"), *(self._start or (1, 1)))
             self._unit.clear()
             self._start, self._skipping = None, False
+        return unit
 
 
 def _code(line: str) -> str:

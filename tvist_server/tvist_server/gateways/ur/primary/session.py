@@ -1,51 +1,137 @@
-"""One client of the primary or the secondary interface."""
+"""One client of the primary or the secondary interface, and what the real-time interface has in common with them."""
 
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Final
 
 from tvist_controller.instruments.snapshot import Snapshot
+from tvist_protocol.replies import Refused
 from tvist_protocol.stream import Event
-from tvist_server.gateways.ur import messages, version
-from tvist_server.gateways.ur.base import ControllerAccess, PortSession, Send
+from tvist_server.gateways.ur import messages, power, version
+from tvist_server.gateways.ur.base import InTurnSession, Send
+from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.messages import ErrorLevel
-from tvist_server.gateways.ur.primary.orders import Orders
 from tvist_server.gateways.ur.primary.packages import robot_state
-from tvist_server.gateways.ur.primary.scripts import Intake
+from tvist_server.gateways.ur.primary.scripts import LONGEST, Intake, Unit
 from tvist_server.gateways.ur.robot import UrRobot
 
 EVERY: Final = 50
 """Ticks between two robot states: 10 Hz."""
+TOO_LONG: Final = f"program_too_long: it has more than {LONGEST} bytes and was thrown away"
+SHORT: Final = 1000
+"""Length of none of the interface's own commands."""
+READ_ONLY: Final = (
+    "this interface is read-only: somebody else controls the robot, or the port takes no commands"
+)
+STOP: Final = "stop program"
+CHANGES: Final[Mapping[str, Callable[[UrRobot, ConnectionControl], Awaitable[Refused | None]]]] = {
+    "power on": power.power_on,
+    "power off": power.power_off,
+    "set robotmode run": power.release_brakes,
+    "set unlock protective stop": power.unlock,
+}
+"""The interfaces' own commands that change the robot's mode."""
 
 
-class PrimarySession(PortSession):
+class ScriptSession(InTurnSession[Unit]):
+    """Carries out units of script text in their order.
+
+    A few commands are the interface's own; everything else is a program for the controller. The outcome of each unit
+    is also reported on the server's console, since few clients show their answers.
+    """
+
+    def __init__(
+        self, robot: UrRobot, control: ConnectionControl, send: Send, *, read_only: bool = False
+    ) -> None:
+        super().__init__(robot, control, send)
+        self._read_only = read_only
+        """Whether what the client sends is declined."""
+        self._intake = Intake()
+
+    def receive(self, data: bytes) -> None:
+        """Take a piece of a script."""
+        for unit in self._intake.feed(data):
+            self._add(unit, stop=not self._read_only and len(unit.text) < SHORT and unit.words == STOP)
+
+    def closed(self) -> None:
+        """Report what the client leaves unfinished."""
+        unfinished = self._intake.unfinished
+        if unfinished is not None:
+            self._report(unfinished, "was not run: the connection ended before its last line feed")
+        super().closed()
+
+    def _tell(self, message: bytes) -> None:
+        """Send a robot message to the client, or to those who get its messages."""
+        self._robot.tell(message)
+
+    async def _do(self, unit: Unit) -> None:
+        words = unit.words if len(unit.text) < SHORT else ""
+        if self._read_only:
+            self._tell_read_only()
+            self._report_refusal(unit, "this port is read-only")
+        elif unit.too_long:
+            stamp = messages.stamp(self._robot.latest)
+            self._robot.tell(messages.runtime_exception(stamp, unit.line, unit.column, TOO_LONG))
+            self._report_refusal(unit, f"it has more than {LONGEST} bytes")
+        elif words == STOP:
+            stopped = await self._robot.programs.stop(self._control)
+            self._report(unit, "was run" if stopped else "was refused")
+        elif words in {"set sim", "set real"}:
+            self._report(unit, "changes nothing: the arm is simulated")
+        elif words in CHANGES:
+            refused = await CHANGES[words](self._robot, self._control)
+            if refused is None:
+                self._report(unit, "was run")
+            else:
+                self._tell_refused(unit, words, refused)
+        else:
+            refused = await self._robot.programs.run(unit.text, self._control, secondary=unit.secondary)
+            if refused is None:
+                self._report(unit, "was started")
+            elif refused.code == "script_error":  # all clients have got the exception
+                _, line, column = refused.where.split(":")
+                self._report_refusal(unit, f"line {line}, column {column}: {refused.why}")
+            else:
+                self._tell_refused(unit, unit.title, refused)
+
+    def _tell_refused(self, unit: Unit, what: str, refused: Refused) -> None:
+        """Tell the client, and the person at the console, why something was refused."""
+        if refused.code in {"no_control", "stale_token"}:
+            self._tell_read_only()
+        else:
+            stamp = messages.stamp(self._robot.latest)
+            self._tell(messages.text(stamp, f"{what} was refused: {refused.why}"))
+        self._report_refusal(unit, refused.why)
+
+    def _tell_read_only(self) -> None:
+        stamp = messages.stamp(self._robot.latest)
+        self._tell(messages.error_code(stamp, messages.READ_ONLY, 0, ErrorLevel.VIOLATION, READ_ONLY))
+
+    def _report(self, unit: Unit, what: str) -> None:
+        self._robot.report(f'the script "{unit.title}" of {self._control.peer} {what}')
+
+    def _report_refusal(self, unit: Unit, why: str) -> None:
+        self._robot.report_refusal(f'the script "{unit.title}" of {self._control.peer} was refused: {why}')
+
+
+class PrimarySession(ScriptSession):
     """Sends a client the robot's state and messages, and takes its commands.
 
     The secondary interface is the same without messages, as on UR's controllers: some of its clients expect nothing but
     the state.
-
-    Args:
-        robot: The robot.
-        control: Access to its controller.
-        send: Sends data to the client.
-        read_only: Whether what the client sends is declined.
-        informed: Whether the client gets messages.
     """
 
     def __init__(
         self,
         robot: UrRobot,
-        control: ControllerAccess,
+        control: ConnectionControl,
         send: Send,
         *,
         read_only: bool = False,
         informed: bool = True,
     ) -> None:
-        self._robot = robot
-        self._send = send
-        self._read_only = read_only
+        super().__init__(robot, control, send, read_only=read_only)
         self.informed = informed
         """Whether the client gets messages."""
-        self._intake = Intake()
-        self._orders = Orders(robot, control, self._tell)
         self._errors: list[bytes] = []
         """Error codes of this tick, which follow the state with what caused them."""
         self._due = 0
@@ -58,14 +144,6 @@ class PrimarySession(PortSession):
         self._send(
             messages.version(version.MAJOR, version.MINOR, version.BUGFIX, version.BUILD, version.DATE)
         )
-
-    def receive(self, data: bytes) -> None:
-        """Take a piece of a script."""
-        for unit in self._intake.feed(data):
-            if self._read_only:
-                self._orders.decline(unit)
-            else:
-                self._orders.carry_out(unit)
 
     def _tell(self, message: bytes) -> None:
         if self.informed:
@@ -94,15 +172,6 @@ class PrimarySession(PortSession):
             return state
         self._send(state)  # the client waits for it, so it must not be dropped
         return b""
-
-    def closed(self) -> None:
-        """Report what the client leaves unfinished, and carry out what it has finished."""
-        self._orders.leave(self._intake.unfinished)
-
-    @property
-    def waiting(self) -> int:
-        """Number of units of its text that wait to be carried out."""
-        return self._orders.waiting
 
     def event(self, event: Event) -> None:
         """Send a protective stop as an error, and other safety stops and warnings as lines of the log.

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_controller.instruments.variables import VARIABLES
 from tvist_controller.instruments.wrench import JOINT_LISTS
-from tvist_server.gateways.ur.rtde.registers import KINDS, SINGLE_BITS, registers
+from tvist_server.gateways.ur.rtde.inputs import KINDS, SINGLE_BITS, registers
 from tvist_server.rtde.wire import Wire
 
 OUTPUTS: dict[str, Wire] = {name: Wire[one.type] for name, one in VARIABLES.items()} | {

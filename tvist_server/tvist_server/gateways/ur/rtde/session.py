@@ -10,7 +10,8 @@ from struct import Struct
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_server.gateways.ur import version
-from tvist_server.gateways.ur.base import ControllerAccess, PortSession, Send
+from tvist_server.gateways.ur.base import PortSession, Send
+from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.inputs import INPUTS, NEED_CONTROL
@@ -44,9 +45,6 @@ class RtdeSession(PortSession):
     """Answers the packages of one client, and sends it the outputs that it has subscribed to.
 
     Args:
-        robot: State that the interfaces of a robot share.
-        control: Access to its controller.
-        send: Sends bytes to the client.
         boards: Make the data packages of all clients of the robot, by ticks between two packages: what only a
             slow client reads is not computed for the others.
     """
@@ -54,17 +52,14 @@ class RtdeSession(PortSession):
     client_begins = True
 
     def __init__(
-        self, robot: UrRobot, control: ControllerAccess, send: Send, boards: Mapping[int, Board]
+        self, robot: UrRobot, control: ConnectionControl, send: Send, boards: Mapping[int, Board]
     ) -> None:
+        super().__init__(robot, control, send)
         self._boards, self._board = boards, boards[1]
-        self._robot = robot
-        self._control = control
-        self._send = send
         self._reader = PackageReader()
         self._writer = InputWriter(robot, control, self._complain)
         self._version = 1
         self._head = b""
-        self._started = False
         self._outputs: OutputRecipe | None = None
         self._inputs: list[InputRecipe] = []
         self._every = 1
@@ -81,11 +76,6 @@ class RtdeSession(PortSession):
             PackageKind.PAUSE: self._pause,
         }
 
-    @property
-    def served(self) -> bool:
-        """Whether the client has started outputs and not paused them since."""
-        return self._started
-
     def receive(self, data: bytes) -> None:
         """Handle all packages that are complete with these bytes; the rest is kept for the next call."""
         for kind, payload in self._reader.feed(data):
@@ -100,7 +90,7 @@ class RtdeSession(PortSession):
 
         The first one is sent with the first tick after the start, the others at the frequency of the recipe.
         """
-        if not self._started or self._outputs is None:
+        if not self.served or self._outputs is None:
             return b""
         tick, every = snapshot.state.tick, self._every
         if self._next is None:
@@ -114,6 +104,7 @@ class RtdeSession(PortSession):
         """Release the input variables of the connection, so that other clients can set them, and read no more."""
         self._robot.inputs.release(self)
         self._board.end(self)
+        super().closed()
 
     # ------------------------------------------------------------------ answers
 
@@ -182,20 +173,20 @@ class RtdeSession(PortSession):
 
     def _start(self, _payload: bytes) -> None:
         """Start to send outputs. This is refused without an output recipe, or if the last one was invalid."""
-        self._started, self._next = self._outputs is not None, None
+        self.served, self._next = self._outputs is not None, None
         self._read()
         self._said.clear()
-        self._send(package(PackageKind.START, _TRUE if self._started else _FALSE))
+        self._send(package(PackageKind.START, _TRUE if self.served else _FALSE))
 
     def _pause(self, _payload: bytes) -> None:
-        self._started = False
+        self.served = False
         self._read()
         self._send(package(PackageKind.PAUSE, _TRUE))
 
     def _read(self) -> None:
         """Have the variables of the recipe computed as long as the client reads them."""
         self._board.end(self)
-        if self._started and self._outputs is not None:
+        if self.served and self._outputs is not None:
             self._board = self._boards[self._every]
             self._board.begin(self, self._outputs)
 
@@ -207,7 +198,7 @@ class RtdeSession(PortSession):
 
         Before the start nothing is sent, since clients would take it for the answer to the recipe that they set up.
         """
-        if self._started and sentence not in self._said and len(self._said) < SENTENCES:
+        if self.served and sentence not in self._said and len(self._said) < SENTENCES:
             self._said.add(sentence)
             self._send(text_message(self._version, TextLevel.WARNING, sentence, "RTDE"))
 

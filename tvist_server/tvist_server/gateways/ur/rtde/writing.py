@@ -1,21 +1,20 @@
 """Turns the input variables of data packages into commands, and leaves out values that are in force already."""
 
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Awaitable, Callable, Hashable, Iterable, Iterator
 from math import isclose
 
 from tvist_controller.instruments.peripherals import analog_share
-from tvist_protocol.commands import Command, SetSpeed
+from tvist_protocol.commands import SetSpeed
 from tvist_protocol.forces import SetExternalWrench
 from tvist_protocol.io import Bank, Io, Registers, SetIo, SetRegisters
 from tvist_protocol.replies import Refused, Reply
-from tvist_server.gateways.ur.base import ControllerAccess
+from tvist_server.gateways.ur.later import begin
+from tvist_server.gateways.ur.lease import ConnectionControl, MakeCommand
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.inputs import DIGITAL, REGISTERS
 from tvist_server.gateways.ur.rtde.recipes import Value
 from tvist_server.rtde.wire import Wire
 
-Complain = Callable[[str], None]
-"""Function that sends the client a warning."""
 Number = bool | int | float
 LARGEST = 1e308
 """Largest absolute value of an input: infinity and NaN are refused."""
@@ -33,11 +32,11 @@ class InputWriter:
         complain: Sends the client a warning.
     """
 
-    def __init__(self, robot: UrRobot, control: ControllerAccess, complain: Complain) -> None:
+    def __init__(self, robot: UrRobot, control: ConnectionControl, complain: Callable[[str], None]) -> None:
         self._robot = robot
         self._control = control
         self._complain = complain
-        self._ledger = robot.inputs.ledger
+        self._pending = robot.inputs.pending
         self._held: dict[str, Value] = {}
 
     def write(self, values: dict[str, Value]) -> None:
@@ -85,7 +84,7 @@ class InputWriter:
             name: value
             for name, value in values.items()
             if name in watched
-            or self._ledger.is_news(name, value, None if io is None else _present(io, name))
+            or self._pending.changed(name, value, None if io is None else _present(io, name))
         }
         if not news:
             return
@@ -106,8 +105,8 @@ class InputWriter:
             for first, run in _runs(cell)
         ]
         command = SetRegisters(bank=head.bank, first=head.first, values=head.values, also=tuple(rest))
-        self._ledger.ask(news)
-        self._control.ask(command, self._answer_of(news))
+        self._pending.ask(news)
+        begin(self._answered(news, self._control.ask(command)))
 
     # ------------------------------------------------------------------ what needs control
 
@@ -116,7 +115,7 @@ class InputWriter:
         if not int(self._number("speed_slider_mask")) & 1 or not self._is_share("speed_slider_fraction"):
             return
         io = self._io
-        if self._ledger.is_news("speed", fraction, None if io is None else io.target_speed_fraction):
+        if self._pending.changed("speed", fraction, None if io is None else io.target_speed_fraction):
             self._change({"speed": fraction}, lambda token: SetSpeed(token=token, fraction=fraction))
 
     def _set_outputs(self, values: Iterable[str]) -> None:
@@ -158,7 +157,7 @@ class InputWriter:
     def _is_digital_news(self, bit: int, on: bool) -> bool:
         io = self._io
         present = None if io is None else bool(io.actual_digital_output_bits >> bit & 1)
-        return self._ledger.is_news(("digital", bit), on, present)
+        return self._pending.changed(("digital", bit), on, present)
 
     def _analog(self) -> Iterator[tuple[int, tuple[int, float]]]:
         """Analogue outputs whose bit in the mask is set: number of each, and its type and share of the range."""
@@ -176,7 +175,7 @@ class InputWriter:
             # The robot publishes volts or amperes: the share computed from them differs from the one set by rounding.
             shown = analog_share(value, voltage=bool(voltage))
             present = voltage, ratio if isclose(shown, ratio, abs_tol=1e-9) else shown
-        return self._ledger.is_news(("analog", number), (kind, ratio), present)
+        return self._pending.changed(("analog", number), (kind, ratio), present)
 
     def _is_share(self, name: str) -> bool:
         if name not in self._held:
@@ -187,24 +186,21 @@ class InputWriter:
         self._complain(f"{name} is {value:g}: must be between 0 and 1")
         return False
 
-    def _change(self, values: dict[Hashable, object], command: Callable[[str], Command]) -> None:
+    def _change(self, values: dict[Hashable, object], command: MakeCommand) -> None:
         if self._control.held_by_other:
             self._complain(
                 "another client has control: speed and outputs stay as they are, and forces are not read"
             )
             return
-        self._ledger.ask(values)
-        self._control.change(command, self._answer_of(values))
+        self._pending.ask(values)
+        begin(self._answered(values, self._control.change(command)))
 
-    def _answer_of(self, values: dict[Hashable, object]) -> Callable[[Reply], None]:
-        """Return a function that handles the reply to a command that sets these values."""
-
-        def then(reply: Reply) -> None:
-            self._ledger.answered(values)
-            if isinstance(reply, Refused):
-                self._complain(reply.why)
-
-        return then
+    async def _answered(self, values: dict[Hashable, object], reply: Awaitable[Reply]) -> None:
+        """Handle the reply to a command that sets these values."""
+        answer = await reply
+        self._pending.answered(values)
+        if isinstance(answer, Refused):
+            self._complain(answer.why)
 
 
 def _present(io: Io, name: str) -> Number:

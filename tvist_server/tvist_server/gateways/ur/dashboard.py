@@ -1,0 +1,329 @@
+"""UR's dashboard, port 29999: commands, one a line, and their answers, which clients compare word by word."""
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Final
+
+from tvist_controller.instruments.snapshot import Snapshot
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.replies import Refused
+from tvist_server.gateways.ur import messages, power, version
+from tvist_server.gateways.ur.base import InTurnSession, Lines, Send
+from tvist_server.gateways.ur.later import Later
+from tvist_server.gateways.ur.lease import ConnectionControl
+from tvist_server.gateways.ur.robot import NO_MODE, UrRobot
+from tvist_server.ur_model import series
+
+GREETING: Final = "Connected: Universal Robots Dashboard Server"
+LONGEST: Final = 4096
+"""Longest line [bytes]; the rest of a longer one is ignored."""
+PATIENCE: Final = 2500
+"""Ticks within which a stopped arm has to come to rest."""
+ECHO: Final = 200
+"""Characters of an unknown line that the answer repeats."""
+UNNAMED: Final = "<unnamed>"
+"""Name of the program while none is loaded."""
+INSTALLATION: Final = "default.installation"
+"""Name of the only installation."""
+MODES: Final = ("MANUAL", "AUTOMATIC")
+TOO_SOON: Final = (
+    "Cannot unlock protective stop until 5s after occurrence. "
+    "Always inspect cause of protective stop before unlocking"
+)
+"""UR's answer. Here it means that the arm is still stopping; there are no 5 s to wait."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """One command as a client sent it."""
+
+    robot: UrRobot
+    control: ConnectionControl
+    argument: str
+    at_rest: Callable[[], Awaitable[bool]]
+    """Waits until the arm rests; returns whether it does in time."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """One row of the table of commands."""
+
+    keyword: str
+    """Keyword in the manual's spelling; clients may use any case."""
+    carry_out: Callable[[Request], str | Awaitable[str | None] | None]
+    """Returns the answer, at once or later; None if the command has failed."""
+    argument: bool = False
+    """Whether an argument may follow."""
+
+
+# ---------------------------------------------------------------------- power and safety
+
+
+def _changing(
+    change: Callable[[UrRobot, ConnectionControl], Awaitable[Refused | None]],
+    done: str,
+    too_soon: str | None = None,
+) -> Callable[[Request], Awaitable[str | None]]:
+    """Return what carries out a change and answers `done`, or `too_soon` if the robot's mode does not permit it."""
+
+    async def carry_out(request: Request) -> str | None:
+        refused = await change(request.robot, request.control)
+        return done if refused is None else too_soon if refused.code == "wrong_mode" else None
+
+    return carry_out
+
+
+def _robot_mode(request: Request) -> str:
+    latest = request.robot.latest
+    mode = RobotMode.NO_CONTROLLER if latest is None else RobotMode(latest.robot_mode)
+    return f"Robotmode: {mode.name}"
+
+
+def _safety_mode(request: Request) -> str:
+    latest = request.robot.latest
+    return f"Safetymode: {_safety(None if latest is None else latest.safety_mode)}"
+
+
+def _safety_status(request: Request) -> str:
+    latest = request.robot.latest
+    return f"Safetystatus: {_safety(None if latest is None else latest.safety_status)}"
+
+
+def _safety(number: int | None) -> str:
+    return SafetyMode.UNDEFINED.name if number is None else SafetyMode(number).name
+
+
+# ---------------------------------------------------------------------- programs
+
+
+async def _load(request: Request) -> str:
+    path, robot, control = request.argument, request.robot, request.control
+    failed = f"Error while loading program: {path}"
+    if control.held_by_other:
+        return failed
+    refused = await robot.programs.load(path, control)
+    if refused is None:
+        return f"Loading program: {path}" if await request.at_rest() else failed
+    place = refused.where.replace("text:", "line ").replace(":", ", column ")
+    why = f"{place}: {refused.why}" if refused.code == "script_error" else refused.why
+    robot.report_refusal(f'the program "{path}" of {control.peer} was not loaded: {why}')
+    return f"File not found: {path}" if refused.code == "out_of_range" else failed
+
+
+def _load_installation(request: Request) -> str:
+    name = request.argument
+    if request.control.held_by_other:
+        return f"Failed to load installation: {name}"
+    known = name.rpartition("/")[2] == INSTALLATION
+    return f"Loading installation: {name}" if known else f"File not found: {name}"
+
+
+async def _play(request: Request) -> str | None:
+    return "Starting program" if await request.robot.programs.play(request.control) else None
+
+
+async def _pause(request: Request) -> str | None:
+    return "Pausing program" if await request.robot.programs.pause(request.control) else None
+
+
+async def _stop(request: Request) -> str | None:
+    stopped = await request.robot.programs.stop(request.control) and await request.at_rest()
+    return "Stopped" if stopped else None
+
+
+def _running(request: Request) -> str:
+    return f"Program running: {_bool(request.robot.programs.playing)}"
+
+
+def _program_state(request: Request) -> str:
+    programs = request.robot.programs
+    return f"{programs.state} {programs.name or UNNAMED}"
+
+
+def _loaded_program(request: Request) -> str:
+    path = request.robot.programs.path
+    return "No program loaded" if path is None else f"Loaded program: {path}"
+
+
+def _is_program_saved(request: Request) -> str:
+    programs = request.robot.programs
+    return f"{_bool(programs.saved)} {programs.name or UNNAMED}"
+
+
+# ---------------------------------------------------------------------- the person at the robot
+
+
+def _popup(request: Request) -> str:
+    stamp = messages.stamp(request.robot.latest)
+    request.robot.tell(messages.popup(stamp, "Message", request.argument))
+    return "showing popup"
+
+
+async def _close_popup(request: Request) -> str | None:
+    return "closing popup" if await request.robot.programs.close_popup(request.control) else None
+
+
+def _add_to_log(request: Request) -> str:
+    if not request.argument:
+        return "No log message to add"
+    request.robot.tell(messages.text(messages.stamp(request.robot.latest), request.argument))
+    return "Added log message"
+
+
+def _set_operational_mode(request: Request) -> str:
+    mode = request.argument.upper()
+    if mode not in MODES or request.control.held_by_other:
+        return f"Failed setting operational mode: {request.argument}"
+    request.robot.operational_mode = mode
+    return f"Operational mode {mode} is set"
+
+
+def _clear_operational_mode(request: Request) -> str | None:
+    if request.control.held_by_other:
+        return None
+    request.robot.operational_mode = NO_MODE
+    return f"No longer controlling the operational mode. Current operational mode: {NO_MODE}"
+
+
+# ---------------------------------------------------------------------- information
+
+
+def _model(request: Request) -> str:
+    model = request.robot.description.robot.model
+    return series(model) or model
+
+
+def _say(text: str) -> Callable[[Request], str]:
+    return lambda _: text
+
+
+def _bool(value: bool) -> str:
+    return "true" if value else "false"
+
+
+QUIT: Final = "quit"
+NUMBER: Final = f"{version.MAJOR}.{version.MINOR}.{version.BUGFIX}.{version.BUILD}"
+COMMANDS: Final = (
+    Command("power on", _changing(power.power_on, "Powering on")),
+    Command("power off", _changing(power.power_off, "Powering off")),
+    Command("brake release", _changing(power.release_brakes, "Brake releasing")),
+    Command("unlock protective stop", _changing(power.unlock, "Protective stop releasing", TOO_SOON)),
+    Command("restart safety", _changing(power.restart_safety, "Restarting safety")),
+    Command("close safety popup", _say("closing safety popup")),
+    Command("robotmode", _robot_mode),
+    Command("safetymode", _safety_mode),
+    Command("safetystatus", _safety_status),
+    Command("load installation", _load_installation, argument=True),
+    Command("load", _load, argument=True),
+    Command("play", _play),
+    Command("pause", _pause),
+    Command("stop", _stop),
+    Command("running", _running),
+    Command("programState", _program_state),
+    Command("get loaded program", _loaded_program),
+    Command("isProgramSaved", _is_program_saved),
+    Command("popup", _popup, argument=True),
+    Command("close popup", _close_popup),
+    Command("addToLog", _add_to_log, argument=True),
+    Command("saveLog", _say("Log saved to disk")),
+    Command("set operational mode", _set_operational_mode, argument=True),
+    Command("get operational mode", lambda request: request.robot.operational_mode),
+    Command("clear operational mode", _clear_operational_mode),
+    Command("is in remote control", lambda request: _bool(not request.control.held_by_other)),
+    Command("PolyscopeVersion", _say(f"URSoftware {NUMBER} ({version.DATE})")),
+    Command("version", _say(NUMBER)),
+    Command("get robot model", _model),
+    Command("get serial number", lambda request: request.robot.serial),
+    Command("generate flight report", _say("Flight Report generated with id: 1"), argument=True),
+    Command(
+        "generate support file",
+        lambda request: f"Completed successfully: support_{request.robot.serial}.zip",
+        argument=True,
+    ),
+    Command("shutdown", _changing(power.power_off, "Shutting down")),
+    Command(QUIT, _say("Disconnected")),
+)
+"""All commands; a longer keyword comes before one that it begins with."""
+
+
+def find(line: str) -> tuple[Command, str] | None:
+    """Return the command on a line and its argument; None if there is no such command."""
+    lower = line.lower()
+    for command in COMMANDS:
+        keyword = command.keyword.lower()
+        if lower == keyword:
+            return command, ""
+        if command.argument and lower.startswith(keyword) and line[len(keyword)].isspace():
+            return command, line[len(keyword) :].strip()
+    return None
+
+
+class DashboardSession(InTurnSession[str]):
+    """One client of the dashboard."""
+
+    client_begins = True
+
+    def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
+        super().__init__(robot, control, send)
+        self._lines = Lines(LONGEST)
+        self._rests: Later[bool] | None = None
+        """What waits for the arm to rest."""
+        self._last = 0
+        """Tick at which waiting for rest ends."""
+
+    def opened(self) -> None:
+        self._say(GREETING)
+
+    def receive(self, data: bytes) -> None:
+        """Carry out the commands that are complete with these bytes."""
+        for line in self._lines.feed(data):
+            if not self.over:
+                text = line.decode(errors="replace").strip()
+                self._add(text, stop=text.lower() == "stop")
+
+    async def _do(self, line: str) -> None:
+        found = find(line)
+        if found is None:
+            self._say(f"could not understand: '{line[:ECHO]}'")
+            return
+        command, argument = found
+        answer = command.carry_out(Request(self._robot, self._control, argument, self._at_rest))
+        if isinstance(answer, Awaitable):
+            answer = await answer
+        self._say(f"Failed to execute: {command.keyword}" if answer is None else answer)
+        if command.keyword == QUIT:
+            self._end()
+
+    def sample(self, snapshot: Snapshot) -> bytes:
+        """Continue a command that waited for the arm to rest."""
+        rests = self._rests
+        if rests is not None:
+            still = snapshot.runtime_state == RuntimeState.STOPPED
+            if still or snapshot.state.tick >= self._last:
+                self._rests = None
+                rests.come(still)
+        return b""
+
+    def closed(self) -> None:
+        """Carry out nothing more."""
+        self._end()
+        super().closed()
+        if self._rests is not None:
+            self._rests.come(False)
+
+    def _end(self) -> None:
+        self.over = True
+        self._items.clear()
+
+    async def _at_rest(self) -> bool:
+        """Wait until the arm rests, so that a stopped program can be played once its stop is answered."""
+        latest = self._robot.latest
+        if self.over or latest is None or latest.runtime_state == RuntimeState.STOPPED:
+            return True
+        self._rests, self._last = Later[bool](), latest.state.tick + PATIENCE
+        return await self._rests
+
+    def _say(self, text: str) -> None:
+        if not self.over:
+            plain = "".join([letter if letter.isprintable() else "?" for letter in text])
+            self._send(plain.encode() + b"\n")
