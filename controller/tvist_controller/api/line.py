@@ -19,7 +19,7 @@ from tvist_controller.line.whole_motion import Driven, DrivenLine, respond
 from tvist_controller.planning.choices import choose_filter, wanted_modes
 from tvist_controller.planning.keeping import keeping_motion
 from tvist_controller.setup import Setup, body, paper_payload
-from tvist_controller.sources.elastic_source import elastic_feed_forward
+from tvist_controller.sources.elastic_source import elastic_feed_forward, known_friction
 from tvist_controller.sources.mode_source import ModeSource
 from tvist_controller.sources.own_shapers import OwnShaper, RecordedShaper
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Trajectory, quickest_motion
@@ -53,6 +53,7 @@ __all__ = [
     "elastic_feed_forward",
     "estimator_of",
     "keeping_motion",
+    "known_friction",
     "load_calibration",
     "mass_matrix",
     "modal_estimator",

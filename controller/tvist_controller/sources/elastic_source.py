@@ -4,11 +4,13 @@ import numpy as np
 
 from tvist_controller.calibrations.modal import drivetrain, friction_law
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.line.joint_controllers import described_friction
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import Floats, flexible_model
 from tvist_protocol.calibration import Calibration
 from tvist_shaping.base import Filter
 from tvist_shaping.errors import EstimatorError
+from tvist_shaping.filter import TvistFilter
 
 
 def elastic_feed_forward(
@@ -22,9 +24,28 @@ def elastic_feed_forward(
     if tvist.feed_forward == "rigid":
         return None
     springs = springs_of(description, calibration)
-    law = friction_law(calibration.modal.parameters, description) if calibration.modal is not None else None
+    law = known_friction(tvist, description, calibration)
     torques = tvist.feed_forward == "elastic"
     return ElasticFeedForward(description, *springs, tvist.period, torques=torques, law=law)
+
+
+def known_friction(
+    tvist: Filter | None, description: RobotDescription, calibration: Calibration | None
+) -> Floats | None:
+    """Return the friction that is fed forward in full with a filter, see `LAWS`; None for a share of Coulomb friction.
+
+    If the robot file says how the motors stick, it is that of the file. Unshaped, for which the filter is None, and
+    with the paper's filter it is not, since the tails of Table 2 are what a share of Coulomb friction leaves.
+    Otherwise it is what was identified.
+
+    Raises:
+        EstimatorError: See `friction_law`.
+    """
+    plain = tvist is None or isinstance(tvist, TvistFilter)
+    described = None if plain else described_friction(description)
+    if described is not None or calibration is None or calibration.modal is None:
+        return described
+    return friction_law(calibration.modal.parameters, description)
 
 
 def springs_of(description: RobotDescription, calibration: Calibration) -> tuple[Floats, Floats]:

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Literal
 
 from tvist_controller.calibrations import available, estimator_of, load
-from tvist_controller.calibrations.modal import Floats, friction_law, modal_estimator
+from tvist_controller.calibrations.modal import modal_estimator
 from tvist_plant.description import RobotDescription
 from tvist_plant.fingerprint import fingerprint
 from tvist_protocol.calibration import Calibration
@@ -43,16 +43,6 @@ class ModeSource:
         """Whether the calibration was measured on the arm of the robot file; None if the calibration does not say."""
         measured = None if self.calibration is None else self.calibration.provenance.arm
         return None if measured is None else measured == fingerprint(self.description)
-
-    @cached_property
-    def friction(self) -> Floats | None:
-        """Identified friction of the joints, see `friction_law`; None if the calibration has none.
-
-        Raises:
-            EstimatorError: The calibration has it for some joints only, or more than the drives have torque.
-        """
-        modal = None if self.calibration is None else self.calibration.modal
-        return None if modal is None else friction_law(modal.parameters, self.description)
 
     @property
     def most(self) -> int:
