@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Callable
+from dataclasses import fields
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -109,8 +110,9 @@ def _check_imperfections(description: RobotDescription, source: str | Path) -> N
         inner = known.get(key)
         more = value.keys() - inner.keys() if isinstance(value, dict) and isinstance(inner, dict) else set()
         for name in [key] * (key not in known) + [f"{key}.{one}" for one in sorted(more)]:
+            keys = ", ".join(one.name for one in fields(getattr(made, key) if more else made))
             raise RobotFileError(
-                f"robot file {source}: imperfections.{name:.200} is not a key of a robot file"
+                f"robot file {source}: imperfections.{name:.200} is not a key of a robot file: must be one of {keys}"
             )
     try:
         GearLaw.of(made, description)
