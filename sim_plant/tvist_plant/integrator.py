@@ -171,6 +171,10 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR09
     bias, last_bias = arm.dynamics[NOW, links], arm.dynamics[LAST, links]
     springs, f = arm.springs, arm.force
     h = period / substeps
+    sticks = False  # found once, since the arms whose motors do not stick have to stay as fast as without
+    for j in range(n):
+        joint = of_joint(arm.joints, j)
+        sticks = sticks or joint.stiction > 0.0 or joint.stiction_load > 0.0
     factorise(arm, h)
     for step in range(substeps):
         middle = (step + 0.5) / substeps
@@ -203,7 +207,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR09
             f[m] = torque + joint.velocity_gain * qd_r + joint.position_gain * q_r + slack - wave
             f[m] += joint.integral_gain * (s[j] + 0.5 * h * q_r) + more
             f[l] += wave - more
-            if joint.stiction > 0.0 or joint.stiction_load > 0.0:
+            if sticks:
                 turning = v[l] + 0.5 * h * a[l] - speed
                 spring = joint.gear_stiffness * (y[l] - y[m] + 0.5 * h * turning)
                 load[j] = spring + joint.gear_damping * turning - wave + more
@@ -225,7 +229,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR09
             a[m] = (a[m] - coupling(joint, h) * a[l]) / of_motor(joint, springs, m, h)
             q_r, _, _ = set_points(arm.commands, j, middle)
             s[j] += h * (q_r - (y[m] + 0.5 * h * (v[m] + 0.5 * h * a[m])))
-            if joint.stiction > 0.0 or joint.stiction_load > 0.0:
+            if sticks:
                 speed = v[m] + 0.5 * h * a[m]
                 d[j] = stuck(joint, d[j], h * speed, speed, load[j])
             if joint.hysteresis > 0.0:
