@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @contextmanager
 def designing(code: int = 2) -> Iterator[None]:
     """Tell why a shaper cannot be made of a calibration for an arm."""
-    from tvist_controller.commands.refusal import RefusalError
+    from tvist_controller.refusal import RefusalError
     from tvist_lab.study.recipes import RecipeError
     from tvist_shaping.errors import ShapingError
 
@@ -48,9 +48,10 @@ def load_given(place: str) -> "OwnShaper":
     Raises:
         Failure: The file contains no such shaper, or no file is named.
     """
-    from tvist_controller.sources.own_shapers import OwnShaperError, load_own
+    from tvist_controller.sources.own_files import OwnFileError
+    from tvist_controller.sources.own_shapers import load_own
 
-    with told(OwnShaperError, code=2):
+    with told(OwnFileError, code=2):
         return load_own(place)
 
 
@@ -90,9 +91,9 @@ def calibration_for(
     Raises:
         Failure: There is no such calibration or shaper.
     """
-    from tvist_controller.calibrations import default_for, load
-    from tvist_controller.commands.refusal import RefusalError
     from tvist_controller.planning.choices import wanted_modes
+    from tvist_controller.refusal import RefusalError
+    from tvist_controller.sources.calibrations import default_for, load
     from tvist_controller.sources.mode_source import modal_source
     from tvist_protocol.calibration import CalibrationError
     from tvist_shaping import Registry
@@ -117,7 +118,7 @@ def calibration_of(name: str) -> "Calibration":
     Raises:
         Failure: There is no such calibration.
     """
-    from tvist_controller.calibrations import load
+    from tvist_controller.sources.calibrations import load
     from tvist_protocol.calibration import CalibrationError
 
     with told(CalibrationError, code=2):

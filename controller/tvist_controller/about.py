@@ -6,16 +6,16 @@ from importlib.metadata import version
 import msgspec
 import numpy as np
 
-from tvist_controller.calibrations import available, fits
 from tvist_controller.controller import Controller
 from tvist_controller.foresight.stops import StopPlanner
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.setup import body, paper_payload
+from tvist_controller.sources.calibrations import available, fits
 from tvist_plant.description import RobotDescription
-from tvist_plant.plant import PERIOD, Plant
+from tvist_plant.plant import PERIOD, Things
 from tvist_protocol.channels import COMMANDS, tag
-from tvist_protocol.geometry import Capsule, Geometry, Mesh, World, WorldShape
+from tvist_protocol.geometry import Geometry
 from tvist_protocol.info import CalibrationInfo, Info, Limits, Stopping
 from tvist_protocol.values import PROTOCOL_VERSION
 
@@ -30,9 +30,9 @@ FIELDS = {tag(kind): list(kind.__struct_fields__) for kind in COMMANDS}
 
 def info_of(controller: Controller) -> Info:
     """Describe the robot, its limits and its present setup."""
-    setup, limits, lease = controller.setup, controller.setup.description.limits, controller.session.lease
-    hold = controller.stepping.hold
-    calibration = controller.filters.source.calibration
+    setup, limits = controller.setup, controller.setup.description.limits
+    lease, hold = controller.session.lease, controller.session.clock
+    calibration = controller.assumed.source.calibration
     watched = controller.watching is not None
     place = None if setup.plant is None else setup.plant.place
     own = (setup.calibration.name,) if setup.calibration is not None else ()
@@ -47,10 +47,10 @@ def info_of(controller: Controller) -> Info:
         clock=setup.clock,
         limits=Limits(
             position=[(-limit, limit) for limit in limits.position],
-            velocity=list(limits.velocity),
-            acceleration=list(limits.acceleration),
-            jerk=list(limits.jerk),
-            torque=list(limits.torque),
+            velocity=[*limits.velocity],
+            acceleration=[*limits.acceleration],
+            jerk=[*limits.jerk],
+            torque=[*limits.torque],
             payload=limits.payload,
         ),
         payload=controller.declared,
@@ -59,8 +59,8 @@ def info_of(controller: Controller) -> Info:
         else CalibrationInfo(
             name=calibration.name,
             payload_mass=calibration.payload.mass,
-            fits_payload=fits(calibration, controller.declared, controller.filters.source.name),
-            fits_arm=controller.filters.source.fits_arm,
+            fits_payload=fits(calibration, controller.declared, controller.assumed.source.name),
+            fits_arm=controller.assumed.source.fits_arm,
             seed=calibration.provenance.seed,
             f_d_range=calibration.provenance.measured_f_d_range,
             zeta_range=calibration.provenance.measured_zeta_range,
@@ -68,7 +68,7 @@ def info_of(controller: Controller) -> Info:
         ),
         shaper=tvist.name,
         modes=tvist.estimator.modes,
-        estimator=controller.filters.source.name,
+        estimator=controller.assumed.source.name,
         calibrations=sorted({*available(), *own}),
         shapers=list(setup.registry.names()),
         control=None if lease is None else lease.client,
@@ -82,48 +82,26 @@ def info_of(controller: Controller) -> Info:
         arm=controller.arm,
         programs=controller.programs.kept.names,
         poses=setup.description.poses,
-        geometry=geometry_of(setup.description, _world_of(controller.cycle.plant)),
+        geometry=geometry_of(setup.description, controller.cycle.plant.things()),
         watched=place if watched else None,
         moved=place if controller.supervision is not None else None,
     )
 
 
-def _world_of(plant: Plant) -> World | None:
-    """What stands around an arm, for clients that draw it; None if nothing does."""
-    things = plant.things()
-    if things is None:
-        return None
-    shapes = [
-        WorldShape(
-            kind=one.kind, size=list(one.size), pose=list(one.pose), body=one.body, colour=list(one.colour)
-        )
-        for one in things.shapes
-    ]
-    return World(name=things.name, bodies=list(things.bodies), shapes=shapes, unseen=things.unseen)
-
-
-def geometry_of(description: RobotDescription, world: World | None = None) -> Geometry:
-    """Kinematics and shape of an arm and its world, for clients that draw it."""
+def geometry_of(description: RobotDescription, things: Things | None = None) -> Geometry:
+    """Kinematics and shape of an arm and of what stands around it, for clients that draw it."""
     kinematics, collision = description.kinematics, description.collision
-    return Geometry(
-        a=list(kinematics.a),
-        d=list(kinematics.d),
-        alpha=list(kinematics.alpha),
-        placement=list(kinematics.placement),
-        bending=sorted(description.link_flexibility.links),
-        capsules=[
-            Capsule(name=body.name, link=body.link, start=body.start, end=body.end, radius=body.radius)
-            for body in collision.bodies
-        ],
-        meshes=[
-            Mesh(link=mesh.link, file=mesh.file, placement=mesh.placement, scale=mesh.scale)
-            for mesh in description.meshes
-        ],
-        payload_radius=collision.payload_radius,
-        floor=collision.floor,
-        has_floor=collision.has_floor,
-        world=world,
-    )
+    content = {
+        **msgspec.structs.asdict(kinematics),
+        "bending": sorted(description.link_flexibility.links),
+        "capsules": collision.bodies,
+        "meshes": description.meshes,
+        "payload_radius": collision.payload_radius,
+        "floor": collision.floor,
+        "has_floor": collision.has_floor,
+        "world": things,
+    }
+    return msgspec.convert(content, Geometry, from_attributes=True)
 
 
 # ---------------------------------------------------------------------- stops, as a safety report requires them

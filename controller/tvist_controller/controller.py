@@ -1,64 +1,33 @@
-"""The controller: messages in, replies, states and events out. It has no clock, socket, thread or log.
-
-It puts the rooms together: each part knows those below it, and the controller what they need of one another.
-"""
+"""The controller: messages in, replies, states and events out. It has no clock, socket, thread or log."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
-from functools import cached_property, partial
-from typing import Any, Unpack
+from functools import partial
+from typing import Any
 
-import numpy as np
-
-from tvist_controller.authority.rights import Authority
-from tvist_controller.authority.session import NoControlError
-from tvist_controller.cell.live_cell import LiveCell
-from tvist_controller.commands.counters import Counters
-from tvist_controller.commands.events import Fields
-from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.dispatch.guided_commands import ForceCommands, GuidedCommands
-from tvist_controller.dispatch.motion_commands import MotionCommands
-from tvist_controller.dispatch.payload_control import PayloadControl
 from tvist_controller.dispatch.planner import Planner
-from tvist_controller.dispatch.program_commands import ProgramCommands
-from tvist_controller.dispatch.setpoints import Setpoints, Unreadable
-from tvist_controller.dispatch.table import COMMANDS, HARMLESS, WholeRobot
-from tvist_controller.foresight.collision import CollisionModel
-from tvist_controller.instruments.peripherals import Peripherals
-from tvist_controller.instruments.tool_forces import ToolForces
-from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.dispatch.rights import NoControlError, is_holders
+from tvist_controller.dispatch.robot import Robot
+from tvist_controller.dispatch.table import COMMANDS, HARMLESS
+from tvist_controller.instruments.report import TRUE_MODES_EVERY, Report, true_modes, truth_message
 from tvist_controller.line.sample import Sample
-from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.motion.filter_control import Filters
-from tvist_controller.motion.force_control import ForceControl
-from tvist_controller.motion.guidance import Guidance
-from tvist_controller.motion.monitor import Monitor
+from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.planning.command_row import Call
-from tvist_controller.planning.filter_planner import PlannedFilter
-from tvist_controller.planning.plan import Order, Plan, Plans
-from tvist_controller.planning.snapshot import Snapshot
-from tvist_controller.programs.access import Access
-from tvist_controller.programs.player import ProgramPlayer
-from tvist_controller.reporting.report import Report, Reporter, truth_of
-from tvist_controller.safety.faults import Faults
-from tvist_controller.safety.monitors import Overload, ShaperMonitor
-from tvist_controller.safety.own_controller import REFUSED, Supervision, Watching
-from tvist_controller.safety.robot_modes import RobotModes
-from tvist_controller.safety.safety_control import SafetyControl
-from tvist_controller.setup import Setup, body
-from tvist_plant.fingerprint import fingerprint
+from tvist_controller.planning.plan import Order, Plan
+from tvist_controller.refusal import RefusalError
+from tvist_controller.safety.own_controller import REFUSED
+from tvist_controller.setup import Setup
 from tvist_plant.foreign import arm_of
-from tvist_plant.plant import PERIOD, Plant, PlantError, RealArm, SimulatedArm
+from tvist_plant.plant import PERIOD, Plant, PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Refused, Reply
-from tvist_protocol.simulation import SimulationReset, SimulationStep
-from tvist_protocol.stream import Event, EventKind, State, Truth
-from tvist_protocol.values import Payload
+from tvist_protocol.simulation import SimulationStep
+from tvist_protocol.stream import Event, State, Truth
 
 
-class Controller(WholeRobot):
+class Controller(Robot):
     """One robot.
 
     Args:
@@ -74,93 +43,13 @@ class Controller(WholeRobot):
         plant = setup.made_plant() if plant is None else arm_of(plant)
         setup = setup.standing(plant)
         setup.check(placed=plant is None or not (plant.watched or plant.supervised))
-        self.setup = setup
-        """Initial setup; of an arm that cannot be placed, with the posture in which it stood."""
-        self.tick_number = 0
-        self.counters = Counters()
-        self._events: list[Event] = []
-        planner = Planner(setup)
         self._failed: PlantError | None = None
         """Failure of the plant between two ticks, with which the next one deals."""
         self._next_timeout = -math.inf
         """Time at which something may time out next [s]."""
-        self.plans = Plans(planner, self.snapshot, order)
-        """The way to plans."""
-        first = planner.filters.first()
-        self.cycle = _cycle(setup, first, plant)
-        self._seed = setup.seed
-        self._reporter = Reporter(setup.description, self.cycle.plant)
-        # What only watches has no power to move anything, whatever is asked of it.
-        mode = "POWER_OFF" if self.cycle.plant.watched else setup.mode
-        collisions = CollisionModel(setup.description, body(setup.payload))
-        self.motion = MotionControl(self.cycle, collisions, self._emit, mode)
-        self.modes = RobotModes(self.motion)
-        """Robot mode, safety mode and runtime state."""
-        self.session = Authority(
-            self._interrupt, self._emit, realtime=setup.clock == "realtime", instance=setup.instance
-        )
-        """Rights to control the robot and to advance time."""
-        self.stepping = self.session.stepping
-        self._setpoints = Setpoints(self.session, self.motion, self.counters)
-        self._safety = safety = SafetyControl(self.motion, self._emit)
-        self._faults = Faults(self.motion, safety)
-        self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
-        self.watching, self.supervision = self._own_controller()
-        """The robot's own controller, which is only watched, or through which the robot is moved; None for neither."""
-        self.forces = ToolForces(
-            setup.description, self.peripherals, lambda: self.latest, lambda: self.declared
-        )
-        """Forces and torques on the arm."""
-        self.cell = (
-            None
-            if setup.cell is None
-            else LiveCell(setup.cell, setup.description, self.cycle.plant, self.peripherals, self._emit)
-        )
-        """What stands around the robot; None for nothing."""
-        self._force_control = ForceControl(
-            Guidance(self.motion), self.forces, timeouts=setup.clock == "realtime"
-        )
-        self.programs = ProgramPlayer(self._access(), safety)
-        self._told_program = self.programs.progress
-        self.filters = Filters(self.motion, first.source, setup.payload, self._emit)
-        self.payload = PayloadControl(
-            setup.payload, self.motion, self.filters, self.peripherals, planner.for_lesson, self._emit,
-            follows=setup.adapt == "payload",
-        )  # fmt: skip
-        """What it carries."""
-        safety.monitors = self._monitors()
-        parts = (
-            self.session, MotionCommands(self.motion, safety, self.programs),
-            GuidedCommands(self._force_control.guidance, self.programs),
-            ForceCommands(self._force_control, self.forces), self.filters, self.payload, self.peripherals,
-            self._faults, ProgramCommands(self.programs, self.motion), self,
-        )  # fmt: skip
-        self._parts: dict[type[c.Command], Any] = {row.message: part for part in parts for row in part.rows}
-        """The part that carries out each command."""
-        self.report = self._report(self.cycle.sample)
-        """Report of the last tick, or of the arm at rest if it has not ticked yet or was placed somewhere since."""
-
-    @property
-    def declared(self) -> Payload:
-        """Declared payload; that of a robot that is watched, if it says so."""
-        declared = self.payload.declared
-        return declared if self.watching is None else self.watching.declared(declared)
-
-    @property
-    def now(self) -> float:
-        """Time of the present tick [s], which only ticks advance."""
-        return self.tick_number * PERIOD
-
-    @cached_property
-    def arm(self) -> str:
-        """Fingerprint of the arm that the robot file describes."""
-        return fingerprint(self.setup.description)
+        super().__init__(setup, plant, Planner(setup), order)
 
     # ------------------------------------------------------------------ inputs
-
-    def snapshot(self, time: float | None = None) -> Snapshot:
-        """The present state that plans depend on; for a time, that of a path that goes on from the running motion."""
-        return self.motion.snapshot(self.filters.present, self.programs.statements.last, time)
 
     def receive(
         self,
@@ -183,7 +72,7 @@ class Controller(WholeRobot):
             token: Any = getattr(command, "token", None)
             if row.lease == "needed" or (row.lease == "if named" and token is not None):
                 self.session.renew(token, self.now)
-            reply = self._carry_out(command, plan, session, origin)
+            reply = self.carry_out(command, plan, session, origin)
         except (RefusalError, NoControlError) as refusal:
             self.counters.refused += 1
             return refusal.reply
@@ -193,7 +82,7 @@ class Controller(WholeRobot):
             return Refused(code="plant_failure", where="", why=str(error))
         return Done() if reply is None else reply
 
-    def _carry_out(
+    def carry_out(
         self,
         command: c.Command,
         plan: Plan | None = None,
@@ -210,12 +99,12 @@ class Controller(WholeRobot):
             raise RefusalError("wrong_mode", "", REFUSED)
         if self.supervision is not None:
             self.supervision.check(command)
-        self._look_again()
+        if not isinstance(command, SimulationStep):  # which changes nothing before its ticks
+            self._look_again()
         row, planned = COMMANDS[type(command)], partial(self.plans.found, command, plan)
         if row.check is not None:
             row.check(command, self.setup.description)
-        call = Call(command, self.tick_number + 1, self.now, session, planned, origin)
-        reply = row.handle(self._parts[type(command)], call)
+        reply = row.handle(self, Call(command, self.tick_number + 1, self.now, session, planned, origin))
         self.peripherals.changed |= row.changes_io
         return reply
 
@@ -226,13 +115,24 @@ class Controller(WholeRobot):
 
         Args:
             setpoint: The set-point; None for one that was not admitted.
-            note: Notes it in the journal; called if it is of the client in control.
+            note: Notes it in the journal; called before anything changes, if it is of the client in control.
         """
-        self._setpoints.receive(setpoint, self.now, note)
+        self.counters.setpoints_received += 1
+        if setpoint is None or not is_holders(self.session.lease, setpoint.token):
+            self.counters.setpoints_refused += 1  # neither the stream nor the journal is concerned
+            return
+        if note is not None:
+            note()
+        if self.motion.streams.take(setpoint, self.now) and setpoint.token is not None:
+            self.session.renew(setpoint.token, self.now)
+        else:
+            self.counters.setpoints_refused += 1
 
     def refuse_setpoint(self, why: str) -> None:
         """Count and drop a set-point of the client in control; if the stream falls silent, its end gives the reason."""
-        self._setpoints.refuse(why)
+        self.counters.setpoints_received += 1
+        self.counters.setpoints_refused += 1
+        self.motion.streams.refuse(why)
 
     def client_gone(self, client: str, session: str) -> None:
         """Handle the end of a client's session, which ends the rights it held."""
@@ -243,12 +143,11 @@ class Controller(WholeRobot):
         """Count ticks that began too late."""
         self.counters.missed_ticks += ticks
 
-    # ------------------------------------------------------------------ outputs
+    def fail(self, why: str) -> None:
+        """Let the next tick deal with a failure of the plant that something outside the controller has seen."""
+        self._failed = PlantError(why)
 
-    @property
-    def latest(self) -> State:
-        """State of the last tick; see `report`."""
-        return self.report.state
+    # ------------------------------------------------------------------ ticks
 
     def tick(self) -> tuple[State, list[Event]]:
         """Compute one control period."""
@@ -266,91 +165,72 @@ class Controller(WholeRobot):
             self.tick_number = max(self.tick_number, 0 if tick is None else tick - 1)
             self.counters.missed_ticks = self.watching.missed
             self.watching.tell_cycle()
-        if self.supervision is not None:
-            try:
+        try:
+            if self.supervision is not None:
                 self.supervision.look()
-            except PlantError as error:
-                self._failed = error
-            self.counters.missed_ticks = self.supervision.missed
-        if self.now >= self._next_timeout:
-            try:
+                self.counters.missed_ticks = self.supervision.missed
+            if self.now >= self._next_timeout:
                 self._watch_time()
-            except PlantError as error:  # a push that ends
-                self._failed = error
+        except PlantError as error:  # it does not answer, or a push that ends fails
+            self._failed = error
         if not self.programs.idle:
             self._look_again()
             self.programs.advance(self.tick_number + 1)
 
     def complete_tick(self) -> tuple[Report, list[Event]]:
-        """Compute the rest of a control period that has begun."""
-        if self.watching is not None:
-            return self._complete_watched(self.watching)
-        failed, self._failed = self._failed, None
+        """Compute the rest of a control period that has begun.
+
+        Nothing here judges what a robot that is watched said, since nothing here could stop it.
+        """
+        sample = self._step() if self.watching is None else self.watching.sample()
+        self.tick_number += 1
+        events, self.events = self.events, []
+        self.report = self.reported(sample)
+        return self.report, events
+
+    def _step(self) -> Sample:
+        """Let the arm go on by a tick, and judge that."""
+        motion, failed, self._failed = self.motion, self._failed, None
         try:
             if failed is not None:
                 raise failed
-            sensor = self._force_control.external
-            sample = self.motion.step(None if sensor.latest is None else sensor.next())
-            self._safety.watch_power(sample)
+            force = self.force_control
+            sample = motion.step(None if force.external.latest is None else force.sensed())
+            self.safety.watch_power(sample)
             if self.cell is not None:
                 self.cell.tick(self.tick_number + 1, sample.measured.q)
         except PlantError as error:
             with suppress(PlantError):
-                self._faults.clear()
-            sample = self._safety.recover(error, self._seed)
-            self.modes.changed = True
-        self._safety.watch(sample)
-        self.modes.update()
-        self.tick_number += 1
-        events, self._events = self._events, []
-        self.report = self._report(sample)
-        self.programs.steadiness.note(sample.measured.q, at_rest=self.cycle.mode.at_rest)
-        return self.report, events
-
-    def _complete_watched(self, watching: Watching) -> tuple[Report, list[Event]]:
-        """Report what a robot that is watched said; nothing here judges it, since nothing here could stop it."""
-        sample = watching.sample()
-        self.tick_number += 1
-        events, self._events = self._events, []
-        self.report = self._report(sample)
-        return self.report, events
-
-    def _report(self, sample: Sample) -> Report:
-        motion, cycle = self.motion, self.cycle
-        return self._reporter.report(
-            self.tick_number, sample, cycle.tvist, cycle.drives.delay, self.modes.now,
-            motion.motions.speed if self.watching is None else self.watching.speed,
-            motion.streams.sequence, self.counters.missed_ticks,
-        )  # fmt: skip
+                self.faults.clear()
+            sample = self.safety.recover(error, self.seed)
+            motion.changed = True
+        self.safety.watch(sample)
+        if motion.changed:
+            self.modes.update()
+        motion.note(sample)
+        return sample
 
     def _look_again(self) -> None:
         """Let the next tick see what has timed out, and what modes have become: a command may have changed both."""
-        self._next_timeout, self.modes.changed = -math.inf, True
+        self._next_timeout, self.motion.changed = -math.inf, True
 
-    def io(self, *, wrench: bool = True) -> Io:
-        """Return inputs, outputs and registers as they are for the next tick.
+    def _watch_time(self) -> None:
+        """End what has timed out or run its course, and note when something will next."""
+        self.faults.end(self.tick_number + 1)
+        self.session.watch(self.now)
+        self._next_timeout = min(PERIOD * (self.faults.next_end - 1), self.session.ends)
+        if self.setup.clock == "realtime":
+            self.motion.watch(self.now)
+            self._next_timeout = min(self._next_timeout, self.motion.streams.silent_at)
+        self.motion.changed = True
 
-        Args:
-            wrench: Whether to compute the wrench at the tool, which takes a third of a tick.
-        """
-        said = self.watching or self.supervision
-        estimated = wrench and said is None
-        io = self.peripherals.io(
-            self.tick_number + 1,
-            self.payload.declared,
-            self.motion.motions.asked_speed,
-            self.programs.published,
-            self.forces.wrench() if estimated else None,
-            None if self.payload.assumed == self.payload.declared else self.payload.assumed,
-        )
-        return io if said is None else said.io(io, force=wrench)
+    # ------------------------------------------------------------------ outputs
 
     def changed_io(self) -> Io | None:
         """Return inputs, outputs and registers before a tick, if they changed since the last call; else None."""
-        program, peripherals = self.programs.progress, self.peripherals
-        if not peripherals.changed and program == self._told_program:
+        if not self.peripherals.changed:
             return None
-        peripherals.changed, self._told_program = False, program
+        self.peripherals.changed = False
         return self.io(wrench=False)
 
     def truth(self) -> Truth | None:
@@ -359,137 +239,11 @@ class Controller(WholeRobot):
         Raises:
             ValueError: The plant does not provide it.
         """
+        plant = self.cycle.plant
         try:
-            return self._reporter.truth(self.tick_number, with_modes=self.setup.truth)
+            if self.setup.truth and (not self.true_modes or self.tick_number % TRUE_MODES_EVERY == 0):
+                self.true_modes = true_modes(plant, self.setup.description.joints)
+            return truth_message(plant, self.tick_number, self.true_modes)
         except PlantError as error:
             self._failed = error
             return None
-
-    def fail(self, why: str) -> None:
-        """Let the next tick deal with a failure of the plant that something outside the controller has seen."""
-        self._failed = PlantError(why)
-
-    def _emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
-        """Store an event of the tick that is being computed, or of the next one between two ticks."""
-        event = Event(tick=self.tick_number + 1, kind=kind, **fields)
-        self._events.append(event)
-        self.modes.hear(event)
-        self.programs.hear(event)
-
-    def _watch_time(self) -> None:
-        """End what has timed out or run its course, and note when something will next."""
-        self._faults.end(self.tick_number + 1)
-        self.session.watch(self.now)
-        self._next_timeout = min(PERIOD * (self._faults.next_end - 1), self.session.ends)
-        if self.setup.clock == "realtime":
-            self.motion.watch(self.now)
-            self._next_timeout = min(self._next_timeout, self.motion.streams.silent_at)
-        self.modes.changed = True
-
-    def _interrupt(self, why: str) -> None:
-        """End the activities that need control, when no client has control any more."""
-        self.programs.end(why)
-        self.motion.interrupt(why)
-
-    def _own_controller(self) -> tuple[Watching | None, Supervision | None]:
-        """Return what follows a robot's own controller; see `watching` and `supervision`."""
-        tools, set_tcp, plant = self.peripherals, self._reporter.set_tcp, self.cycle.plant
-        if isinstance(plant, RealArm) and plant.watched:
-            return Watching(plant, self.cycle, self.modes, tools, set_tcp, self._emit), None
-        if isinstance(plant, RealArm) and plant.supervised:
-            return None, Supervision(plant, self.motion, self._safety, tools, tools.set_tcp, self._emit)
-        return None, None
-
-    def _monitors(self) -> Sequence[Monitor]:
-        """Return all that judges the signals of a tick, in this order."""
-        description = self.setup.description
-        overload = Overload(description.robot.joints, description.limits.torque)
-        # An arm with a controller of its own is watched by that; here its torques may be guessed from currents.
-        drives = () if self.cycle.plant.supervised else (overload,)
-        return *drives, ShaperMonitor(self.cycle), self._force_control, self.payload.monitor
-
-    def _access(self) -> Access:
-        """What programs may use of the robot."""
-        return Access(
-            description=self.setup.description,
-            motion=self.motion,
-            guidance=self._force_control.guidance,
-            peripherals=self.peripherals,
-            emit=self._emit,
-            send=self._carry_out,
-            plans=self.plans,
-            latest=lambda: self.latest,
-            io=lambda: self.io(wrench=False),
-            declared=lambda: self.declared,
-            force=self._force_control,
-            forces=self.forces,
-            shape_guided=self.setup.shape_servo,
-            cell=self.cell,
-        )
-
-    # ------------------------------------------------------------------ commands that concern the whole robot
-
-    def place(self, call: Call[SimulationReset]) -> Reply:
-        """Place the simulated arm somewhere at rest."""
-        command, chosen, plant = call.command, call.planned(), self.cycle.plant
-        if not isinstance(plant, SimulatedArm):
-            name = type(plant).__name__
-            raise RefusalError(
-                "unknown_type", "type", f"the plant {name} cannot be put anywhere: it has no reset"
-            )
-        q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
-        carried = None if command.payload is None else body(command.payload)
-        if self.cell is not None:
-            carried = carried or self.cell.empty
-        placed = [] if carried is None else [carried]
-        if command.q is not None:
-            placed = [self.motion.collisions.declared, *(placed or [plant.payload])]
-        blamed = "payload" if command.q is None and command.payload is not None else "q"
-        self.motion.collisions.check_place(q, placed, blamed)
-        met = plant.obstacle(q, carried)
-        if met is not None:
-            raise RefusalError("collision", blamed, f"{met}: choose a posture in which the arm is clear")
-        self.programs.end("simulation.reset")
-        self.motion.abandon("simulation.reset")
-        self._faults.clear()
-        if chosen is not None:
-            self.filters.use(chosen)
-        if command.seed is not None:
-            self._seed = command.seed
-        self.cycle.reset(q, carried=carried, seed=self._seed)
-        if self.cell is not None and carried is not None:
-            self.cell.begin(carried)
-        self._safety.put(command.mode)
-        if command.mode is not None:
-            self.modes.forget_stops()
-        self._reporter.forget_modes()
-        self.modes.update()
-        self.report = self._report(self.cycle.sample)
-        self._force_control.begin_anew()
-        self.programs.steadiness.forget()
-        return Done(tick=self.tick_number)
-
-    def check_step(self, call: Call[SimulationStep]) -> Reply:
-        """Check that a client may advance time; the host then does so."""
-        self.session.check_step(call.command, call.now)
-        self._setpoints.check(call.command)
-        return Done(tick=self.tick_number + call.command.ticks)
-
-
-def _cycle(setup: Setup, first: PlannedFilter, plant: Plant | None) -> ControlCycle:
-    """The control line with its arm.
-
-    Raises:
-        ValueError: The arm cannot be where it is to begin, or has no truth to report.
-    """
-    try:
-        cycle = ControlCycle(
-            setup.description, first.tvist, elastic=first.elastic, q=np.array(setup.q, dtype=float),
-            declared=body(setup.payload), carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
-            compensate_sag=setup.compensate_sag, law=first.law,
-        )  # fmt: skip
-    except PlantError as error:
-        raise ValueError(str(error)) from error
-    if setup.truth:
-        truth_of(cycle.plant)  # raises now, not at the first tick
-    return cycle

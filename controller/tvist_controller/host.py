@@ -9,22 +9,20 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 from tvist_controller.about import info_of
-from tvist_controller.authority.session import is_holders
-from tvist_controller.authority.stepping import Standing, may_step
 from tvist_controller.cell.gripper import changes
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
-from tvist_controller.dispatch.setpoints import Unreadable
-from tvist_controller.experience.experience import Experience
+from tvist_controller.dispatch.rights import Standing, is_holders, may_step
+from tvist_controller.instruments.sink import Sink
+from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.socket_traffic import NoPorts, SocketNews, SocketPorts
-from tvist_controller.reporting.sink import Sink
+from tvist_controller.safety.experience import Experience
 from tvist_plant.foreign import told
 from tvist_plant.user_file import named
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command, Forget, Setpoint
 from tvist_protocol.journal import Entry, entry_of
-from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event
@@ -95,8 +93,8 @@ class Host:
             self.controller.session.lease, getattr(command, "token", None)
         ):
             self._note(entry)
-        if self._experience is not None and not isinstance(reply, Refused):
-            self._outdate(self._experience, command)
+        if self._experience is not None and not isinstance(reply, Refused) and self._forgets(command):
+            self._experience.void()
         if isinstance(command, SimulationStep) and isinstance(reply, Done):
             reply = self._step(command, attend)
         self.standing = self._standing()
@@ -157,8 +155,8 @@ class Host:
         if experience is not None:
             experience.watch(
                 report.sample,
-                controller.payload.beliefs,
-                held=controller.payload.held,
+                controller.assumed.beliefs,
+                held=controller.assumed.held,
                 placements=controller.cycle.placements,
             )
         for sink in self._sinks:
@@ -172,27 +170,22 @@ class Host:
             self.socket(one)
         self.tell_raised()
 
-    def _take(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
-        self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
-        self.controller.payload.learn(lesson, plan)
-
     def _learn(self, experience: Experience) -> None:
         for beliefs, lesson, plan in experience.lessons():
-            if beliefs.payload != self.controller.payload.beliefs().payload:
+            if beliefs.payload != self.controller.assumed.beliefs().payload:
                 continue  # it is void: another payload was declared, learnt or forgotten since
-            self._take(lesson, plan)
+            self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
+            self.controller.assumed.learn(lesson, plan)
         for error in experience.raised():
             self.warn(f"a motion has taught nothing: {named(error)}")
             for sink in self._sinks:
                 sink.raised(error)
 
-    def _outdate(self, experience: Experience, command: Command) -> None:
-        """Drop what a command that was carried out makes wrong."""
-        match command:
-            case Forget():
-                experience.void()
-            case SimulationReset() if command.payload is not None or self.controller.cell is not None:
-                experience.void()
+    def _forgets(self, command: Command) -> bool:
+        """Whether a command that was carried out makes wrong what is being learnt."""
+        if isinstance(command, SimulationReset):
+            return command.payload is not None or self.controller.cell is not None
+        return isinstance(command, Forget)
 
     def _tell_truth(self) -> None:
         """Pass on what a real robot cannot measure, computed once, to those who want it."""
@@ -284,7 +277,7 @@ class Host:
 
     def _standing(self) -> Standing:
         controller = self.controller
-        return Standing(controller.session.lease, controller.stepping.hold)
+        return Standing(controller.session.lease, controller.session.clock)
 
     def _step(self, step: SimulationStep, attend: Attend | None) -> Done:
         """Tick as often as a step says, or until its token no longer gives the right to advance time."""
@@ -295,7 +288,7 @@ class Host:
             for _ in range(step.ticks):
                 going_on = attend is None or attend()
                 if not going_on or not may_step(
-                    controller.stepping.hold, controller.session.lease, step.token
+                    controller.session.clock, controller.session.lease, step.token
                 ):
                     break
                 setpoint = next(setpoints, None)

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 
 from tvist_controller.controller import Controller
-from tvist_controller.experience.experience import Student, experience_of
 from tvist_controller.host import Host
-from tvist_controller.reporting.report import Report
-from tvist_controller.reporting.sink import Sink, Topic
+from tvist_controller.instruments.report import Report
+from tvist_controller.instruments.sink import Sink, Topic
+from tvist_controller.safety.experience import Student, experience_of
 from tvist_controller.setup import Setup
 from tvist_plant.plant import Plant
 from tvist_protocol.codec import encode

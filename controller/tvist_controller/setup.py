@@ -28,6 +28,12 @@ from tvist_protocol.values import Payload, ResetMode
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.named import Registry
 
+_RECORDED = (
+    "description", "q", "payload", "carried", "mode", "calibration", "name", "shaper", "seed", "clock", "truth",
+)  # fmt: skip
+"""Fields that every recording has as they are."""
+_LATER = ("compensate_sag", "shape_servo", "instance", "hidden")
+"""Fields that recordings from before these options existed do not have."""
 Adapt = Literal["payload"]
 """What can follow a robot's own motions."""
 
@@ -65,7 +71,7 @@ class Setup:
     plant: OwnPlant | None = None
     """Plant other than the flexible arm of the description; None for that."""
     hidden: int | None = None
-    """Seed of a hidden robot, see `tvist_plant.hidden`; None for the robot of the description."""
+    """Seed of a hidden robot, see `tvist_plant.variants`; None for the robot of the description."""
     shape_servo: bool = False
     """Whether `servoj`, `speedj` and `speedl` of programs are shaped where they begin at rest."""
     cell: Cell | None = None
@@ -138,7 +144,7 @@ class Setup:
         """Make the plant; None for the flexible arm of the description.
 
         Raises:
-            OwnPlantError: It cannot be made.
+            OwnFileError: It cannot be made.
         """
         carried = body(self.carried or self.payload)
         if self.hidden is not None:
@@ -170,26 +176,18 @@ class Setup:
 
     def to_builtins(self) -> dict[str, Any]:
         """Convert the setup to maps and lists for a recording."""
-        return {
-            "description": msgspec.to_builtins(self.description),
-            "q": list(self.q),
-            "payload": msgspec.to_builtins(self.payload),
-            "carried": msgspec.to_builtins(self.carried),
-            "mode": self.mode,
-            "calibration": msgspec.to_builtins(self.calibration),
-            "name": self.name,
-            "shaper": self.shaper,
-            "seed": self.seed,
-            "clock": self.clock,
-            "truth": self.truth,
-            "own_shapers": [msgspec.to_builtins(own.recorded) for own in self.own_shapers],
-            "compensate_sag": self.compensate_sag,
-            "shape_servo": self.shape_servo,
-            **({} if self.cell is None else {"cell": msgspec.to_builtins(self.cell)}),
-            **({} if self.plant is None else {"plant": msgspec.to_builtins(self.plant.recorded)}),
-            **({} if self.hidden is None else {"hidden": self.hidden}),
-            **({"instance": self.instance} if self.instance else {}),
-            **({} if self.adapt is None else {"adapt": self.adapt}),
+        content = {name: msgspec.to_builtins(getattr(self, name)) for name in _RECORDED}
+        content["own_shapers"] = [msgspec.to_builtins(own.recorded) for own in self.own_shapers]
+        content |= {name: getattr(self, name) for name in ("compensate_sag", "shape_servo")}
+        optional = {
+            "cell": self.cell,
+            "plant": self.plant and self.plant.recorded,
+            "hidden": self.hidden,
+            "instance": self.instance or None,
+            "adapt": self.adapt,
+        }
+        return content | {
+            name: msgspec.to_builtins(value) for name, value in optional.items() if value is not None
         }
 
     @classmethod
@@ -208,26 +206,19 @@ class Setup:
         """
         try:
             calibration = content["calibration"]
-            return replace(
-                cls(
-                    description=checked(content["description"], RobotDescription),
-                    q=tuple(map(float, content["q"])),
-                    payload=checked(content["payload"], Payload),
-                    carried=None if content["carried"] is None else checked(content["carried"], Payload),
-                    mode=msgspec.convert(content["mode"], ResetMode),
-                    calibration=None if calibration is None else calibration_of(calibration),
-                    own_shapers=tuple(own_shapers),
-                    plant=plant,
-                    cell=checked(content["cell"], Cell) if "cell" in content else None,
-                    adapt=msgspec.convert(content.get("adapt"), Adapt | None),
-                ),
-                **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
-                # Recordings from before these options existed do not have them.
-                **{
-                    key: content[key]
-                    for key in ("compensate_sag", "shape_servo", "instance", "hidden")
-                    if key in content
-                },
+            return cls(
+                description=checked(content["description"], RobotDescription),
+                q=tuple(map(float, content["q"])),
+                payload=checked(content["payload"], Payload),
+                carried=None if content["carried"] is None else checked(content["carried"], Payload),
+                mode=msgspec.convert(content["mode"], ResetMode),
+                calibration=None if calibration is None else calibration_of(calibration),
+                own_shapers=tuple(own_shapers),
+                plant=plant,
+                cell=checked(content["cell"], Cell) if "cell" in content else None,
+                adapt=msgspec.convert(content.get("adapt"), Adapt | None),
+                **{name: content[name] for name in ("name", "shaper", "seed", "clock", "truth")},
+                **{name: content[name] for name in _LATER if name in content},
             )
         except KeyError as error:
             raise ValueError(f"initial setup in the recording: {error.args[0]} is missing") from error

@@ -236,7 +236,7 @@ def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
                 )
             controller.cell.answer(entry.data or b"")
         case "lesson":
-            controller.payload.learn(lesson_of(entry))
+            controller.assumed.learn(lesson_of(entry))
         case "setpoint_refused":
             controller.refuse_setpoint(entry.why or "")
         case _:

@@ -86,7 +86,8 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
             apart = max(apart, abs(new[i, k] - old[i, k]))
     h2 = period * period
     if (1.0 - share) * apart <= ROUNDING * acceleration * h2:
-        out[2] = new[2]
+        for k in range(joints):
+            out[2, k] = new[2, k]
         return 1.0, 0.0, 0.0
     least, most = -math.inf, math.inf  # bounds of s for the limits of this tick
     # Highest ṡ from which s can come to rest at 1 with a share of the jerk limit.

@@ -87,7 +87,8 @@ def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> 
         Number of taps up to the last one that matters, as `length` does.
     """
     ticks, N = past.shape[1], taps.shape[0]
-    out[:] = taps
+    for n in range(N):
+        out[n] = taps[n]
     for stage in range(3):
         for n in range(N):
             sums[stage, n] += out[n] - past[stage, row, n]

@@ -36,9 +36,6 @@ def chain_of(model: pin.Model, frame: int) -> Floats:
     A row has the rotation (9) and translation (3) of a joint's frame, whose z is its axis, in that of the joint before,
     and its body's ten inertial parameters in pinocchio's order [kg, kg m, kg m^2]. The last row places the frame at the
     end.
-
-    Raises:
-        ValueError: The model is no chain of joints that turn about an axis of their frame.
     """
     links = model.nv
     chain = np.zeros((links + 1, WIDTH))

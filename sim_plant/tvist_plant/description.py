@@ -1,16 +1,14 @@
 """A robot as described by its file: numbers with units, checked but not processed."""
 
-import re
 import tomllib
-from collections.abc import Callable
-from dataclasses import fields
+from hashlib import sha256
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 
-from tvist_plant.robot_checks import check, is_real_body
+from tvist_plant.robot_checks import check, in_words, is_real_body
 from tvist_plant.robot_tables import (
     DISTURBANCES,
     QUIET_STEP,
@@ -34,18 +32,24 @@ __all__ = [
     "Payload",
     "RobotDescription",
     "Tensor",
+    "fingerprint",
     "is_real_body",
     "load",
     "robots",
 ]
 
+_ROBOTS: Final = resources.files("tvist_plant") / "robots"
+_VIBRATING: Final = (
+    "gear_stiffness", "gear_damping", "rotor_inertia", "velocity_gain", "position_gain", "integral_gain",
+    "coulomb_friction", "friction_width",
+)  # fmt: skip
+"""Parameters of the drives that determine frequency and damping; feed-forward and gear error only excite vibration."""
+
 
 def robots() -> tuple[str, ...]:
     """Names of the robots that come with the package."""
-    folder = resources.files("tvist_plant") / "robots"
-    return tuple(
-        sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    )
+    files = (entry.name for entry in _ROBOTS.iterdir())
+    return tuple(sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml")))
 
 
 def load(robot: str | Path) -> RobotDescription:
@@ -58,18 +62,10 @@ def load(robot: str | Path) -> RobotDescription:
         DescriptionError: There is no such robot, or the file is invalid; the message names the key.
         UserFileError: The file is not text, too large, nested too deeply, or has its limits in degrees.
     """
-    shipped = resources.files("tvist_plant") / "robots" / f"{robot}.toml"
     try:
-        if isinstance(robot, str) and robot in robots():
-            content = toml(shipped.read_text(encoding="utf-8"))
-        elif Path(robot).suffix == ".urdf":
-            from tvist_plant.urdf import read_urdf  # pinocchio is slow to import
-
-            content = with_limits(read_urdf(robot))
-        else:
-            content = read_toml(robot, "robot file")
-        content = completed(content)
+        content = completed(_content(robot))
         description = msgspec.convert(content, RobotDescription)
+        check(description)
     except OSError as error:
         known = ", ".join(robots())
         raise DescriptionError(
@@ -78,107 +74,29 @@ def load(robot: str | Path) -> RobotDescription:
     except tomllib.TOMLDecodeError as error:
         raise RobotFileError(f"robot file {robot}: it is not valid TOML: {error}") from error
     except msgspec.ValidationError as error:
-        raise RobotFileError(f"robot file {robot}: {_in_words(error, content)}") from error
-    check(description, robot)
-    if description.imperfections:
-        _check_imperfections(description, robot)
+        raise RobotFileError(f"robot file {robot}: {in_words(error, content)}") from error
+    except RobotFileError as error:
+        raise RobotFileError(f"robot file {robot}: {error}") from error
     return description
 
 
-def _check_imperfections(description: RobotDescription, source: str | Path) -> None:
-    """Check the table of imperfections by converting it, and that this arm can have them.
+def _content(robot: str | Path) -> dict[str, Any]:
+    if isinstance(robot, str) and robot in robots():
+        return toml((_ROBOTS / f"{robot}.toml").read_text(encoding="utf-8"))
+    if Path(robot).suffix == ".urdf":
+        from tvist_plant.urdf import read_urdf  # pinocchio is slow to import
 
-    Raises:
-        RobotFileError: A key is unknown, or a value wrong; the message names the file and the key.
+        return with_limits(read_urdf(robot))
+    return read_toml(robot, "robot file")
+
+
+def fingerprint(description: RobotDescription) -> str:
+    """Return a fingerprint of everything that affects vibration: geometry, masses, springs, dampers and drive gains.
+
+    It tells whether two robot files describe the same arm. Names, limits, poses, collision bodies, sensors and the
+    payload are left out; a calibration itself contains the payload that it was measured with. The 16 hexadecimal digits
+    are equal for equal numbers on every machine.
     """
-    from tvist_plant.imperfections import (
-        GearLaw,
-        Imperfections,
-        imperfect_model,
-    )  # pinocchio is slow to import
-
-    table = {"imperfections": description.imperfections}
-    try:
-        made = Imperfections.of(description)
-    except msgspec.ValidationError as error:
-        said, _, path = str(error).partition(" - at `$")
-        inner = path.rstrip("`")
-        told = _in_words(msgspec.ValidationError(f"{said} - at `$.imperfections{inner}`"), table)
-        raise RobotFileError(f"robot file {source}: {told}") from error
-    known = msgspec.to_builtins(made)
-    for key, value in description.imperfections.items():
-        inner = known.get(key)
-        more = value.keys() - inner.keys() if isinstance(value, dict) and isinstance(inner, dict) else set()
-        for name in [key] * (key not in known) + [f"{key}.{one}" for one in sorted(more)]:
-            keys = ", ".join(one.name for one in fields(getattr(made, key) if more else made))
-            raise RobotFileError(
-                f"robot file {source}: imperfections.{name:.200} is not a key of a robot file: must be one of {keys}"
-            )
-    try:
-        GearLaw.of(made, description)
-        imperfect_model(description, description.payload, made)
-    except ValueError as error:
-        raise RobotFileError(f"robot file {source}: imperfections: {error}") from error
-
-
-_KINDS = {
-    "float": "a number", "int": "a whole number", "str": "text", "array": "a list", "object": "a table",
-    "bool": "true or false", "null": "nothing",
-}  # fmt: skip
-_RELATIONS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less than", "": "exactly"}
-
-
-def _in_words(error: msgspec.ValidationError, content: Any) -> str:
-    """Return msgspec's message about a content, with the key, the value and the permitted values."""
-    said, _, path = str(error).partition(" - at `$")
-    key = path.rstrip("`").removeprefix(".")
-    value = content
-    for name, index in re.findall(r"([A-Za-z_][^.\[]*)|\[(\d+)\]", key):
-        try:
-            value = value[int(index) if index else name]
-        except (TypeError, LookupError):
-            value = None
-    key = key.replace("[...]", ".<one of its keys>")[:200]
-    for pattern, words in _RULES:
-        if found := re.fullmatch(pattern, said):
-            return words(key, value, *found.groups())
-    return f"{key or 'the file'}: {said.replace('`', ''):.300}"
-
-
-def _missing(key: str, _: Any, name: str) -> str:
-    return f"{_joined(key, name)} is missing"
-
-
-def _unknown(key: str, _: Any, name: str) -> str:
-    return f"{_joined(key, name):.200} is not a key of a robot file"
-
-
-def _bound(key: str, value: Any, relation: str, limit: str) -> str:
-    return f"{key} is {value!r:.60}: must be {_RELATIONS[relation]} {float(limit):g}"
-
-
-def _length(key: str, value: Any, relation: str, limit: str) -> str:
-    count = len(value) if isinstance(value, list | str) else "another number of"
-    return f"{key} has {count} entries: must have {_RELATIONS[relation]} {limit}"
-
-
-def _kind(key: str, value: Any, wanted: str, got: str) -> str:
-    found = f" is {_called(got)}, {value!r:.60}:" if key else ""
-    return f"{key or 'the file'}{found} must be {_called(wanted)}"
-
-
-_RULES: tuple[tuple[str, Callable[..., str]], ...] = (
-    (r"Object missing required field `(.*)`", _missing),
-    (r"Object contains unknown field `(.*)`", _unknown),
-    (r"Expected `(?:float|int)` (>=|<=|>|<) (\S+)", _bound),
-    (r"Expected `(?:array|str)` of length (>=|<=|) ?(\d+)(?:, got \d+)?", _length),
-    (r"Expected `([^`]*)`, got `([^`]*)`", _kind),
-)
-
-
-def _joined(key: str, name: str) -> str:
-    return f"{key}.{name}".removeprefix(".")
-
-
-def _called(said: str) -> str:
-    return " or ".join(_KINDS.get(kind, kind) for kind in said.split(" | "))
+    drives = [getattr(description.drives, name) for name in _VIBRATING]
+    parts = (description.kinematics, description.links, description.link_flexibility, drives)
+    return sha256(msgspec.json.encode(parts, order="sorted")).hexdigest()[:16]

@@ -58,9 +58,7 @@ class LinearPart:
         """Assemble the matrices."""
         links, joints = flexible.model.nv, len(flexible.joints)
         gear, gear_damping = np.array(drives.gear_stiffness), np.array(drives.gear_damping)
-        K_d, K_p, K_i = (
-            np.array(g) for g in (drives.velocity_gain, drives.position_gain, drives.integral_gain)
-        )
+        K_d, K_p, K_i = map(np.array, (drives.velocity_gain, drives.position_gain, drives.integral_gain))
         friction = np.array(drives.coulomb_friction) / drives.friction_width
         stiffness, damping = np.zeros((2, links + joints, links + joints))
         link, motor = flexible.joints, links + np.arange(joints)
@@ -102,13 +100,8 @@ class Nonlinear:
     @classmethod
     def of(cls, drives: Drives) -> "Nonlinear":
         """Copy them from the robot's description."""
-        friction = (
-            np.zeros(len(drives.coulomb_friction))
-            if drives.linear_friction
-            else np.array(drives.coulomb_friction)
-        )
         return cls(
-            friction=friction,
+            friction=np.array(drives.coulomb_friction) * (not drives.linear_friction),
             friction_width=drives.friction_width,
             gear_stiffness=np.array(drives.gear_stiffness),
             gear_error=drives.gear_error_amplitude,

@@ -16,11 +16,13 @@ from tvist_plant.plant import Condition, Measurement, Plant, PlantError, RealArm
 from tvist_plant.user_file import named
 
 _MEASURING = ("step", "reset", "measure")
-_OPTIONAL = (
-    "load", "mount", "grip", "opening", "switch", "stop", "wait", "push", "make_nan", "things", "places", "contact",
-    "obstacle", "sight", "interval", "seen", "described",
-)  # fmt: skip
 _TELLING = ("truth", "play", "held", "modes")
+_METHODS = [
+    name
+    for kind in (Plant, SimulatedArm, RealArm)
+    for name, value in vars(kind).items()
+    if callable(value) and not name.startswith("_") and name != "can"
+]
 MOST_KEPT = 10
 """Largest number of exceptions that are kept until `told` returns them."""
 
@@ -32,57 +34,48 @@ def is_plant(value: object) -> bool:
 
 def arm_of(plant: Plant) -> Plant:
     """Return a plant with all methods: itself, or what stands for an object that derives from no class here."""
-    if isinstance(plant, SimulatedArm | RealArm):
-        return plant
-    return _standing_for(plant, _StandIn, ())  # type: ignore[type-abstract]
+    return plant if isinstance(plant, SimulatedArm | RealArm) else called(plant, None)
 
 
-def called(plant: Plant, joints: int, *, untold: bool = False) -> Plant:
+def called(plant: Plant, joints: int | None, *, untold: bool = False) -> Plant:
     """Return what stands for a plant, with the same abilities, and raises only `PlantError`.
 
     Args:
         plant: Somebody's own plant, or a hidden one.
-        joints: Number of joints in the robot's description.
+        joints: Number of joints in the robot's description; None to let all that it raises and measures pass.
         untold: Whether to leave out what a real arm could not tell.
     """
-    found = _standing_for(plant, _Guarded, _TELLING if untold else ())  # type: ignore[type-abstract]
-    cast("_Guarded", found).joints = joints
-    return found
+    members: dict[str, Any] = {
+        name: _method(name)
+        for name in _METHODS
+        if callable(getattr(plant, name, None)) and not (untold and name in _TELLING)
+    }
+    if hasattr(plant, "condition"):
+        members["condition"] = property(lambda self: self.ask("condition", lambda: self.plant.condition))
+    base = SimulatedArm if "reset" in members else RealArm
+    return cast("Plant", type(type(plant).__name__, (_StandIn, base), members)(plant, joints))
+
+
+def _method(name: str) -> Callable[..., Any]:
+    def method(self: _StandIn, *given: Any, **options: Any) -> Any:
+        return self.ask(name, lambda: getattr(self.plant, name)(*given, **options))
+
+    return method
 
 
 def told(plant: Plant) -> list[Exception]:
     """Return what methods of a plant have raised since the last call."""
-    if not isinstance(plant, _Guarded) or not plant.raised:
+    if not isinstance(plant, _StandIn) or not plant.raised:
         return []
     raised, plant.raised = plant.raised, []
     return raised
 
 
 class _StandIn(Plant):
-    """Stands for an object, and has its methods."""
+    """Stands for a plant, and has its methods; none of its exceptions but `PlantError` is raised."""
 
-    def __init__(self, plant: Plant) -> None:
-        self.plant = plant
-
-    @property
-    def payload(self) -> Payload:  # type: ignore[override]
-        return self.plant.payload
-
-    def can(self, method: Callable[..., Any]) -> bool:
-        own = super().can(method)
-        return own and (not isinstance(self.plant, Plant) or self.plant.can(method))
-
-    def ask(self, _: str, call: Callable[[], Any]) -> Any:
-        return call()
-
-
-class _Guarded(_StandIn):
-    """Stands for a plant, none of whose exceptions but `PlantError` may be raised."""
-
-    joints: int
-
-    def __init__(self, plant: Plant) -> None:
-        super().__init__(plant)
+    def __init__(self, plant: Plant, joints: int | None) -> None:
+        self.plant, self._joints = plant, joints
         self._payload = plant.payload
         self.raised: list[Exception] = []
         """Exceptions of its methods other than `PlantError`, until `told` returns them."""
@@ -93,10 +86,16 @@ class _Guarded(_StandIn):
             self._payload = self.ask("payload", lambda: self.plant.payload)
         return self._payload
 
+    def can(self, method: Callable[..., Any]) -> bool:
+        own = super().can(method)
+        return own and (not isinstance(self.plant, Plant) or self.plant.can(method))
+
     def ask(self, name: str, call: Callable[[], Any]) -> Any:
+        if self._joints is None:
+            return call()
         try:
             answer = call()
-            self._check(name, answer)
+            self._check(name, answer, self._joints)
         except PlantError:
             raise
         except Exception as error:
@@ -105,45 +104,20 @@ class _Guarded(_StandIn):
             raise PlantError(f"the arm's {name} raises {named(error)}") from error
         return answer
 
-    def _check(self, name: str, answer: Any) -> None:
+    def _check(self, name: str, answer: Any, joints: int) -> None:
         if name == "condition" and not isinstance(answer, Condition):
             raise TypeError(f"it is a {type(answer).__name__}, and must be a Condition")
         if name in {"sight", "seen"}:
-            check_sight(answer, self.joints)
+            check_sight(answer, joints)
         if name in _MEASURING:
-            check_measurement(answer, self.joints, self.plant)
+            check_measurement(answer, joints, self.plant)
             felt = () if answer.wrench is None else answer.wrench
             if not np.isfinite(np.concatenate((answer.q, answer.qd, answer.moment, felt))).all():
                 raise PlantError("the arm has measured what is no number")
 
 
-def _standing_for(plant: Plant, kind: type[_StandIn], without: tuple[str, ...]) -> Plant:
-    """Return a plant with the methods of an object; those that it lacks have their defaults."""
-    names = [
-        name
-        for name in (*_MEASURING, *_OPTIONAL, *_TELLING)
-        if name not in without and callable(getattr(plant, name, None))
-    ]
-    members: dict[str, Any] = {name: _method(name) for name in names}
-    if hasattr(plant, "condition"):
-        members["condition"] = property(lambda self: self.ask("condition", lambda: self.plant.condition))
-    base = SimulatedArm if "reset" in members else RealArm
-    return cast("Plant", type(type(plant).__name__, (kind, base), members)(plant))
-
-
-def _method(name: str) -> Callable[..., Any]:
-    def method(self: _StandIn, *given: Any, **options: Any) -> Any:
-        return self.ask(name, lambda: getattr(self.plant, name)(*given, **options))
-
-    return method
-
-
 def check_unpaced(plant: Plant) -> None:
-    """Check that a plant may be moved as fast as a machine computes, without a clock.
-
-    Raises:
-        ValueError: It gives the tick, so it may be a real arm.
-    """
+    """Check that a plant may be moved as fast as a machine computes, without a clock."""
     if plant.can(Plant.wait):
         name = type(plant).__name__
         raise ValueError(
@@ -152,11 +126,7 @@ def check_unpaced(plant: Plant) -> None:
 
 
 def measured_standing(plant: Plant, joints: int) -> Measurement:
-    """Return what a plant that cannot be placed measures where it stands.
-
-    Raises:
-        ValueError: The plant does not answer, or its measurement has the wrong shape or is not finite.
-    """
+    """Return what a plant that cannot be placed measures where it stands."""
     name = type(plant).__name__
     assert isinstance(plant, RealArm), f"plant {name}: a simulated arm is placed"
     try:
@@ -171,11 +141,7 @@ def measured_standing(plant: Plant, joints: int) -> Measurement:
 
 
 def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
-    """Check the first measurement of a plant, which is named in the error.
-
-    Raises:
-        ValueError: An array is missing or has the wrong shape, for example for another number of joints.
-    """
+    """Check the first measurement of a plant, which is named in the error."""
     shapes = {"q": (joints,), "qd": (joints,), "moment": (joints,), "accelerometer": (3,)}
     if getattr(measured, "wrench", None) is not None:
         shapes["wrench"] = (6,)

@@ -14,11 +14,12 @@ There are two models of the same arm:
 import math
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from tvist_plant.robot_tables import Payload, RobotDescription, Tensor
+from tvist_plant.robot_tables import LinkFlexibility, Payload, RobotDescription, Tensor
 
 FLANGE = "flange"
 
@@ -57,14 +58,8 @@ class FlexibleModel:
 
 def rigid_model(description: RobotDescription, payload: Payload) -> pin.Model:
     """Create the model of the arm with rigid joints and links, n degrees of freedom and a frame named "flange"."""
-    model = pin.Model()
-    parent, placement = 0, pin.SE3.Identity()
-    for number, name in enumerate(description.robot.joints):
-        parent = model.addJoint(parent, pin.JointModelRZ(), placement, name)
-        placement = link_frame(description, number)
-        model.appendBodyToJoint(parent, _link_inertia(description, number), placement)
-    _add_flange(model, parent, placement, payload)
-    return model
+    rigid = msgspec.structs.replace(description, link_flexibility=LinkFlexibility())
+    return flexible_model(rigid, payload).model
 
 
 def flexible_model(
@@ -93,7 +88,8 @@ def flexible_model(
             continue
         near, far = _lumps(description, number)
         model.appendBodyToJoint(parent, near, frame)
-        middle = _shift(description.kinematics.a[number] / 2, description.kinematics.d[number])
+        half = np.array([description.kinematics.a[number] / 2, 0.0, description.kinematics.d[number]])
+        middle = pin.SE3(np.eye(3), half)
         parent = model.addJoint(parent, pin.JointModelRY(), middle, f"{name}_bending_y")
         parent = model.addJoint(parent, pin.JointModelRZ(), pin.SE3.Identity(), f"{name}_bending_z")
         bending += [model.nv - 2, model.nv - 1]
@@ -110,7 +106,9 @@ def flexible_model(
         placement = middle.inverse() * frame
         model.appendBodyToJoint(parent, far, placement)
     bare = pin.Inertia(model.inertias[parent])
-    _add_flange(model, parent, placement, payload)
+    model.addFrame(pin.Frame(FLANGE, parent, 0, placement, pin.FrameType.OP_FRAME))
+    if payload.mass > 0.0:
+        model.appendBodyToJoint(parent, payload_inertia(payload), placement)
     return FlexibleModel(
         model=model,
         joints=np.array(joints),
@@ -127,10 +125,6 @@ def carries_weight(description: RobotDescription) -> bool:
     """Whether gravity can load a joint: not where every axis is vertical, as the first one always is."""
     turns = [link_frame(description, number).rotation for number in range(description.joints - 1)]
     return any(np.hypot(turn[0, 2], turn[1, 2]) > 1e-9 for turn in turns)
-
-
-def _shift(x: float, z: float) -> pin.SE3:
-    return pin.SE3(np.eye(3), np.array([x, 0.0, z]))
 
 
 def link_frame(description: RobotDescription, number: int) -> pin.SE3:
@@ -174,12 +168,6 @@ def _lumps(description: RobotDescription, number: int) -> tuple[pin.Inertia, pin
     lumps = [pin.Inertia(mass / 2, com + sign * offset, np.eye(3) * xx / 2) for sign in (1.0, -1.0)]
     near, far = sorted(lumps, key=lambda lump: abs(description.kinematics.a[number] + lump.lever[0]))
     return near, far
-
-
-def _add_flange(model: pin.Model, parent: int, placement: pin.SE3, payload: Payload) -> None:
-    model.addFrame(pin.Frame(FLANGE, parent, 0, placement, pin.FrameType.OP_FRAME))
-    if payload.mass > 0.0:
-        model.appendBodyToJoint(parent, payload_inertia(payload), placement)
 
 
 def payload_inertia(payload: Payload) -> pin.Inertia:

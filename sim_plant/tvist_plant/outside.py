@@ -6,7 +6,7 @@ the torques on the joints, and subtracted from the bias b(q, q̇).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -14,8 +14,7 @@ import pinocchio as pin
 from tvist_plant.model import FLANGE, FlexibleModel, Floats
 
 
-@dataclass(frozen=True)
-class _Wrench:
+class _Wrench(NamedTuple):
     joint: int
     """Index of the model's joint that the body is attached to."""
     point: Floats
@@ -34,10 +33,8 @@ class Outside:
         self._data = flexible.model.createData()
         self._torque: Floats | None = None
         self._wrenches: dict[str, _Wrench] = {}
-        self._bodies = {
-            name: (number, pin.SE3.Identity()) for number, name in enumerate(flexible.model.names)
-        }
-        del self._bodies[flexible.model.names[0]]  # the world
+        names = list(flexible.model.names)[1:]  # without the world
+        self._bodies = {name: (number, pin.SE3.Identity()) for number, name in enumerate(names, 1)}
         flange = flexible.model.frames[flexible.flange]
         self._bodies[FLANGE] = flange.parentJoint, flange.placement
 
@@ -63,18 +60,14 @@ class Outside:
         """Set the wrench on a body; see `FlexibleArm.push_body`."""
         if body not in self._bodies:
             raise ValueError(f"body is {body!r}: must be one of {', '.join(self._bodies)}")
-        vectors = {
-            name: np.array(value, dtype=float)
-            for name, value in (("force", force), ("moment", moment), ("point", point))
-        }
-        for name, vector in vectors.items():
+        vectors = f, m, r = [np.array(value, dtype=float) for value in (force, moment, point)]
+        for name, vector in zip(("force", "moment", "point"), vectors, strict=True):
             if vector.shape != (3,) or not np.isfinite(vector).all():
                 raise ValueError(f"{name} is {vector.tolist()}: must be three finite numbers")
         joint, placement = self._bodies[body]
         self._wrenches.pop(body, None)
-        if vectors["force"].any() or vectors["moment"].any():
-            at = placement.act(vectors["point"])
-            self._wrenches[body] = _Wrench(joint, at, vectors["force"], vectors["moment"])
+        if f.any() or m.any():
+            self._wrenches[body] = _Wrench(joint, placement.act(r), f, m)
 
     @property
     def rests(self) -> bool:

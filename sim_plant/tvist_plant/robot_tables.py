@@ -254,11 +254,7 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
         return self.disturbed_by(())
 
     def disturbed_by(self, kept: Collection[str]) -> "RobotDescription":
-        """Return the same arm with only some of its `DISTURBANCES`; the linear equivalent of Coulomb friction stays.
-
-        Raises:
-            DescriptionError: There is no such disturbance.
-        """
+        """Return the same arm with only some of its `DISTURBANCES`; the linear equivalent of Coulomb friction stays."""
         for name in kept:
             if name not in DISTURBANCES:
                 raise DescriptionError(f"disturbance is {name!r}: must be one of {', '.join(DISTURBANCES)}")

@@ -1,8 +1,17 @@
 """The arm's sensors, an accelerometer and a force sensor in the flange, and the phases of the gears' errors."""
 
+from collections.abc import Callable, Iterator
+from itertools import islice
+
 import numpy as np
 
 from tvist_plant.model import Floats
+
+
+def _rows(draw: Callable[[], Floats]) -> Iterator[Floats]:
+    """Draw rows of noise in blocks, since one call of the generator takes as long as a hundred samples."""
+    while True:
+        yield from draw()
 
 
 class Accelerometer:
@@ -12,34 +21,20 @@ class Accelerometer:
     """
 
     def __init__(self, noise: float, seed: int) -> None:
+        random = np.random.default_rng([seed, 1])
         self._noise = noise
-        self._random = np.random.default_rng([seed, 1])
-        self._drawn, self._used = np.empty((0, 3)), 0
+        self._drawn = _rows(lambda: noise * random.standard_normal((512, 3)))
 
     def read(self, specific_force: Floats) -> Floats:
         """Return a noisy reading [m/s^2], shape (3,)."""
-        if self._noise == 0.0:
-            return specific_force.copy()
-        if self._used == len(self._drawn):
-            self._draw()
-        noisy: Floats = specific_force + self._drawn[self._used]
-        self._used += 1
-        return noisy
+        return specific_force.copy() if self._noise == 0.0 else specific_force + next(self._drawn)
 
     def read_all(self, specific_forces: Floats) -> Floats:
         """Return noisy readings one after the other, as `read` does, shape (T, 3) [m/s^2]."""
-        noisy, done = specific_forces.copy(), 0
-        while self._noise != 0.0 and done < len(noisy):
-            if self._used == len(self._drawn):
-                self._draw()
-            block = self._drawn[self._used : self._used + len(noisy) - done]
-            noisy[done : done + len(block)] += block
-            self._used, done = self._used + len(block), done + len(block)
-        return noisy
-
-    def _draw(self) -> None:
-        """Draw a block, since one call of the generator takes as long as a hundred samples."""
-        self._drawn, self._used = self._noise * self._random.standard_normal((512, 3)), 0
+        if self._noise == 0.0:
+            return specific_forces.copy()
+        rows = list(islice(self._drawn, len(specific_forces)))
+        return np.asarray(specific_forces + np.reshape(rows, (-1, 3)))
 
 
 class ForceSensor:
@@ -49,16 +44,13 @@ class ForceSensor:
     """
 
     def __init__(self, noise: tuple[float, float], offset: tuple[float, float], seed: int) -> None:
-        self._random = np.random.default_rng([seed, 2])
-        self._offset = np.repeat(offset, 3) * self._random.uniform(-1.0, 1.0, 6)
-        self._noise = np.repeat(noise, 3)
-        self._drawn: list[Floats] = []
+        random = np.random.default_rng([seed, 2])
+        error, rms = np.repeat(offset, 3) * random.uniform(-1.0, 1.0, 6), np.repeat(noise, 3)
+        self._drawn = _rows(lambda: (rms * random.standard_normal((256, 6)) + error)[::-1])
 
     def read(self, wrench: Floats) -> Floats:
         """Return a noisy reading, shape (6,) [N, N m]."""
-        if not self._drawn:  # in blocks, as above
-            self._drawn = list(self._noise * self._random.standard_normal((256, 6)) + self._offset)
-        return np.asarray(wrench + self._drawn.pop())
+        return np.asarray(wrench + next(self._drawn))
 
 
 def gear_phases(joints: int, seed: int) -> Floats:

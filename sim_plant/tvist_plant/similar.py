@@ -24,7 +24,7 @@ from typing import Any, Final
 
 import msgspec
 
-from tvist_plant.robot_tables import ArmLimits, Drives, Kinematics, LinkFlexibility, Payload, Sensors
+from tvist_plant.robot_tables import ArmLimits, Kinematics, RobotDescription
 from tvist_plant.user_file import toml
 
 RULE: Final = "assumed: the UR5e's, scaled by dynamic similarity to this arm's torques and length"
@@ -34,34 +34,26 @@ WRIST: Final = 3
 DIGITS: Final = 4
 """Number of significant digits that a scaled value keeps."""
 
-_TORQUE, _INERTIA, _DAMPER = 0.0, 1.0, 0.5
 _POWERS: Final = {
-    "gear_stiffness": _TORQUE,
-    "coulomb_friction": _TORQUE,
-    "rotor_inertia": _INERTIA,
-    "gear_damping": _DAMPER,
-    "velocity_gain": _DAMPER,
+    "gear_stiffness": (1.0, 0.0),
+    "coulomb_friction": (1.0, 0.0),
+    "rotor_inertia": (1.0, 1.0),
+    "gear_damping": (1.0, 0.5),
+    "velocity_gain": (1.0, 0.5),
+    "position_gain": (0.0, -0.5),
+    "integral_gain": (0.0, -0.5),
+    "friction_width": (0.0, -0.5),
+    "friction_feedforward_width": (0.0, -0.5),
+    "windup_feedforward": (0.0, 0.0),
 }
-"""Power of λ by which each parameter of a joint grows that is proportional to its torque."""
-_RATES: Final = ("position_gain", "integral_gain", "friction_width", "friction_feedforward_width")
-"""Parameters that are proportional to a frequency."""
-
-
-class _Measured(msgspec.Struct, frozen=True):
-    """The UR5e, whose springs and drives agree with measurements."""
-
-    kinematics: Kinematics
-    limits: ArmLimits
-    payload: Payload
-    drives: Drives
-    link_flexibility: LinkFlexibility
-    sensors: Sensors
+"""Powers of τ and λ by which parameters of drives grow; all others are those of the UR5e."""
 
 
 @cache
-def _measured() -> _Measured:
+def _measured() -> RobotDescription:
+    """Return the UR5e, whose springs and drives agree with measurements."""
     text = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
-    return msgspec.convert(toml(text), _Measured)
+    return msgspec.convert(toml(text), RobotDescription)
 
 
 def stretched(kinematics: Kinematics) -> float:
@@ -103,20 +95,16 @@ class Scale:
     def drives(self) -> dict[str, Any]:
         """Return the table `drives` of the arm."""
         own = msgspec.structs.asdict(_measured().drives)
-        for key, power in _POWERS.items():
-            grown = self.length**power
-            own[key] = [
-                _rounded(own[key][like] * torque * grown)
-                for like, torque in zip(self.like, self.torque, strict=True)
-            ]
-        for key in _RATES:
-            value = own[key]
+        for key, (of_torque, of_length) in _POWERS.items():
+            value, grown = own[key], self.length**of_length
             own[key] = (
-                [_rounded(value[like] / self.time) for like in self.like]
+                [
+                    _rounded(value[like] * torque**of_torque * grown)
+                    for like, torque in zip(self.like, self.torque, strict=True)
+                ]
                 if isinstance(value, tuple)
-                else _rounded(value / self.time)
+                else _rounded(value * grown)
             )
-        own["windup_feedforward"] = [own["windup_feedforward"][like] for like in self.like]
         return own
 
     def link_flexibility(self, kinematics: Kinematics) -> dict[str, Any]:

@@ -10,17 +10,15 @@ import math
 from collections import Counter
 from itertools import product
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from tvist_plant.model import Floats
 from tvist_plant.robot_tables import MAX_JOINTS, RobotFileError
 from tvist_plant.user_file import LONGEST_NAME, UserFileError, is_name, read_text, xml
-
-Floats = npt.NDArray[np.float64]
 
 TURNING: Final = ("revolute", "continuous")
 FLANGES: Final = ("tool0", "flange")
@@ -33,172 +31,134 @@ DEEPEST: Final = 200
 """Largest number of joints from the base to a link, fixed ones included: parsers of URDF recurse along a chain."""
 LARGEST: Final = 1e7
 """Largest number, as in other robot files."""
-NUMBERS: Final = {
-    "joint": {
-        "origin": ("xyz", "rpy"), "axis": ("xyz",), "limit": ("lower", "upper", "effort", "velocity")
-    },
-    "link": {
-        "inertial/origin": ("xyz", "rpy"), "inertial/mass": ("value",),
-        "inertial/inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
-    },
-}  # fmt: skip
-"""Attributes that are read, by the elements of joints and links."""
-
-
-class UrdfError(RobotFileError):
-    """A URDF file describes no arm that can be simulated; the message names the link or joint."""
-
-
-class _Joint(NamedTuple):
-    """A joint that turns."""
-
-    name: str
-    kind: str
-    child: str
-    axis: Floats
-    limit: Element
+_ORIGIN: Final = {"xyz": (0.0, 0.0, 0.0), "rpy": (0.0, 0.0, 0.0)}
+NUMBERS: Final[dict[tuple[str, str], dict[str, tuple[float, ...]]]] = {
+    ("joint", "origin"): {**_ORIGIN},
+    ("joint", "axis"): {"xyz": (1.0, 0.0, 0.0)},
+    ("joint", "limit"): dict.fromkeys(("lower", "upper", "effort", "velocity"), (0.0,)),
+    ("link", "inertial/origin"): {**_ORIGIN},
+    ("link", "inertial/mass"): {"value": (0.0,)},
+    ("link", "inertial/inertia"): dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), (0.0,)),
+    ("link", "visual/origin"): {**_ORIGIN},
+    ("link", "visual/geometry/mesh"): {"scale": (1.0, 1.0, 1.0)},
+}
+"""Attributes that are read, by the elements of joints and links, with their defaults."""
 
 
 def read_urdf(path: str | Path) -> dict[str, Any]:
-    """Read a URDF file as the content of a robot file without springs and drives.
-
-    Raises:
-        UrdfError: The file describes no arm that can be simulated.
-        UserFileError: The file is not text, too large or nested too deeply.
-        OSError: The file cannot be read.
-    """
-    where, text = f"robot file {path}", read_text(path, "robot file")
+    """Read a URDF file as the content of a robot file without springs and drives."""
+    text = read_text(path, "robot file")
     try:
         root = xml(text.encode())
     except UserFileError as error:
-        raise UrdfError(f"{where}: {error}") from error
+        raise RobotFileError(str(error)) from error
     if root.tag != "robot":
-        raise UrdfError(f"{where}: it is no URDF: its outermost element must be <robot>; expand xacro first")
-    links = {_named(link, where): link for link in root.findall("link")}
-    _check_numbers(root, where)
-    _check_names(root, where)
-    _check_tree(root, links, where)
-    turning = {joint.name: joint for joint in _turning(root, where)}
-    model = _model(root, where)
-    chain = [turning[name] for name in list(model.names)[1:]]
-    _check_chain(model, chain, where)
-    return _content(str(root.get("name") or Path(path).stem), Path(path), links, model, chain, where)
+        raise RobotFileError("it is no URDF: its outermost element must be <robot>; expand xacro first")
+    links, joints = ({_named(one): one for one in root.findall(kind)} for kind in ("link", "joint"))
+    names = Counter(f"{one.tag} {one.get('name')}" for one in root if one.tag in {"link", "joint"})
+    if same := [name for name, count in names.items() if count > 1]:
+        raise RobotFileError(f"there are two of {', '.join(same)}: give each a name of its own")
+    _check_numbers(root)
+    _check_tree(root, links)
+    _check_joints(joints)
+    model = _model(root)
+    chain = [joints[name] for name in list(model.names)[1:]]
+    _check_chain(model, chain)
+    return _content(str(root.get("name") or Path(path).stem), Path(path), links, model, chain)
 
 
-def _named(element: Element, where: str) -> str:
+def _named(element: Element) -> str:
     name = element.get("name")
     if not name:
-        raise UrdfError(f"{where}: a <{element.tag}> has no name")
+        raise RobotFileError(f"a <{element.tag}> has no name")
     if not is_name(name):
-        raise UrdfError(
-            f"{where}: a <{element.tag}> has the name {name!r:.{LONGEST_NAME}}: "
+        raise RobotFileError(
+            f"a <{element.tag}> has the name {name!r:.{LONGEST_NAME}}: "
             f"must be at most {LONGEST_NAME} printable characters"
         )
     return name
 
 
-def _check_names(root: Element, where: str) -> None:
-    """Check that no two links or joints have the same name."""
-    same = [
-        f"{kind} {name}"
-        for kind in ("link", "joint")
-        for name, count in Counter(one.get("name") for one in root.findall(kind)).items()
-        if count > 1
-    ]
-    if same:
-        raise UrdfError(f"{where}: there are two of {', '.join(same)}: give each a name of its own")
+def _check_numbers(root: Element) -> None:
+    """Check the numbers of all elements that are read, and write them as every parser reads them."""
+    for (kind, at), keys in NUMBERS.items():
+        for element in root.findall(kind):
+            for part, (key, default) in product(element.findall(at), keys.items()):
+                _check_number(part, key, default, f"{kind} {element.get('name')}")
+    for link in root.findall("link"):
+        inertial = link.find("inertial")
+        if inertial is not None and (inertial.find("mass") is None or inertial.find("inertia") is None):
+            raise RobotFileError(f"link {link.get('name')}: <inertial> has no <mass> or no <inertia>")
 
 
-def _check_tree(root: Element, links: dict[str, Element], where: str) -> None:
+def _check_number(element: Element, key: str, default: tuple[float, ...], here: str) -> None:
+    text = element.get(key)
+    try:
+        found = default if text is None else [float(word) for word in text.split()]
+    except ValueError:
+        found = ()
+    if len(found) != len(default) or not all(abs(number) <= LARGEST for number in found):
+        raise RobotFileError(
+            f"{here}: {key} is {text!r:.60}: must be {len(default)} numbers within ±{LARGEST:g}"
+        )
+    element.set(key, " ".join(map(repr, found)))
+
+
+def _numbers(element: Element, key: str) -> Floats:
+    """Return the numbers of an attribute that was checked."""
+    return np.array([float(word) for word in str(element.get(key)).split()])
+
+
+def _check_tree(root: Element, links: dict[str, Element]) -> None:
     """Check that joints make one tree of the links."""
     children: Counter[str] = Counter()
     after: dict[str, list[str]] = {}
     for joint in root.findall("joint"):
-        here = f"{where}: joint {_named(joint, where)}"
-        ends = [
-            None if (part := joint.find(tag)) is None else part.get("link") for tag in ("parent", "child")
-        ]
+        here = f"joint {joint.get('name')}"
+        parent, child = (joint.find(tag) for tag in ("parent", "child"))
+        ends = [None if part is None else part.get("link") for part in (parent, child)]
         if not ends[0] or not ends[1]:
-            raise UrdfError(f"{here} has no parent or no child link")
+            raise RobotFileError(f"{here} has no parent or no child link")
         for link in ends:
             if link not in links:
-                raise UrdfError(f"{here}: there is no link {link!r:.{LONGEST_NAME}}")
+                raise RobotFileError(f"{here}: there is no link {link!r:.{LONGEST_NAME}}")
         children[ends[1]] += 1
         after.setdefault(ends[0], []).append(ends[1])
     twice = next((name for name, count in children.items() if count > 1), None)
     if twice is not None:
-        raise UrdfError(f"{where}: link {twice} is the child of two joints: closed chains are not supported")
-    roots = [name for name in links if name not in children]
-    if len(roots) != 1:
-        raise UrdfError(f"{where}: {len(roots)} links are no joint's child: exactly one must be, the base")
-    row, count = roots, 0
+        raise RobotFileError(f"link {twice} is the child of two joints: closed chains are not supported")
+    row = [name for name in links if name not in children]
+    if len(row) != 1:
+        raise RobotFileError(f"{len(row)} links are no joint's child: exactly one must be, the base")
+    count = 0
     for _ in range(DEEPEST + 1):
         count += len(row)
         row = [child for link in row for child in after.get(link, ())]
     if row:
-        raise UrdfError(
-            f"{where}: link {row[0]} is more than {DEEPEST} joints from the base: make the chain shorter"
+        raise RobotFileError(
+            f"link {row[0]} is more than {DEEPEST} joints from the base: make the chain shorter"
         )
     if count < len(links):
-        raise UrdfError(f"{where}: some joints lead round in a circle: closed chains are not supported")
+        raise RobotFileError("some joints lead round in a circle: closed chains are not supported")
 
 
-def _check_numbers(root: Element, where: str) -> None:
-    """Check the numbers of all elements that are read, and write them as every parser reads them."""
-    for kind, parts in NUMBERS.items():
-        for element in root.findall(kind):
-            here = f"{where}: {kind} {_named(element, where)}"
-            for at, keys in parts.items():
-                for part, key in product(element.findall(at), keys):
-                    default = (0.0,) * (3 if key in {"xyz", "rpy"} else 1)
-                    if at == "axis":
-                        default = (1.0, 0.0, 0.0)
-                    part.set(key, " ".join(map(repr, numbers(part, key, default, here).tolist())))
-    for link in root.findall("link"):
-        inertial = link.find("inertial")
-        if inertial is not None and (inertial.find("mass") is None or inertial.find("inertia") is None):
-            raise UrdfError(f"{where}: link {link.get('name')}: <inertial> has no <mass> or no <inertia>")
-
-
-def numbers(element: Element, key: str, default: tuple[float, ...], here: str) -> Floats:
-    """Return the numbers of an attribute, as many as its default has."""
-    text = element.get(key)
-    try:
-        found = np.array(default if text is None else [float(word) for word in text.split()])
-    except ValueError:
-        found = np.zeros(0)
-    if len(found) != len(default) or not (np.abs(found) <= LARGEST).all():
-        raise UrdfError(f"{here}: {key} is {text!r:.60}: must be {len(default)} numbers within ±{LARGEST:g}")
-    return found
-
-
-def _turning(root: Element, where: str) -> list[_Joint]:
-    """Return the joints that are not fixed, each of which must turn."""
-    found = []
-    for element in root.findall("joint"):
-        name, kind = _named(element, where), str(element.get("type"))
-        here = f"{where}: joint {name}"
+def _check_joints(joints: dict[str, Element]) -> None:
+    """Check that joints that are not fixed turn, about an axis and within limits of their own."""
+    for name, joint in joints.items():
+        here, kind, axis = f"joint {name}", str(joint.get("type")), joint.find("axis")
         if kind == "fixed":
             continue
         if kind not in TURNING:
-            raise UrdfError(f"{here} is {kind:.60}: must be {', '.join(TURNING)} or fixed")
-        axis, child = element.find("axis"), element.find("child")
-        direction = np.array([1.0, 0.0, 0.0])
-        if axis is not None:
-            direction = numbers(axis, "xyz", (1.0, 0.0, 0.0), here)
-        if not np.linalg.norm(direction) > 0.0:
-            raise UrdfError(f"{here}: axis is 0 0 0: must have a direction")
-        if element.find("mimic") is not None:
-            raise UrdfError(f"{here} mimics another joint: only joints of their own are supported")
-        limit = element.find("limit")
-        if limit is None:
-            raise UrdfError(f"{here} has no <limit>: effort and velocity are needed")
-        assert child is not None
-        found.append(_Joint(name, kind, str(child.get("link")), direction, limit))
-    return found
+            raise RobotFileError(f"{here} is {kind:.60}: must be {', '.join(TURNING)} or fixed")
+        if axis is not None and not _numbers(axis, "xyz").any():
+            raise RobotFileError(f"{here}: axis is 0 0 0: must have a direction")
+        if joint.find("mimic") is not None:
+            raise RobotFileError(f"{here} mimics another joint: only joints of their own are supported")
+        if joint.find("limit") is None:
+            raise RobotFileError(f"{here} has no <limit>: effort and velocity are needed")
 
 
-def _model(root: Element, where: str) -> pin.Model:
+def _model(root: Element) -> pin.Model:
     """Return pinocchio's model of what was checked; other elements of a file, and limits, are not passed on."""
     checked = Element("robot", {"name": "arm"})
     for kind, parts in (("link", {"inertial"}), ("joint", {"origin", "parent", "child", "axis"})):
@@ -209,42 +169,41 @@ def _model(root: Element, where: str) -> pin.Model:
     try:
         return pin.buildModelFromXML(tostring(checked, encoding="unicode"))
     except (RuntimeError, ValueError) as error:
-        raise UrdfError(f"{where}: pinocchio cannot read it: {error}") from error
+        raise RobotFileError(f"pinocchio cannot read it: {error}") from error
 
 
-def _check_chain(model: pin.Model, chain: list[_Joint], where: str) -> None:
+def _check_chain(model: pin.Model, chain: list[Element]) -> None:
     """Check that no two joints follow the same one, and that all that moves has a mass."""
+    carriers = [f"link {joint.find('child').get('link')}" for joint in chain]  # type: ignore[union-attr]
     for number in range(model.njoints):
         after = [model.names[one] for one in range(1, model.njoints) if model.parents[one] == number]
         if len(after) > 1:
-            at = f"link {chain[number - 1].child}" if number else "the base"
-            raise UrdfError(
-                f"{where}: the chain branches after {at}, into the joints {', '.join(after)}: only one chain is "
+            at = carriers[number - 1] if number else "the base"
+            raise RobotFileError(
+                f"the chain branches after {at}, into the joints {', '.join(after)}: only one chain is "
                 "supported; make the others fixed or remove them"
             )
     if not chain:
-        raise UrdfError(f"{where}: it has no joint that turns")
+        raise RobotFileError("it has no joint that turns")
     if len(chain) > MAX_JOINTS:
-        raise UrdfError(f"{where}: more than {MAX_JOINTS} joints turn: 1 to {MAX_JOINTS} are supported")
-    for joint, inertia in zip(chain, list(model.inertias)[1:], strict=True):
+        raise RobotFileError(f"more than {MAX_JOINTS} joints turn: 1 to {MAX_JOINTS} are supported")
+    for carrier, inertia in zip(carriers, list(model.inertias)[1:], strict=True):
         if not inertia.mass > 0.0:
-            raise UrdfError(
-                f"{where}: link {joint.child} has no <inertial> with a mass: a moving link needs one"
-            )
+            raise RobotFileError(f"{carrier} has no <inertial> with a mass: a moving link needs one")
 
 
 def _content(
-    name: str, path: Path, links: dict[str, Element], model: pin.Model, chain: list[_Joint], where: str
+    name: str, path: Path, links: dict[str, Element], model: pin.Model, chain: list[Element]
 ) -> dict[str, Any]:
-    kind = pin.FrameType.BODY
+    kind, names = pin.FrameType.BODY, [str(joint.get("name")) for joint in chain]
     frames = {
         link: model.frames[model.getFrameId(link, kind)] for link in links if model.existFrame(link, kind)
     }
-    turns = [pin.SE3(_about_z(joint.axis), np.zeros(3)) for joint in chain]
+    turns = [pin.SE3(_about_z(joint.find("axis")), np.zeros(3)) for joint in chain]
     ends = [place * turn for place, turn in zip(list(model.jointPlacements)[1:], turns, strict=True)]
     first = ends[0]
     if first.rotation[2, 2] < 1.0 - UPRIGHT:
-        raise UrdfError(f"{where}: the axis of joint {chain[0].name} must point straight up from the base")
+        raise RobotFileError(f"the axis of joint {names[0]} must point straight up from the base")
     last = [frames[one] for one in FLANGES if one in frames and frames[one].parentJoint == len(chain)]
     ends.append(last[0].placement if last else pin.SE3.Identity())
     away = first.translation * [1.0, 1.0, 0.0]  # the base frame is on the first joint's axis
@@ -262,17 +221,13 @@ def _content(
         mesh
         for link, frame in sorted(frames.items(), key=lambda one: one[1].parentJoint)
         for mesh in _meshes(
-            frame.parentJoint - 1,
-            links[link],
-            into[frame.parentJoint] * frame.placement,
-            path,
-            f"{where}: link {link}",
+            frame.parentJoint - 1, links[link], into[frame.parentJoint] * frame.placement, path
         )
     ]
     given = f"given: {path.name}"
-    limits, notes = _limits(chain, where)
+    limits, notes = _limits(chain)
     return {
-        "robot": {"name": path.stem, "model": name, "joints": [joint.name for joint in chain]},
+        "robot": {"name": path.stem, "model": name, "joints": names},
         "kinematics": {"placement": placements},
         "links": {
             "mass": [body.mass for body in bodies],
@@ -282,10 +237,7 @@ def _content(
         "limits": limits,
         "meshes": meshes,
         "provenance": {
-            "kinematics": given,
-            "links": given,
-            "limits.velocity": given,
-            "limits.torque": given,
+            **dict.fromkeys(("kinematics", "links", "limits.velocity", "limits.torque"), given),
             "limits.position": f"assumed: {notes}" if notes else given,
         },
     }
@@ -296,9 +248,10 @@ def _row(placement: pin.SE3) -> list[float]:
     return [*placement.translation.tolist(), *pin.rpy.matrixToRpy(placement.rotation).tolist()]
 
 
-def _about_z(axis: Floats) -> Floats:
+def _about_z(axis: Element | None) -> Floats:
     """Return the rotation of a frame whose z axis is a joint's axis, shape (3, 3)."""
-    z = axis / np.linalg.norm(axis)
+    direction = np.array([1.0, 0.0, 0.0]) if axis is None else _numbers(axis, "xyz")
+    z = direction / np.linalg.norm(direction)
     if np.array_equal(z, [0.0, 0.0, 1.0]):
         return np.eye(3)
     x = np.eye(3)[int(np.argmin(np.abs(z)))]
@@ -307,24 +260,19 @@ def _about_z(axis: Floats) -> Floats:
     return np.column_stack((x, np.cross(z, x), z))
 
 
-def _meshes(number: int, link: Element, frame: pin.SE3, path: Path, here: str) -> list[dict[str, Any]]:
+def _meshes(number: int, link: Element, frame: pin.SE3, path: Path) -> list[dict[str, Any]]:
     """Return the meshes that show a link, whose frame is given in that of the link of a number."""
     found = []
     for visual in link.findall("visual"):
         mesh, origin = visual.find("geometry/mesh"), visual.find("origin")
-        if mesh is not None and mesh.get("filename"):
-            at = pin.SE3.Identity()
-            if origin is not None:
-                rpy, xyz = (numbers(origin, key, (0.0,) * 3, here) for key in ("rpy", "xyz"))
-                at = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz)
-            found.append(
-                {
-                    "link": number,
-                    "file": str(mesh_file(str(mesh.get("filename")), path)),
-                    "placement": _row(frame * at),
-                    "scale": numbers(mesh, "scale", (1.0, 1.0, 1.0), here).tolist(),
-                }
-            )
+        if mesh is None or not mesh.get("filename"):
+            continue
+        at = pin.SE3.Identity()
+        if origin is not None:
+            at = pin.SE3(pin.rpy.rpyToMatrix(_numbers(origin, "rpy")), _numbers(origin, "xyz"))
+        file = str(mesh_file(str(mesh.get("filename")), path))
+        scale = _numbers(mesh, "scale").tolist()
+        found.append({"link": number, "file": file, "placement": _row(frame * at), "scale": scale})
     return found
 
 
@@ -344,27 +292,28 @@ def mesh_file(name: str, urdf: Path) -> Path:
     return next((place for place in places if place.is_file()), folder / inside)
 
 
-def _limits(chain: list[_Joint], where: str) -> tuple[dict[str, Any], str]:
+def _limits(chain: list[Element]) -> tuple[dict[str, list[float]], str]:
     """Return the table `limits`, and what was assumed about positions."""
-    position, velocity, torque, notes = [], [], [], []
+    limits: dict[str, list[float]] = {"position": [], "velocity": [], "torque": []}
+    notes = []
     for joint in chain:
-        here = f"{where}: joint {joint.name}"
-        values = {
-            key: float(numbers(joint.limit, key, (0.0,), here)[0])
-            for key in ("lower", "upper", "effort", "velocity")
-        }
-        for key in ("effort", "velocity"):
-            if not values[key] > 0.0:
-                raise UrdfError(f"{here}: <limit> has {key} {values[key]:g}: must be more than 0")
-        low, high = values["lower"], values["upper"]
-        if joint.kind == "continuous":
+        name, limit = joint.get("name"), joint.find("limit")
+        assert limit is not None
+        low, high, effort, velocity = (
+            float(_numbers(limit, key)[0]) for key in ("lower", "upper", "effort", "velocity")
+        )
+        for key, value in (("effort", effort), ("velocity", velocity)):
+            if not value > 0.0:
+                raise RobotFileError(f"joint {name}: <limit> has {key} {value:g}: must be more than 0")
+        if joint.get("type") == "continuous":
             low, high = -CONTINUOUS, CONTINUOUS
         elif not low < high:
-            raise UrdfError(f"{here}: <limit> has lower {low:g} and upper {high:g}: lower must be less")
+            raise RobotFileError(
+                f"joint {name}: <limit> has lower {low:g} and upper {high:g}: lower must be less"
+            )
         most = max(abs(low), abs(high))
         if low + high != 0.0:
-            notes.append(f"{joint.name} {low:g} to {high:g} rad in the URDF, here ±{most:g}")
-        position.append(most)
-        velocity.append(values["velocity"])
-        torque.append(values["effort"])
-    return {"position": position, "velocity": velocity, "torque": torque}, "; ".join(notes)
+            notes.append(f"{name} {low:g} to {high:g} rad in the URDF, here ±{most:g}")
+        for values, value in zip(limits.values(), (most, velocity, effort), strict=True):
+            values.append(value)
+    return limits, "; ".join(notes)

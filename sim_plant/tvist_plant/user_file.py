@@ -8,9 +8,8 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 LARGEST: Final = 4 << 20
@@ -23,8 +22,6 @@ LONGEST_NAME: Final = 100
 """Largest number of characters of a name in a file."""
 LONGEST_LINE: Final = 500
 """Largest number of characters of what a file, or a library that reads it, says."""
-
-Content = TypeVar("Content")
 
 
 def named(error: BaseException, said: str | None = None) -> str:
@@ -44,12 +41,7 @@ class UserFileError(ValueError):
 
 
 def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
-    """Read a file that a user has named; messages say what kind of file it is, "robot file".
-
-    Raises:
-        UserFileError: The file is not a regular file, or larger than `LARGEST`.
-        OSError: The file does not exist or cannot be read.
-    """
+    """Read a file that a user has named; messages say what kind of file it is, "robot file"."""
     # Check before opening, since opening a device may already have an effect, and again afterwards, since the path
     # may refer to another file by then. Open without blocking, since that may be a pipe.
     check_is_file(path, what)
@@ -65,12 +57,7 @@ def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
 
 
 def read_text(path: str | os.PathLike[str], what: str) -> str:
-    """Read a text that a user has named.
-
-    Raises:
-        UserFileError: See `read_bytes`; or the file is not UTF-8.
-        OSError: See `read_bytes`.
-    """
+    """Read a text that a user has named."""
     try:
         return read_bytes(path, what).decode()
     except UnicodeDecodeError as error:
@@ -80,13 +67,7 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
 
 
 def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
-    """Read a TOML file that a user has named.
-
-    Raises:
-        UserFileError: See `read_text`; or the content has more than `DEEPEST` levels.
-        TOMLDecodeError: The content is not valid TOML.
-        OSError: See `read_bytes`.
-    """
+    """Read a TOML file that a user has named."""
     text = read_text(path, what)
     if _is_deeper(text, DEEPEST):
         raise UserFileError(f"{what} {path} is nested too deeply: at most {DEEPEST} levels are supported")
@@ -94,11 +75,7 @@ def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
 
 
 def toml(text: str) -> dict[str, Any]:
-    """Parse TOML.
-
-    Raises:
-        TOMLDecodeError: The text is not valid TOML, or has an integer of thousands of digits, which Python refuses.
-    """
+    """Parse TOML."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError:
@@ -108,11 +85,7 @@ def toml(text: str) -> dict[str, Any]:
 
 
 def xml(data: bytes) -> Element:
-    """Parse XML without a document type, since its entities could grow without end.
-
-    Raises:
-        UserFileError: The data is not valid XML, has a document type, or more than `DEEPEST` levels.
-    """
+    """Parse XML without a document type, since its entities could grow without end."""
     parser = XMLParser(target=_Tree())  # noqa: S314  see `_Tree`
     try:
         parser.feed(data)
@@ -149,25 +122,8 @@ def is_name(text: str) -> bool:
 
 
 def check_is_file(path: str | os.PathLike[str], what: str) -> None:
-    """Check that a path names a regular file.
-
-    Raises:
-        UserFileError: It names something else.
-        OSError: There is nothing.
-    """
+    """Check that a path names a regular file."""
     _check_kind(path, what, Path(path).stat())
-
-
-def parsed(path: str | os.PathLike[str], what: str, parse: Callable[[], Content]) -> Content:
-    """Parse a file with a parser that checks the depth itself; messages say what kind of file it is.
-
-    Raises:
-        UserFileError: The content is nested more deeply than the parser supports.
-    """
-    try:
-        return parse()
-    except RecursionError:
-        raise UserFileError(f"{what} {path} is nested too deeply") from None
 
 
 def _is_deeper(text: str, most: int) -> bool:

@@ -1,9 +1,13 @@
 """Plants by name: arms that differ from what their controller knows, each in one way or in many.
 
 A controller uses the robot file for all of them. What is drawn is drawn from the seed of a case or of a robot.
+
+A hidden robot is not quite its file, so that a controller stands before it as before a real one: each gear and link is
+softer or stiffer, its dampers, loops, rotors and friction are others, and what it carries is not quite what it was said
+to carry. All factors are uniform within 1 ± a share, and independent of each other.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from math import radians
@@ -13,10 +17,9 @@ import numpy as np
 from msgspec import structs
 
 from tvist_plant.flexible_arm import SUBSTEPS_IF_IMPERFECT, FlexibleArm
-from tvist_plant.hidden import hidden, hidden_payload
 from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.plant import SimulatedArm
-from tvist_plant.robot_tables import Payload, RobotDescription
+from tvist_plant.robot_tables import Drives, LinkFlexibility, Payload, RobotDescription
 from tvist_plant.similar import counterpart
 
 SCATTER: Final = 0.15
@@ -33,9 +36,27 @@ SPRINGS: Final = ("gear_stiffness",)
 """What is a spring among the parameters of the drives."""
 LOOPS: Final = (*SPRINGS, "velocity_gain", "position_gain")
 """Springs and the gains of the loops."""
+DRIVES: Final = {
+    "gear_stiffness": 0.2,
+    "gear_damping": 0.2,
+    "velocity_gain": 0.3,
+    "rotor_inertia": 0.2,
+    "coulomb_friction": 0.2,
+    "friction_width": 0.2,
+}
+"""Largest relative deviation of each joint's drive of a hidden robot; the width is one for all joints [-]."""
+LINKS: Final = {"stiffness": 0.2, "damping_time": 0.2}
+"""Largest relative deviation of each of its links that bends; the time is one for all links [-]."""
+MASS: Final = 0.15
+"""Largest relative deviation of its carried mass from the declared one [-]."""
+CENTRE: Final = 0.015
+"""Largest deviation of its carried centre of mass along each axis of the flange [m]."""
+
+Factors = Callable[[float, tuple[int, ...]], Any]
+"""Makes factors of a shape from a share."""
 
 
-def _same(description: RobotDescription, seed: int) -> RobotDescription:  # noqa: ARG001  nothing is drawn
+def _same(description: RobotDescription, _seed: int) -> RobotDescription:
     return description
 
 
@@ -55,14 +76,13 @@ class Variant:
     """Backlash of its gears, relative to `BACKLASH` [-]."""
     carries: Callable[[Payload], Payload] | None = None
     """Returns what it carries from what it is said to carry; None if that is true."""
+    seed: int | None = None
+    """Seed of its own, which then counts alone."""
 
     def make(self, description: RobotDescription, carried: Payload, seed: int) -> SimulatedArm:
-        """Create the arm from the controller's description, the payload that it is said to carry, and a seed.
-
-        Raises:
-            ValueError: It cannot be this one, since none of its links bends.
-        """
-        arm, found = self.truly(description, seed), self.imperfections
+        """Create the arm from the controller's description, the payload that it is said to carry, and a seed."""
+        arm = self.truly(description, seed if self.seed is None else self.seed)
+        found = self.imperfections
         if self.backlash:
             joints = description.joints
             widths = (self.backlash * BACKLASH[counterpart(joint, joints)] for joint in range(joints))
@@ -71,29 +91,55 @@ class Variant:
         return FlexibleArm(arm, carried, imperfections=found, substeps=substeps, carries=self.carries)
 
 
-def _heavier(payload: Payload) -> Payload:
-    """Return a payload with a tenth more mass, whose centre is off by 15 mm sideways; nothing stays nothing."""
-    if payload.mass == 0.0:
-        return payload
-    (x, y, z), (xx, xy, xz, yy, yz, zz) = payload.com, (1.1 * value for value in payload.inertia)
-    return Payload(mass=1.1 * payload.mass, com=(x + 0.015, y, z), inertia=(xx, xy, xz, yy, yz, zz))
+def _changed(
+    description: RobotDescription, drives: Mapping[str, float], links: Mapping[str, float], factors: Factors
+) -> RobotDescription:
+    """Return an arm with parameters of its drives and its bending links multiplied by factors of their shares."""
+
+    def changed(table: Drives | LinkFlexibility, shares: Mapping[str, float]) -> Any:
+        own = {name: np.array(getattr(table, name)) for name in shares}
+        new = {name: (value * factors(shares[name], value.shape)).tolist() for name, value in own.items()}
+        return structs.replace(
+            table, **{name: tuple(value) if isinstance(value, list) else value for name, value in new.items()}
+        )
+
+    return structs.replace(
+        description,
+        drives=changed(description.drives, drives),
+        link_flexibility=changed(description.link_flexibility, links),
+    )
 
 
-def _sharper(share: float, description: RobotDescription, seed: int) -> RobotDescription:  # noqa: ARG001  not drawn
+def _signs(*seed: int) -> Factors:
+    """Return what draws 1 plus or minus a share."""
+    random = np.random.default_rng(seed)
+    return lambda share, shape: random.choice([1.0 - share, 1.0 + share], shape)
+
+
+def _off(
+    share: float, number: int, description: RobotDescription, seed: int, names: tuple[str, ...] = LOOPS
+) -> RobotDescription:
+    """Return an arm with each gear, link and gain of the drives' loops changed by a share, up or down at random."""
+    return _changed(description, dict.fromkeys(names, share), {"stiffness": share}, _signs(seed, number))
+
+
+def stiffer(description: RobotDescription, factor: float) -> RobotDescription:
+    """Return an arm all of whose springs are stiffer by a factor; their damping stays the same."""
+    springs, links = dict.fromkeys(SPRINGS, factor), {"stiffness": factor}
+    return _changed(description, springs, links, lambda factor, _: factor)
+
+
+def _sprung(factor: float, description: RobotDescription, _seed: int) -> RobotDescription:
+    return stiffer(description, factor)
+
+
+def _sharper(share: float, description: RobotDescription, _seed: int) -> RobotDescription:
     """Return an arm whose friction, never linear, changes sign within a share of the speed."""
     drives = description.drives
     return structs.replace(
         description,
         drives=structs.replace(drives, friction_width=share * drives.friction_width, linear_friction=False),
     )
-
-
-def _off(share: float, number: int, description: RobotDescription, seed: int) -> RobotDescription:
-    return softer_and_stiffer(description, share, [seed, number])
-
-
-def _sprung(factor: float, description: RobotDescription, seed: int) -> RobotDescription:  # noqa: ARG001  not drawn
-    return stiffer(description, factor)
 
 
 def _unlike(description: RobotDescription, seed: int) -> RobotDescription:
@@ -111,16 +157,43 @@ def _unlike(description: RobotDescription, seed: int) -> RobotDescription:
     )
     drives = structs.replace(description.drives, friction_width=0.5 * description.drives.friction_width)
     other = structs.replace(links, mass=masses, com=centres, inertia=inertias)
-    return softer_and_stiffer(structs.replace(description, links=other, drives=drives), SCATTER, [seed, 15])
+    return _off(SCATTER, 15, structs.replace(description, links=other, drives=drives), seed)
 
 
 def _all_at_once(description: RobotDescription, seed: int) -> RobotDescription:
     """Return an arm with each spring softer or stiffer, and friction that changes sign in half the speed."""
-    return softer_and_stiffer(_sharper(0.5, description, seed), SCATTER, [seed, 61], SPRINGS)
+    return _off(SCATTER, 61, _sharper(0.5, description, seed), seed, SPRINGS)
 
 
-def _hidden(number: int, description: RobotDescription, seed: int) -> RobotDescription:  # noqa: ARG001  its own seed
-    return hidden(description, number)
+def hidden(description: RobotDescription, seed: int) -> RobotDescription:
+    """Draw the robot behind a robot file, which is all that a controller knows, by a seed of at least 0.
+
+    Its springs, dampers, loops, rotors and friction differ; kinematics, masses, limits and sensors are the
+    file's.
+    """
+    random = np.random.default_rng([seed, 53])
+    return _changed(
+        description, DRIVES, LINKS, lambda share, shape: random.uniform(1.0 - share, 1.0 + share, shape)
+    )
+
+
+def _other_payload(payload: Payload, factor: float, aside: Any) -> Payload:
+    """Return a payload with another mass, whose centre is elsewhere; nothing stays nothing."""
+    if payload.mass == 0.0:
+        return payload
+    centre = tuple((np.array(payload.com) + aside).tolist())
+    inertia = tuple(factor * value for value in payload.inertia)
+    return Payload(mass=factor * payload.mass, com=centre, inertia=inertia)  # type: ignore[arg-type]
+
+
+def hidden_payload(declared: Payload, seed: int) -> Payload:
+    """Return what a hidden robot carries when somebody says that it carries a payload.
+
+    The same seed, at least 0, gives the same error each time.
+    """
+    random = np.random.default_rng([seed, 59])
+    factor = float(random.uniform(1.0 - MASS, 1.0 + MASS))
+    return _other_payload(declared, factor, random.uniform(-CENTRE, CENTRE, 3))
 
 
 AS_DESCRIBED: Final = Variant("calibrated", "as described")
@@ -174,7 +247,7 @@ _ALL = (
         _all_at_once,
         Imperfections(torsion=TORSION, tilt=radians(1.0)),
         backlash=0.5,
-        carries=_heavier,
+        carries=partial(_other_payload, factor=1.1, aside=(0.015, 0.0, 0.0)),
     ),
     Variant("springs-30", "springs 30 % softer", partial(_sprung, 0.7)),
     Variant("springs+30", "springs 30 % stiffer", partial(_sprung, 1.3)),
@@ -184,11 +257,7 @@ VARIANTS: Final = {one.name: one for one in _ALL}
 
 
 def variant(name: str) -> Variant:
-    """Return a plant by its name: one of `VARIANTS`, or a hidden robot, `hidden-SEED`.
-
-    Raises:
-        ValueError: There is none.
-    """
+    """Return a plant by its name: one of `VARIANTS`, or a hidden robot, `hidden-SEED`."""
     kind, dash, number = name.partition("-")
     if kind == "hidden" and dash and number.isascii() and number.isdigit() and len(number) < 19:
         return hidden_variant(int(number))
@@ -202,8 +271,9 @@ def hidden_variant(seed: int) -> Variant:
     return Variant(
         f"hidden-{seed}",
         f"hidden: springs, dampers, loops, rotors, friction and payload drawn from {seed}",
-        partial(_hidden, seed),
+        hidden,
         carries=partial(hidden_payload, seed=seed),
+        seed=seed,
     )
 
 
@@ -223,33 +293,3 @@ def with_springs(factor: float) -> Variant:
         return AS_DESCRIBED
     percent = f"{100.0 * (factor - 1.0):+g}"
     return Variant(f"springs_{percent}_percent", f"springs {percent} %", partial(_sprung, factor))
-
-
-def stiffer(description: RobotDescription, factor: float) -> RobotDescription:
-    """Return an arm all of whose springs are stiffer by a factor; their damping stays the same."""
-    drives, links = description.drives, description.link_flexibility
-    return structs.replace(
-        description,
-        drives=structs.replace(
-            drives, gear_stiffness=tuple(factor * value for value in drives.gear_stiffness)
-        ),
-        link_flexibility=structs.replace(links, stiffness=tuple(factor * value for value in links.stiffness)),
-    )
-
-
-def softer_and_stiffer(
-    description: RobotDescription, share: float, seed: list[int], names: tuple[str, ...] = LOOPS
-) -> RobotDescription:
-    """Return an arm with each gear, link and gain of the drives' loops changed by a share, up or down at random.
-
-    The seed is that of the signs; the names say what is changed of the drives.
-    """
-    random = np.random.default_rng(seed)
-
-    def scattered(values: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple((np.array(values) * random.choice([1.0 - share, 1.0 + share], len(values))).tolist())
-
-    drives, links = description.drives, description.link_flexibility
-    other = structs.replace(drives, **{name: scattered(getattr(drives, name)) for name in names})
-    bending = structs.replace(links, stiffness=scattered(links.stiffness))
-    return structs.replace(description, drives=other, link_flexibility=bending)

@@ -7,12 +7,12 @@ import numpy as np
 from tests.search.draws import postures
 from tests.search.subject import RigidArm
 
-from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.controller import Controller
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.line.differentiator import central_differences
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.setup import Setup, body, paper_payload
+from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c

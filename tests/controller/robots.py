@@ -4,11 +4,11 @@ import msgspec
 import numpy as np
 
 from tvist_controller.controller import Controller
-from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.foresight.stopper import Stopper
+from tvist_controller.instruments.sink import Sink
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.elastic_lead import loads_of
-from tvist_controller.line.limits import StreamTorqueRoom
-from tvist_controller.reporting.sink import Sink
+from tvist_controller.line.limits import TorqueRoom
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.trajectory import JointLine, MotionLimits, SetpointStream, quickest_motion
 from tvist_plant.description import RobotDescription, load
@@ -105,7 +105,7 @@ class Line(ControlCycle):
     def stream(self, stream_period: float, limits: MotionLimits) -> SetpointStream:
         """Follow set-points from rest; no guard watches."""
         spared, reach = self.filter.spared(limits), np.array(self.description.limits.position)
-        torque = StreamTorqueRoom(self.description, self.dynamics)
+        torque = TorqueRoom(self.description, self.dynamics)
         return self.begin(
             SetpointStream(self.reference, stream_period, spared, H, reach=reach, torque=torque)
         )
@@ -120,7 +120,7 @@ def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0, plant: Plant | 
 def stop(line: Line, deceleration: float | None):
     """Stop a line; what is done, or None where a stop goes on."""
     if not hasattr(line, "outlook"):
-        line.outlook = Outlook(line)
+        line.outlook = Stopper(line)
     return line.outlook.stop(deceleration)
 
 

@@ -4,8 +4,8 @@ import msgpack
 import msgspec
 import pytest
 
-from tvist_controller.authority.session import Lease
 from tvist_controller.dispatch.admission import admit, admit_setpoint
+from tvist_controller.dispatch.rights import Lease
 from tvist_protocol import commands as c
 from tvist_protocol.codec import MAX_BYTES, encode
 from tvist_protocol.explain import EXPLAINED_BYTES

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tvist_controller.calibrations import load
 from tvist_controller.setup import paper_payload
+from tvist_controller.sources.calibrations import load
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationReset
@@ -38,7 +38,7 @@ def test_they_bring_their_own_estimator_and_leave_less_than_the_papers_shaper():
         robot.until_rest()
         left[shaper] = ringing(robot)
         if shaper in NAMES:
-            assert robot.controller.filters.source.name == "modal"
+            assert robot.controller.assumed.source.name == "modal"
             assert "with estimator modal" in next(e.why for e in robot.events if e.kind == "shaper_changed")
             assert left[shaper] < min(0.1 * left["none"], left["zv"]), shaper
 
@@ -111,7 +111,7 @@ def test_a_shaper_may_have_as_many_modes_as_the_estimator_gives(modes):
     robot = Robot(calibration=POLYNOMIAL)
     assert robot.send(c.SetShaper, name="zv", modes=modes) == Done()
     assert len(robot.tick().estimated_f_d) == modes
-    assert robot.controller.filters.source.name == "modal"
+    assert robot.controller.assumed.source.name == "modal"
     assert robot.send(c.SetEstimator, name="polynomial").code == "out_of_range"
     assert robot.send(c.SetShaper, name="zv") == Done()
     assert robot.send(c.SetEstimator, name="polynomial") == Done()

@@ -4,10 +4,9 @@ import msgspec
 import pytest
 
 from tvist_controller.about import info_of
-from tvist_controller.calibrations import available, load
+from tvist_controller.sources.calibrations import available, load
+from tvist_plant.description import fingerprint, robots
 from tvist_plant.description import load as load_robot
-from tvist_plant.description import robots
-from tvist_plant.fingerprint import fingerprint
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
 

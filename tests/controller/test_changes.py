@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.foresight.collision import CollisionModel
-from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.line.differentiator import STILL
 from tvist_controller.line.inverse_dynamics import SLEW, InverseDynamics
 from tvist_controller.line.limits import TORQUE_SHARE
@@ -260,7 +260,7 @@ def test_a_stop_while_the_payload_changes_is_safe_with_either(masses):
         if tick == 150:
             line.dynamics.declare(body(paper_payload(UR5E, masses[1])))
         line.step()
-    state, planned = line.newest, Outlook(line).plan_stop(None).trajectory
+    state, planned = line.newest, Stopper(line).plan_stop(None).trajectory
     for mass in masses:
         dynamics = InverseDynamics(UR5E, body(paper_payload(UR5E, mass)))
         present = line.dynamics.effort(state.q, state.qd, state.qdd)

@@ -7,7 +7,7 @@ import pytest
 from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.motion.streaming import TIMEOUT
+from tvist_controller.motion.setpoints import TIMEOUT
 from tvist_controller.setup import body, paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol.codec import check, encode
@@ -138,7 +138,7 @@ def test_an_estimator_is_chosen_and_announced():
     assert robot.send(c.SetEstimator, name="polynomial", calibration=content) == Done()
     assert robot.tick().estimated_f_d == pytest.approx([6.7], abs=0.05)
     assert robot.kinds() == ["shaper_changed", "shaper_changed"]
-    assert robot.controller.filters.source.name == "polynomial"
+    assert robot.controller.assumed.source.name == "polynomial"
 
 
 def test_a_payload_is_declared_and_the_arm_keeps_what_it_carries():
@@ -301,7 +301,7 @@ def assert_unchanged(robot: Robot, twin: Robot, ticks: int = 50) -> None:
         each.tick(ticks)
     assert bits(robot.states) == bits(twin.states)
     assert robot.events == twin.events
-    hidden = [(each.controller.declared, each.controller.filters.source) for each in (robot, twin)]
+    hidden = [(each.controller.declared, each.controller.assumed.source) for each in (robot, twin)]
     assert hidden[0] == hidden[1]
 
 

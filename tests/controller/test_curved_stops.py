@@ -6,9 +6,9 @@ from tests.search.draws import SHAPERS
 from tests.search.stops import KINDS, PAUSES
 from tests.search.subject import Subject
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.foresight.line_copy import resting_after
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_plant.description import Payload

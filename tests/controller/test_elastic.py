@@ -7,16 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.controller.robots import PAPER, Q1, Q2, Q3, UR5E, H, Line, Robot, calibration, cut, spring_loads
 
-from tvist_controller.calibrations import load
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.elastic_lead import MOST, ROTOR, follow
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.setup import Setup, body, paper_payload
-from tvist_controller.sources.elastic_source import springs_of
+from tvist_controller.sources.calibrations import drivetrain, load
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_plant.description import Payload
+from tvist_plant.model import flexible_model
 from tvist_protocol import commands as c
 from tvist_protocol.motions import SpeedJ
 from tvist_protocol.replies import Done
@@ -27,7 +27,9 @@ NAMES = ("elastic", "elastic-position", "elastic-auto")
 
 
 def stage(description=UR5E, **how) -> ElasticFeedForward:
-    return ElasticFeedForward(description, *springs_of(description, MODAL), H, **how)
+    springs = drivetrain(MODAL.modal.parameters, description, flexible_model(description, Payload()))
+    stiffness = np.array(springs.stiffness)
+    return ElasticFeedForward(description, stiffness, np.array(springs.damping) / stiffness, H, **how)
 
 
 def line(shaper: str, q=Q1, *, mass=5.0, believed=None, description=UR5E, plant=None) -> Line:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tvist_controller.experience.motion_record import AFTER, LONGEST
 from tvist_controller.loopback import LoopbackHost
+from tvist_controller.safety.motion_record import AFTER, LONGEST
 from tvist_controller.setup import paper_payload
 from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay
@@ -95,11 +95,11 @@ def test_what_is_learnt_is_told_journaled_replayed_and_undone():
     robot = Served(Recalling(2.0), payload=paper_payload(ROBOT, 1.0), carried=paper_payload(ROBOT, 2.0))
     controller = robot.host.controller
     robot.move(Q2)
-    assert (controller.declared.mass, controller.payload.beliefs().payload.mass) == (1.0, 2.0)
+    assert (controller.declared.mass, controller.assumed.beliefs().payload.mass) == (1.0, 2.0)
     assert b"it carries 2 kg" in b"".join(robot.events)
     robot.move(Q1)
     robot.ask(Forget(token=robot.token, what="payload"))
-    assert controller.payload.beliefs().payload.mass == 1.0
+    assert controller.assumed.beliefs().payload.mass == 1.0
     robot.move(Q2)
     assert [entry.kind for entry in robot.host.entries].count("lesson") == 1
     assert replay(robot.setup, robot.host.entries, robot.states[1:]).first_difference is None
@@ -158,7 +158,7 @@ def test_what_is_being_learnt_when_it_is_to_be_forgotten_is_not_taken():
 
 
 def test_motions_that_are_made_faster_than_studied_do_not_fill_the_memory(monkeypatch):
-    monkeypatch.setattr("tvist_controller.experience.experience.WAITING", 2)
+    monkeypatch.setattr("tvist_controller.safety.experience.WAITING", 2)
     robot = Served(Recalling())
     experience = robot.host._host._experience
     experience._later = lambda _: lambda: False

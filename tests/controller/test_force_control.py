@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.trajectory.force_law import ForceTask, compliant_velocity
+from tvist_controller.trajectory.compliant import ForceTask, compliant_velocity
 from tvist_plant.plant import PERIOD
 from tvist_protocol import forces as f
 from tvist_protocol import motions as m

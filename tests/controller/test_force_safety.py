@@ -394,7 +394,7 @@ def test_whatever_comes_in_between_force_control_keeps_to_its_limits_and_tells_h
     sequence, lockstep
 ):
     robot, plant = feeling(clock="free" if lockstep else "realtime", lease_s=3600.0)
-    control, motion = robot.controller._force_control, robot.controller.motion
+    control, motion = robot.controller.force_control, robot.controller.motion
     limits, started, reference = UR5E_IN_AIR.limits, None, [robot.states[-1].reference_q] * 2
     for (kind, given_), ticks in [*sequence, ((m.StopJ, {}), 1500)]:
         placements = robot.controller.cycle.placements
@@ -403,7 +403,7 @@ def test_whatever_comes_in_between_force_control_keeps_to_its_limits_and_tells_h
         elif kind == "protective stop":
             motion.protect("a test")
         elif kind == "safeguard":
-            robot.controller._safety.safeguard(stopped=given_[0])
+            robot.controller.safety.safeguard(stopped=given_[0])
         else:
             robot.send(kind, **given_)
         for _ in range(ticks):

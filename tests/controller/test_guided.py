@@ -6,7 +6,7 @@ import pytest
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.rotation import turn
 from tvist_controller.trajectory import MotionLimits, Speed
-from tvist_controller.trajectory.servo import _step
+from tvist_controller.trajectory.guided import _step
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
 from tvist_protocol.io import SetTcp

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.examples import examples
 
 from tvist_controller.dispatch.planner import Planner
-from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.pose import LOST, pseudo_inverse
 from tvist_controller.programs.functions.state import PoseFunctions
@@ -102,7 +102,7 @@ def test_a_statement_that_waited_for_its_budget_is_borne_by_the_tick_that_carrie
 def test_few_ticks_plan_or_stop_whatever_the_programs_do(seed, monkeypatch):
     """Threads that are killed while they move, and short moves in quick succession, are held back."""
     robot, beside, _ = begin(seed)
-    plans, stops = Counts(monkeypatch, Planner, "plan"), Counts(monkeypatch, Outlook, "plan_stop")
+    plans, stops = Counts(monkeypatch, Planner, "plan"), Counts(monkeypatch, Stopper, "plan_stop")
     ticks, dear = 900, 0
     for _ in range(ticks):
         robot.controller.begin_tick()
@@ -260,7 +260,7 @@ def test_what_has_ended_or_stopped_does_nothing_any_more(seed):
         """Look at what was written when the main program stops, still within the tick."""
         hear(event)
         if event.kind in {"program_stopped", "protective_stop"} and event.secondary is None and not at_stop:
-            at_stop.append((len(robot.controller._events), robot.controller.tick_number))
+            at_stop.append((len(robot.controller.events), robot.controller.tick_number))
             at_stop.append(written(robot, all_places=False))
 
     player.hear = watching

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from tests.controller.robots import UR5E, H, setup
 
-from tvist_controller.calibrations import load
 from tvist_controller.planning.filter_planner import FilterPlanner
-from tvist_controller.planning.keeping import keeping_motion, shaped_ahead
+from tvist_controller.planning.fitting import keeping_motion, shaped_ahead
+from tvist_controller.sources.calibrations import load
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_lab.study.moves import draw_moves
 

@@ -9,7 +9,7 @@ from tests.search import changes, streams
 from tvist_controller.about import info_of
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
 from tvist_controller.foresight.line_copy import MAX_AHEAD, resting_after
-from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.line.differentiator import STILL
 from tvist_controller.trajectory import StuckError
 from tvist_plant.description import Payload
@@ -29,7 +29,7 @@ def test_what_is_foreseen_is_what_happens_to_the_bit(name):
     for moment in sorted(random.integers(2, 1100, 3)):
         while line.trajectory._ticks < moment and not line.at_rest and motion.rate == 1.0:
             line.step()
-        ahead = Outlook(line).foresee()
+        ahead = Stopper(line).foresee()
         assert ahead is not None
         if moment > 800:
             break
@@ -81,7 +81,7 @@ def test_what_lasts_too_long_is_not_foreseen():
     line.begin(line.plan(Q3, type(PAPER)(0.01, 0.1, 1.0)))
     line.step()
     assert MAX_AHEAD * H < 100.0
-    assert Outlook(line).foresee() is None
+    assert Stopper(line).foresee() is None
 
 
 @pytest.mark.parametrize("number", range(10))

@@ -4,9 +4,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from tvist_controller.calibrations import available, estimator_of, fits, load
-from tvist_controller.calibrations.modal import modal_estimator
 from tvist_controller.setup import body, paper_payload
+from tvist_controller.sources.calibrations import available, estimator_of, fits, load, modal_estimator
 from tvist_plant.description import load as load_robot
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.calibration import (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tvist_controller.authority.session import NoControlError, Session
+from tvist_controller.dispatch.rights import Authority, NoControlError
 from tvist_controller.line.limits import REDUCED_SHARE
 from tvist_controller.safety.monitors import TICKS, Overload
 from tvist_plant.plant import Measurement
@@ -146,7 +146,7 @@ def test_nothing_is_without_a_way_in_and_a_way_out():
 @pytest.mark.parametrize("state", Control)
 @pytest.mark.parametrize("trigger", ["take_control", "hand_over", "release_control", "lease_end"])
 def test_control_goes_by_the_table_too(state, trigger):
-    session = Session(timeouts=True)
+    session = Authority(lambda _: None, lambda *_, **__: None, realtime=True)
     if state is Control.HELD:
         session.take("a", 1.0, 0.0)
     rows = [row for row in TRANSITIONS if row.trigger == trigger and state in row.sources]

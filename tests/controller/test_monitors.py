@@ -30,7 +30,7 @@ class WhileHeld(Alarm):
 
 def with_monitor(monitor):
     robot = Robot()
-    safety = robot.controller._safety
+    safety = robot.controller.safety
     safety.monitors = (*safety.monitors, monitor)
     return robot
 
@@ -55,7 +55,7 @@ def test_a_finding_leads_to_what_it_names(then, kinds):
 def test_a_monitor_looks_while_it_has_what_it_needs_and_begins_anew_when_the_drives_hold_the_arm():
     always, held = Alarm(), WhileHeld()
     robot = with_monitor(always)
-    safety = robot.controller._safety
+    safety = robot.controller.safety
     safety.monitors = (*safety.monitors, held)
     robot.tick(10)
     assert (always.looked, held.looked, held.restarts) == (10, 10, 0)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tvist_controller.about import info_of
-from tvist_controller.calibrations import default_for, load
 from tvist_controller.setup import paper_payload
+from tvist_controller.sources.calibrations import default_for, load
 from tvist_plant.description import load as load_robot
 from tvist_protocol import commands as c
 

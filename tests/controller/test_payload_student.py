@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.controller.test_experience import Q1, Q2, ROBOT, Served
 
-from tvist_controller.calibrations import load
-from tvist_controller.experience.experience import Taught
-from tvist_controller.experience.motion_record import Beliefs, MotionRecord
-from tvist_controller.experience.payload_student import DEAD, PayloadStudent
 from tvist_controller.safety import payload_monitor
+from tvist_controller.safety.experience import Taught
+from tvist_controller.safety.motion_record import Beliefs, MotionRecord
+from tvist_controller.safety.payload_student import DEAD, PayloadStudent
 from tvist_controller.setup import Setup, paper_payload
+from tvist_controller.sources.calibrations import load
 from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay
 from tvist_protocol.codec import decode_event
@@ -38,7 +38,7 @@ class Following(Served):
 
     @property
     def assumed(self):
-        return self.host.controller.payload.beliefs().payload
+        return self.host.controller.assumed.beliefs().payload
 
     def told(self, kind):
         return [event for event in map(decode_event, self.events) if event.kind == kind]

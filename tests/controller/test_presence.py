@@ -2,8 +2,7 @@
 
 import pytest
 
-from tvist_controller.authority.presence import Presence
-from tvist_controller.authority.session import NoControlError
+from tvist_controller.dispatch.rights import NoControlError, Presence
 
 
 @pytest.fixture
@@ -34,8 +33,8 @@ def test_of_two_under_one_name_nobody_can_tell_who_asks(presence, second):
     presence.seen("a", second)
     with pytest.raises(NoControlError) as caught:
         presence.session_of("a")
-    assert caught.value.code == "no_control"
-    assert "'a'" in caught.value.why
+    assert caught.value.reply.code == "no_control"
+    assert "'a'" in caught.value.reply.why
     presence.gone("a", second)
     assert presence.session_of("a") == "1f"
 

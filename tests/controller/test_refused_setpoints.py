@@ -8,7 +8,7 @@ import pytest
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import admit_setpoint
 from tvist_controller.host import Host
-from tvist_controller.motion.streaming import TIMEOUT
+from tvist_controller.motion.setpoints import TIMEOUT
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.journal import Entry

@@ -4,8 +4,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from tvist_controller.instruments import state_layout
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.reporting import state_layout
 from tvist_lab.in_process import free_setup
 from tvist_protocol.codec import decode_state, encode
 from tvist_protocol.commands import MoveJ, ServoStart, Setpoint, TakeControl
@@ -78,7 +78,7 @@ def test_of_any_tick_and_set_point(number, plain, monkeypatch):
         for name, function in vars(state_layout).copy().items():
             if hasattr(function, "py_func"):
                 monkeypatch.setattr(state_layout, name, function.py_func)
-        monkeypatch.setattr("tvist_controller.reporting.report.write_state", state_layout.write_state)
+        monkeypatch.setattr("tvist_controller.instruments.report.write_state", state_layout.write_state)
     for sequence in (None, 0, number):
         changed = msgspec.structs.replace(
             report, tick=number, sequence=sequence, missed=number, made=None, written=None
@@ -90,12 +90,13 @@ def test_one_layout_serves_until_something_else_changes():
     told = Told()
     layouts = told.moving(300).layouts
     assert told.host.controller.report.encoded
-    known = layouts._known
+    ((key, known),) = layouts.items()
     for _ in range(5):
         assert told.step(10).encoded
-    assert layouts._known is known
+    assert layouts[key] is known
     assert msgspec.structs.replace(told.step(), missed=7, written=None).encoded
-    assert layouts._known is not known
+    assert len(layouts) == 1
+    assert key not in layouts
 
 
 def test_a_number_of_any_kind_survives():

@@ -5,16 +5,17 @@ import pinocchio as pin
 import pytest
 
 from tvist_controller.instruments import wrench as module
-from tvist_controller.instruments.joint_lists import (
+from tvist_controller.instruments.rigid_body import RigidBody
+from tvist_controller.instruments.wrench import (
     ACTUAL_MOMENT,
     ACTUAL_Q,
+    DAMPING,
+    NEAR_SINGULAR,
     ROWS,
     SHAPED_MOMENT,
     SHAPED_QD,
     SHAPED_QDD,
 )
-from tvist_controller.instruments.rigid_body import RigidBody
-from tvist_controller.instruments.wrench import DAMPING, NEAR_SINGULAR
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.rotation import rotation_vector
 from tvist_plant.chain import chain_of

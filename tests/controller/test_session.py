@@ -1,19 +1,25 @@
 """Leases."""
 
+import math
+
 import pytest
 
-from tvist_controller.authority.session import NoControlError, Session, check_token
+from tvist_controller.dispatch.rights import Authority, NoControlError, check_token
+
+
+def authority(*, realtime=True, instance=""):
+    return Authority(lambda _: None, lambda *_, **__: None, realtime=realtime, instance=instance)
 
 
 @pytest.fixture
 def session():
-    return Session(timeouts=True)
+    return authority()
 
 
 def refusal(action, *arguments):
     with pytest.raises(NoControlError) as caught:
         action(*arguments)
-    return caught.value
+    return caught.value.reply
 
 
 @pytest.mark.parametrize("token", ["", "a", "a#2", "b#1", "a#1 "])
@@ -26,24 +32,26 @@ def test_any_other_token_is_stale_and_renews_nothing(session, token):
 
 
 def test_without_timeouts_nothing_runs_out():
-    session = Session(timeouts=False)
+    session = authority(realtime=False)
     session.take("a", 0.1, 0.0)
-    assert not session.expired(1e9)
+    assert session.ends == math.inf
 
 
 @pytest.mark.parametrize("gone", [("a", "2f"), ("b", "1f"), ("a", "")])
 def test_the_going_of_another_one_ends_nothing(session, gone):
-    session.take("a", 30.0, 0.0, "1f")
-    assert not session.client_gone(*gone)
+    lease = session.take("a", 30.0, 0.0, "1f")
+    session.end_rights(*gone)
+    assert session.lease is lease
 
 
 def test_a_client_of_which_no_session_is_known_is_not_missed(session):
-    session.take("a", 30.0, 0.0)
-    assert not session.client_gone("a", "")
+    lease = session.take("a", 30.0, 0.0)
+    session.end_rights("a", "")
+    assert session.lease is lease
 
 
 def test_a_token_of_before_a_restart_is_never_valid_again():
-    before, after = (Session(timeouts=True, instance=instance) for instance in ("1f", "2e"))
+    before, after = (authority(instance=instance) for instance in ("1f", "2e"))
     old = before.take("a", 30.0, 0.0).token
     new = after.take("a", 30.0, 0.0).token
     assert (old, new) == ("a#1f.1", "a#2e.1")

@@ -19,7 +19,7 @@ from hypothesis.stateful import (
 from tests.examples import share
 
 from tvist_controller.controller import Controller
-from tvist_controller.motion.streaming import TIMEOUT
+from tvist_controller.motion.setpoints import TIMEOUT
 from tvist_protocol import commands as c
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
@@ -213,7 +213,7 @@ class Sessions(RuleBasedStateMachine):
         replies += [] if stepped is None else [stepped]
         assert {(reply.code, reply.where) for reply in replies} == {("wrong_mode", "type")}
         released = self.receive(c.ReleaseClock(token=self.token(whose)))
-        assert (released.code, self.robot.stepping.hold) == ("no_control", None)
+        assert (released.code, self.robot.session.clock) == ("no_control", None)
         assert self.robot.tick_number == before
 
     # ---------------------------------------------------------------- motion

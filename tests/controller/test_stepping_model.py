@@ -125,7 +125,7 @@ class Steps(RuleBasedStateMachine):
 
     def look(self):
         """Each right has at most one holder, the one that the model says."""
-        lease, hold = self.robot.session.lease, self.robot.stepping.hold
+        lease, hold = self.robot.session.lease, self.robot.session.clock
         assert (lease and lease.client) == (self.lease and self.lease.client)
         assert (hold and hold.client) == (self.clock and self.clock.client)
         assert (hold and hold.token) == (self.clock and self.clock.token)

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from tests.controller.robots import PAPER, Q1, Q2, Q3, H, Line
 
-from tvist_controller.calibrations import default_for, load
 from tvist_controller.line.elastic_lead import STICTION as OF_ELASTIC
 from tvist_controller.line.joint_controllers import LAWS, STICTION, described_friction
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.setup import Setup, body, paper_payload
+from tvist_controller.sources.calibrations import default_for, load
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_plant import description as robot_files
 from tvist_plant.flexible_arm import FlexibleArm

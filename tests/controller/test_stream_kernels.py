@@ -12,14 +12,14 @@ from tvist_controller.line import differentiator
 from tvist_controller.line import limits as line_limits
 from tvist_controller.line.differentiator import Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.limits import GuidedTorqueRoom, StreamTorqueRoom
-from tvist_controller.trajectory import JointStop, b_spline, limiter, stop_profile
+from tvist_controller.line.limits import TorqueRoom
+from tvist_controller.trajectory import JointStop, limiter, stream
 from tvist_plant.description import Payload, load
 
 from .robots import PAPER, UR5E, H
 from .streams import network, played, swinging, there_and_back
 
-MODULES = (b_spline, clearance, differentiator, limiter, line_limits, stop_profile)
+MODULES = (clearance, differentiator, limiter, line_limits, stream)
 FAR_OUT = Payload(mass=2.0, com=(0.2, -0.1, 0.15))
 
 
@@ -48,7 +48,7 @@ def test_a_stream_is_played_alike_in_python_to_the_bit(period, share, in_python)
         MotionLimits(share * PAPER.velocity, share * PAPER.acceleration, share * PAPER.jerk)
     )
     arrivals = network(wanted, period, 1.2, seed=3, jitter=1.2, loss=0.02)
-    room = StreamTorqueRoom(UR5E, InverseDynamics(UR5E, UR5E.payload))
+    room = TorqueRoom(UR5E, InverseDynamics(UR5E, UR5E.payload))
 
     def play():
         stream = SetpointStream(np.zeros(6), period, PAPER, H, reach=np.full(6, 6.28), torque=room)
@@ -65,8 +65,8 @@ def test_the_room_of_the_torque_is_that_of_numpy_to_the_bit(arm, in_python):
     dynamics, random = InverseDynamics(description, description.payload), np.random.default_rng(2)
     most, n = 0.9 * np.array(description.limits.torque), description.joints
     for room, beyond in (
-        (StreamTorqueRoom(description, dynamics), 0.0),
-        (GuidedTorqueRoom(description, dynamics), 1.0),
+        (TorqueRoom(description, dynamics), 0.0),
+        (TorqueRoom(description, dynamics, 1.0), 1.0),
     ):
         for q, qd, qdd in random.uniform(-3, 3, (300, 3, n)):
             still = dynamics.effort(q, qd, np.zeros(n))
@@ -89,7 +89,7 @@ def test_the_room_of_the_torque_is_that_of_numpy_to_the_bit(arm, in_python):
 
 def test_a_payload_that_is_phased_in_may_be_either():
     dynamics = InverseDynamics(UR5E, Payload())
-    room = StreamTorqueRoom(UR5E, dynamics)
+    room = TorqueRoom(UR5E, dynamics)
     q, still = np.array(UR5E.poses["Q1"]), np.zeros(6)
     empty = room.acceleration(q, still)
     dynamics.declare(UR5E.payload)
@@ -107,12 +107,12 @@ def test_the_stop_in_closed_form_is_ruckigs(limit, in_python):
         stop = JointStop(np.zeros(40), qd, qdd, acceleration=limit, jerk=2000.0, period=H)
         durations = []
         for j, (v, a) in enumerate(zip(qd.tolist(), qdd.tolist(), strict=True)):
-            phases = stop_profile.stop_phases(v, a, limit, 2000.0)
-            assert phases == in_python(lambda v=v, a=a: stop_profile.stop_phases(v, a, limit, 2000.0))
+            phases = clearance.stop_phases(v, a, limit, 2000.0)
+            assert phases == in_python(lambda v=v, a=a: clearance.stop_phases(v, a, limit, 2000.0))
             durations.append(phases[0] + phases[2] + phases[3])
             for share in (0.0, 0.01, 0.1, 0.4, 0.8, 1.0):
                 wanted = [values[j] for values in stop.at(share * stop.duration)]
-                found = stop_profile.after(v, a, phases, share * stop.duration)
+                found = clearance.after(v, a, phases, share * stop.duration)
                 assert found == pytest.approx(wanted, abs=1e-9)
         assert max(durations) == pytest.approx(stop.duration, abs=1e-9)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.limits import GENTLEST_STOP, TORQUE_SHARE, StreamTorqueRoom
+from tvist_controller.line.limits import GENTLEST_STOP, TORQUE_SHARE, TorqueRoom
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
 
@@ -13,7 +13,7 @@ from .streams import swinging
 
 DYNAMICS = InverseDynamics(UR5E, body(paper_payload(UR5E)))
 MOST = np.array(UR5E.limits.torque)
-ROOM = StreamTorqueRoom(UR5E, DYNAMICS)
+ROOM = TorqueRoom(UR5E, DYNAMICS)
 STILL = np.zeros(6)
 
 

@@ -7,9 +7,8 @@ import numpy as np
 from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.hidden import hidden, hidden_payload
 from tvist_plant.plant import PERIOD, Measurement
-from tvist_plant.variants import stiffer
+from tvist_plant.variants import hidden, hidden_payload, stiffer
 
 CONSTANTS = 0.05
 """Largest relative error of a joint's torque constant [-]."""

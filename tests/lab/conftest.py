@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tvist_controller import calibrations
+from tvist_controller.sources import calibrations
 from tvist_lab.metrics import motions
 from tvist_lab.recordings import STATE_COLUMNS, Recording
 from tvist_plant.description import load

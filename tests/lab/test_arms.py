@@ -7,12 +7,11 @@ import pytest
 from tests.conformance.served import finished
 from tools.tables.pages import page_of
 
-from tvist_controller.calibrations import available
-from tvist_controller.calibrations import load as load_calibration
+from tvist_controller.sources.calibrations import available
+from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_lab.studies.arms.about import about
 from tvist_lab.studies.arms.measure import sag_error
-from tvist_plant.description import load, robots
-from tvist_plant.fingerprint import fingerprint
+from tvist_plant.description import fingerprint, load, robots
 
 UR = ("ur3e", "ur10e", "ur16e", "ur20", "ur30", "ur5e")
 

@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from tvist_controller import calibrations
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import body, paper_payload
+from tvist_controller.sources import calibrations
 from tvist_lab.studies.evaluate import jobs, report
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import baselines

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from tvist_controller.calibrations import load as load_calibration
+from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_lab.studies.match import (
     FIRST,
     NEITHER,

@@ -245,7 +245,7 @@ def _calibration(folder):
     found = []
     for name in ("ur5e_5kg.json", "ur5e_modal.json"):
         found.append(folder / name)
-        found[-1].write_bytes((resources.files("tvist_controller") / "calibrations" / name).read_bytes())
+        found[-1].write_bytes((resources.files("tvist_controller") / "sources" / name).read_bytes())
     return found
 
 
@@ -316,7 +316,7 @@ def _read_robot(path):
 
 
 def _read_calibration(path):
-    from tvist_controller.calibrations import load
+    from tvist_controller.sources.calibrations import load
     from tvist_plant.user_file import UserFileError
     from tvist_protocol.calibration import CalibrationError
 

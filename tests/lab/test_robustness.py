@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tools.tables.pages import page_of
 
-from tvist_controller.calibrations import load as load_calibration
+from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_lab.figures import robustness_figure
 from tvist_lab.studies.robustness import ERRORS, PLANT, columns, jobs, report
 from tvist_lab.study.arms import PERTURBED, stiffer

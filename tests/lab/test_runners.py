@@ -9,7 +9,7 @@ import pytest
 from distributed import Client, LocalCluster
 from tests.lab.runner_work import die, die_once, function_of, square_late, square_or_raise
 
-from tvist_controller.calibrations import load as load_calibration
+from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_lab.runners import Failed, TaskError, in_order, outcomes, processes
 from tvist_lab.study.case import Case
 from tvist_lab.study.engine import made

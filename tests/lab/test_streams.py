@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.calibrations import load as load_calibration
+from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_lab.study.line import PAPER
 from tvist_lab.study.recipes import Recipe, longest_mean_delay
 from tvist_plant.description import load

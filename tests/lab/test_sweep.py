@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 from polars.testing import assert_frame_equal
 
-from tvist_controller import calibrations
+from tvist_controller.sources import calibrations
 from tvist_lab.figures import study_figure
 from tvist_lab.runners import Failed, TaskError, outcomes, processes
 from tvist_lab.studies.sweep.spec import Spec, SpecError, read_spec

@@ -13,8 +13,8 @@ import msgspec
 import numpy as np
 
 from tvist_controller.api.line import DrivenLine, body, load_calibration, paper_payload
-from tvist_controller.experience.motion_record import AFTER, Beliefs, MotionRecord
-from tvist_controller.experience.payload_student import PayloadStudent
+from tvist_controller.safety.motion_record import AFTER, Beliefs, MotionRecord
+from tvist_controller.safety.payload_student import PayloadStudent
 from tvist_lab.study.line import PAPER, RESTING, Unchanged
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe, own_move

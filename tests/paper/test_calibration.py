@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.calibrations import estimator_of, fits, load
+from tvist_controller.sources.calibrations import estimator_of, fits, load
 from tvist_lab.studies.paper.published import published
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.flexible_arm import FlexibleArm

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tvist_controller.calibrations import load as calibration
-from tvist_controller.calibrations.modal import FRICTION, friction_law
+from tvist_controller.sources.calibrations import FRICTION, friction_law
+from tvist_controller.sources.calibrations import load as calibration
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.identification.friction import fit_friction, friction, identify_friction, unknown_friction
 from tvist_lab.identification.identify import IdentificationError

@@ -9,8 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 from tvist_client import make_payload
-from tvist_controller.calibrations import load as calibration
 from tvist_controller.setup import paper_payload
+from tvist_controller.sources.calibrations import load as calibration
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.identification.modal import identify_modal
 from tvist_lab.identification.modal_plan import ModalPlan, jog_of

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from tvist_controller.calibrations import estimator_of
+from tvist_controller.sources.calibrations import estimator_of
 from tvist_lab.identification.fit import FitError, fit_polynomials
 from tvist_lab.identification.identify import MeasurementPlan, identify
 from tvist_lab.in_process import free_setup, robot_in_process

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tvist_controller.calibrations.modal import modal_estimator
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.setup import body, paper_payload
+from tvist_controller.sources.calibrations import modal_estimator
 from tvist_lab.identification import modal_calibration
 from tvist_lab.identification.design import choose, predicted
 from tvist_lab.identification.identify import IdentificationError

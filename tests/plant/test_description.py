@@ -17,7 +17,7 @@ from tvist_plant.description import (
     robots,
 )
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.robot_checks import check_limits
+from tvist_plant.robot_checks import check
 from tvist_plant.user_file import UserFileError
 
 from .arms import chain, hold
@@ -118,8 +118,10 @@ def test_limits_in_degrees_are_refused_with_what_they_are_in_radians(tmp_path, k
     assert "degrees.toml" in str(refused.value)
 
 
-def test_ten_turns_either_way_and_eight_a_second_are_limits_in_radians():
-    check_limits([20.0 * math.pi], [16.0 * math.pi], "here")
+def test_ten_turns_either_way_and_eight_a_second_are_limits_in_radians(ur5e):
+    replace = msgspec.structs.replace
+    most = replace(ur5e.limits, position=(20.0 * math.pi,) * 6, velocity=(16.0 * math.pi,) * 6)
+    check(replace(ur5e, limits=most))
 
 
 def test_a_body_of_points_is_real_and_one_with_a_too_large_moment_is_not():

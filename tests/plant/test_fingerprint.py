@@ -5,8 +5,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from tvist_plant.description import RobotDescription, load
-from tvist_plant.fingerprint import fingerprint
+from tvist_plant.description import RobotDescription, fingerprint, load
 
 UR5E = load("ur5e")
 REPLACE = msgspec.structs.replace

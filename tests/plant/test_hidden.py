@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from tvist_plant.description import Payload, load
-from tvist_plant.hidden import CENTRE, DRIVES, LINKS, MASS, hidden, hidden_payload
 from tvist_plant.robot_checks import is_real_body
+from tvist_plant.variants import CENTRE, DRIVES, LINKS, MASS, hidden, hidden_payload
 
 UR5E = load("ur5e")
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tvist_plant.description import Payload, load
-from tvist_plant.hidden import hidden, hidden_payload
-from tvist_plant.variants import BACKLASH, TORSION, VARIANTS, variant
+from tvist_plant.variants import BACKLASH, TORSION, VARIANTS, hidden, hidden_payload, variant
 
 from .arms import chain, hold
 

@@ -8,8 +8,8 @@ import msgspec
 import pytest
 from tests.controller.robots import Q1, Q3, UR5E, calibration, cut, setup
 
-from tvist_controller import calibrations
 from tvist_controller.setup import Setup, paper_payload
+from tvist_controller.sources import calibrations
 from tvist_plant.user_file import UserFileError
 from tvist_protocol.calibration import calibration_to_json
 from tvist_server.config import ConfigError, ServeConfig

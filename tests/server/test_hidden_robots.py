@@ -11,13 +11,14 @@ from tests.controller.robots import Q2, UR5E, setup
 from tvist_controller.about import info_of
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.setup import Setup, body
-from tvist_controller.sources.own_plants import OwnPlantError, load_plant
+from tvist_controller.sources.own_files import OwnFileError
+from tvist_controller.sources.own_plants import load_plant
 from tvist_lab.in_process import free_setup
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_plant.description import load
-from tvist_plant.hidden import hidden, hidden_payload
 from tvist_plant.plant import Plant
+from tvist_plant.variants import hidden, hidden_payload
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ConfigError, ServeConfig
@@ -104,5 +105,5 @@ def test_a_plant_by_name_draws_by_the_robots_seed_and_is_found_again_by_a_replay
 
 def test_an_arm_that_cannot_be_what_the_name_says_is_refused():
     one_joint = load("one-joint")
-    with pytest.raises(OwnPlantError, match="plant torsion: torsion is 20000 N m/rad, but no link"):
+    with pytest.raises(OwnFileError, match="plant torsion: torsion is 20000 N m/rad, but no link"):
         load_plant("torsion").make(one_joint, one_joint.payload)

@@ -11,9 +11,9 @@ from tests.own_arm import OwnArm
 from tvist_controller.about import info_of
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.setup import Setup, body
+from tvist_controller.sources.own_files import OwnFileError
 from tvist_controller.sources.own_plants import (
     OwnPlant,
-    OwnPlantError,
     RecordedPlant,
     load_plant,
     named_plants,
@@ -65,7 +65,7 @@ def test_an_installed_one_is_found_by_its_name():
     assert {"mujoco", "combined"} <= set(named_plants())
     made = load_plant("mujoco").make(UR5E, body(setup().payload))
     assert type(made).__name__ == MujocoArm.__name__
-    with pytest.raises(OwnPlantError, match=r"must be FILE\.py:NAME, or one of calibrated, .*mujoco"):
+    with pytest.raises(OwnFileError, match=r"must be FILE\.py:NAME, or one of calibrated, .*mujoco"):
         load_plant("nobody")
 
 
@@ -79,7 +79,7 @@ def test_an_installed_one_is_found_by_its_name():
 )
 def test_one_that_cannot_be_made_says_why(place, name, said):
     plant = load_plant(place.replace("Echo", name))
-    with pytest.raises(OwnPlantError, match=said):
+    with pytest.raises(OwnFileError, match=said):
         plant.make(UR5E, UR5E.payload)
 
 
@@ -102,7 +102,7 @@ def test_a_configuration_names_it_and_a_worker_finds_it_again(place):
     file.write_text(ECHO + "\n")
     other = pickle.dumps(load_plant(place))
     file.write_text(ECHO)
-    with pytest.raises(OwnPlantError, match="has changed"):
+    with pytest.raises(OwnFileError, match="has changed"):
         pickle.loads(other)  # noqa: S301  our own
 
 
@@ -144,7 +144,7 @@ def test_a_replay_of_a_real_arm_says_why_there_is_none(tmp_path, place):
     content = recorded(tmp_path, OwnPlant(at, "", load_plant(place).maker))
     with pytest.raises(ReplayError, match="it cannot be replayed"):
         replay_file(content)
-    with pytest.raises(OwnPlantError, match="only tvist serve takes"):
+    with pytest.raises(OwnFileError, match="only tvist serve takes"):
         load_plant(at)
 
 

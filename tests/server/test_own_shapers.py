@@ -10,8 +10,8 @@ from tests.controller.robots import PAPER, Q1, Q2, Q3, H, Robot, calibration, se
 from tvist_controller.about import info_of
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.setup import Setup
-from tvist_controller.sources.own_files import is_file
-from tvist_controller.sources.own_shapers import OwnShaper, OwnShaperError, load_own
+from tvist_controller.sources.own_files import OwnFileError, is_file
+from tvist_controller.sources.own_shapers import OwnShaper, load_own
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
 from tvist_plant.user_file import UserFileError
@@ -101,7 +101,7 @@ class TestLoading:
 
     @pytest.mark.parametrize("name", list(WRONG_NAMES))
     def test_a_name_that_is_no_shaper_is_said_with_its_file(self, file, name):
-        with pytest.raises(OwnShaperError, match=r"^shaper ") as error:
+        with pytest.raises(OwnFileError, match=r"^shaper ") as error:
             load_own(f"{file}:{name}")
         assert WRONG_NAMES[name] in str(error.value)
         assert str(file) in str(error.value)
@@ -110,18 +110,18 @@ class TestLoading:
     @pytest.mark.parametrize("content", list(WRONG_FILES))
     def test_a_file_that_does_not_run_is_said_with_the_line(self, file, content):
         file.write_text(content)
-        with pytest.raises(OwnShaperError) as error:
+        with pytest.raises(OwnFileError) as error:
             load_own(f"{file}:mine")
         assert WRONG_FILES[content] in str(error.value)
         assert "\n" not in str(error.value)
 
     def test_a_file_that_is_none(self, tmp_path):
-        with pytest.raises(OwnShaperError, match=r"no\.py cannot be read: No such file"):
+        with pytest.raises(OwnFileError, match=r"no\.py cannot be read: No such file"):
             load_own(f"{tmp_path}/no.py:mine")
         (tmp_path / "folder.py").mkdir()
         with pytest.raises(UserFileError, match="is a directory"):
             load_own(f"{tmp_path}/folder.py:mine")
-        with pytest.raises(OwnShaperError, match=r"must be FILE\.py:NAME"):
+        with pytest.raises(OwnFileError, match=r"must be FILE\.py:NAME"):
             load_own("zv")
 
     @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ class TestLoading:
         file.write_text(MINE + "# another\n")
         other = pickle.dumps(load_own(f"{file}:thirds"))
         file.write_text(MINE)
-        with pytest.raises(OwnShaperError, match="has changed"):
+        with pytest.raises(OwnFileError, match="has changed"):
             pickle.loads(other)  # noqa: S301  likewise
 
 

@@ -6,13 +6,12 @@ from tests.controller.robots import UR5E, setup
 
 from tvist_client.blocking import Robot
 from tvist_client.transports.loopback import LoopbackTransport
-from tvist_controller.authority.session import Lease
-from tvist_controller.authority.stepping import ClockHold
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit
+from tvist_controller.dispatch.rights import Lease
 from tvist_controller.host import Host
+from tvist_controller.instruments.sink import Sink
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.reporting.sink import Sink
 from tvist_lab.in_process import free_setup
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
@@ -24,7 +23,7 @@ from tvist_server.jobs import Jobs
 from tvist_server.reception import Reception
 
 LEASE = Lease("anna", "anna#1", 30.0, None)
-HOLD = ClockHold("bert", "bert#clock1", None)
+HOLD = Lease("bert", "bert#clock1", None)
 Q2 = UR5E.poses["Q2"]
 LONG = tuple(StepSetpoint(sequence=n, q=(3.0,) * 6) for n in range(1000))
 

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from tvist_controller.experience import payload_student
+from tvist_controller.safety import payload_student
 from tvist_plant.description import load
 from tvist_server.studies import Studies
 

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from tvist_controller.calibrations.modal import mass_matrix
+from tvist_controller.sources.calibrations import mass_matrix
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.model import flexible_model

@@ -17,8 +17,7 @@ from tests.lab.two_device_logs import TwoDevices
 
 from tvist_cli.output import out, table
 from tvist_client.blocking import Robot
-from tvist_plant.description import load
-from tvist_plant.fingerprint import fingerprint
+from tvist_plant.description import fingerprint, load
 
 HERE = Path(__file__).parent
 NEAR = "0.1,-3.1,0.1,-1.5,0.1,0.1"

@@ -281,7 +281,7 @@ class TestCalibrationFile:
         from importlib import resources
 
         content = json.loads(
-            (resources.files("tvist_controller.calibrations") / "ur5e_5kg.json").read_text("utf-8")
+            (resources.files("tvist_controller.sources") / "ur5e_5kg.json").read_text("utf-8")
         )
         change(content)
         path = tmp_path / "mine.json"

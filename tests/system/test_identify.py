@@ -7,8 +7,7 @@ import pytest
 from tests.conformance.served import Served
 from tests.system.test_command_line import tvist
 
-from tvist_plant.description import load
-from tvist_plant.fingerprint import fingerprint
+from tvist_plant.description import fingerprint, load
 from tvist_protocol.calibration import calibration_from_json
 
 KEYS = {"configurations", "ring_downs", "error_f_d_percent", "error_zeta_percent"}

@@ -7,8 +7,7 @@ from tests.conformance.served import Served
 from tests.conformance.wire import Wire
 from tests.system.test_command_line import tvist
 
-from tvist_plant.description import load
-from tvist_plant.fingerprint import fingerprint
+from tvist_plant.description import fingerprint, load
 from tvist_protocol.calibration import calibration_from_json
 
 

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
-from tvist_controller import calibrations
 from tvist_controller.setup import Setup
+from tvist_controller.sources import calibrations
 from tvist_controller.sources.own_files import is_file
 from tvist_controller.sources.own_shapers import check_for, load_own
 from tvist_plant.description import RobotDescription
@@ -41,7 +41,7 @@ class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         """Return a setup with the fields of this state that are not None.
 
         Raises:
-            OwnShaperError: The file that `shaper` names contains no such shaper.
+            OwnFileError: The file that `shaper` names contains no such shaper.
             UserFileError: `shaper` names something that is not a text file, or too large.
         """
         if self.shaper is not None:
@@ -63,7 +63,7 @@ def shaped_by(setup: Setup, shaper: str) -> Setup:
         shaper: Name of a shaper, or FILE.py:NAME, which is then loaded.
 
     Raises:
-        OwnShaperError: The file contains no such shaper, or it fails for this arm's modes.
+        OwnFileError: The file contains no such shaper, or it fails for this arm's modes.
         UserFileError: FILE.py is not a text file, or too large.
     """
     if not is_file(shaper):

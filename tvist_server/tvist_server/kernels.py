@@ -1,5 +1,6 @@
 """Compile the kernels of a served robot ahead, several parts of them at once, each in a process of its own."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import numpy as np
 
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.instruments.snapshot import Instruments
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.inverse import InverseKinematics
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.paths.legs import JointWay, Pacing
@@ -20,9 +22,11 @@ from tvist_controller.paths.route import Piece
 from tvist_controller.paths.tool_curves import PER_RADIAN, ToolLine
 from tvist_controller.paths.tracking import Tracker
 from tvist_controller.planning.path_planner import LEAST_WINDOW
-from tvist_controller.setup import Setup
+from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory.spline import SplineCurve
 from tvist_kernels.cache import held, kernels, load_all, unkept
+from tvist_plant.drives import DriveCommand
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import Command, MoveJ, ServoStart, ServoStop, SetShaper, Stop, TakeControl
 from tvist_protocol.kinematics import ForwardKinematics
@@ -37,6 +41,8 @@ MOVE_TICKS = 1000
 """Longest time of a motion that uses kernels [ticks]."""
 LOOK = 0.5
 """Time between two looks at what is on disk [s]."""
+FILTERS = (("elastic", 1), ("auto", 1), ("zv", 1), ("none", 2))
+"""Shapers, each with a number of modes, that together use the kernels of all."""
 STUDIES = {"all_to_drives", "drive", "improved_postures", "mean_delay", "play", "product_taps", "shape_all"}
 """Kernels that no served robot calls."""
 KERNELS = tuple(kernel for kernel in kernels if kernel.name.rpartition(".")[2] not in STUDIES)
@@ -111,9 +117,11 @@ def _said(process: _Process) -> str:
 
 def _line() -> None:
     """The control line and the simulated arm: what a tick needs."""
-    host = LoopbackHost(
-        from_mapping({"clock": "lockstep", "truth": True, "adapt": "payload"}, "configuration").setup()
-    )
+    setup = from_mapping({"clock": "lockstep", "truth": True, "adapt": "payload"}, "configuration").setup()
+    arm, still = FlexibleArm(setup.description, body(setup.payload)), np.zeros(setup.description.joints)
+    arm.reset(DriveCommand(still, still, still))
+    arm.step(DriveCommand(still, still, still))
+    host = LoopbackHost(setup)
 
     def ask(command: Command) -> Reply:
         return decode_reply(host.request("kernels", encode(command)))
@@ -147,16 +155,16 @@ def _line() -> None:
     _ = host.controller.cycle.shaped.joints.published
 
 
-def _postures() -> None:
-    """Compile inverse kinematics, in closed form and by iteration."""
-    for robot in ("ur5e", "one-joint"):
-        InverseKinematics(_setup(robot).description).prepare()
-
-
 def _plans() -> None:
-    """Compile what plans use besides inverse kinematics and lines."""
+    """Filters, inverse kinematics, in closed form and by iteration, and plans along a path."""
     setup = _setup("ur5e")
-    Planner(setup).filters.first()
+    filters = Planner(setup).filters
+    filters.first()
+    for name, modes in FILTERS:
+        filters.choose(name, modes, setup.source(), setup.payload)
+    for description in (setup.description, _setup("one-joint").description):
+        q = np.zeros(description.joints)
+        InverseKinematics(description).solve(*Arm(description).pose(q), q)
     q, tracker = np.zeros(setup.description.joints), Tracker(setup.description, (0.0,) * 6)
     tracker.rates(q, ToolLine(*[tracker.pose(q)] * 2).at(0.0))
     run = [Piece(JointWay(q, q + 0.1).part(0.0, 0.1 * PER_RADIAN), Pacing(1.0, 1.0), None, True, "")]
@@ -171,8 +179,8 @@ def _setup(robot: str) -> Setup:
     return from_mapping({"robot": robot}, "configuration").setup()
 
 
-PARTS: dict[str, Callable[[], None]] = {"postures": _postures, "line": _line, "plans": _plans}
-"""What compiles each part; a part takes about as long as any other and shares few kernels with them."""
+PARTS: dict[str, Callable[[], None]] = {"line": _line, "plans": _plans}
+"""What compiles each part, for as long as the other; the line begins with the arm, and finds its filters on disk."""
 
 
 def _end_with_parent() -> None:
@@ -182,6 +190,7 @@ def _end_with_parent() -> None:
 
 def _main() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    gc.set_threshold(100_000)  # numba makes many objects that stay
     PARTS[sys.argv[1]]()
     if unkept:
         folder, why = next(reversed(unkept.items()))

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from queue import SimpleQueue
 from typing import NamedTuple
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.dispatch.table import COMMANDS
 from tvist_controller.host import Host
 from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command, KeepAlive
 from tvist_protocol.replies import Posture, Refused, Reply, ToolPose
 from tvist_server.gateways.base import Answer

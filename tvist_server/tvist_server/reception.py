@@ -4,9 +4,8 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
-from tvist_controller.authority.presence import Presence
-from tvist_controller.authority.session import NoControlError
 from tvist_controller.dispatch.admission import Admitted, admit, admit_command, admit_setpoint
+from tvist_controller.dispatch.rights import NoControlError, Presence
 from tvist_controller.host import Host
 from tvist_protocol.commands import Command, HandOver, TakeClock, TakeControl
 from tvist_protocol.replies import Refused, Reply

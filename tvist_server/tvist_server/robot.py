@@ -8,10 +8,10 @@ from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.dispatch.planner import Planner
-from tvist_controller.experience.experience import Student, experience_of
 from tvist_controller.host import Host
+from tvist_controller.instruments.sink import Sink
 from tvist_controller.programs.socket_traffic import SocketNews
-from tvist_controller.reporting.sink import Sink
+from tvist_controller.safety.experience import Student, experience_of
 from tvist_controller.setup import Setup
 from tvist_plant.plant import Plant, RealArm
 from tvist_protocol.codec import encode

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-from tvist_controller.experience.experience import Work
+from tvist_controller.safety.experience import Work
 
 
 class Studies:

@@ -57,7 +57,7 @@ def _measured(
     name: str, description: "RobotDescription", known: dict[str, Any], moves: int, vary: float, seed: int
 ) -> list[dict[str, Any]]:
     """Measure an arm as its file describes it, and stiffer and softer; empty if it has too few joints for auto."""
-    from tvist_controller.calibrations import load
+    from tvist_controller.sources.calibrations import load
     from tvist_lab.identification.identify import IdentificationError
     from tvist_lab.studies.arms.measure import ALONE, measure
 

@@ -3,11 +3,6 @@
 The modules behind it may change; a study of moves imports nothing else of this package.
 """
 
-from tvist_controller.calibrations import available as calibrations
-from tvist_controller.calibrations import estimator_of
-from tvist_controller.calibrations import load as load_calibration
-from tvist_controller.calibrations.modal import drivetrain, mass_matrix, modal_estimator
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
 from tvist_controller.foresight.line_copy import resting_after
 from tvist_controller.line.cycle import ControlCycle
@@ -17,9 +12,19 @@ from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import REBOUND, TORQUE_SHARE, acceleration_on_way
 from tvist_controller.line.whole_motion import Driven, DrivenLine, respond
 from tvist_controller.planning.choices import choose_filter, wanted_modes
-from tvist_controller.planning.keeping import keeping_motion
+from tvist_controller.planning.fitting import keeping_motion
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, body, paper_payload
-from tvist_controller.sources.elastic_source import elastic_feed_forward, known_friction
+from tvist_controller.sources.calibrations import available as calibrations
+from tvist_controller.sources.calibrations import (
+    drivetrain,
+    elastic_feed_forward,
+    estimator_of,
+    known_friction,
+    mass_matrix,
+    modal_estimator,
+)
+from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_controller.sources.mode_source import ModeSource
 from tvist_controller.sources.own_shapers import OwnShaper, RecordedShaper
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Trajectory, quickest_motion

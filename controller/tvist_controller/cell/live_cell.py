@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from tvist_controller.cell.description import Cell, Part, Tool, Wire, bit_of
 from tvist_controller.cell.gripper import PORT, Gripper, answer
-from tvist_controller.commands.events import Emit
+from tvist_controller.events import Emit
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.paths.poses import Placement, placement
 from tvist_plant.description import Payload, RobotDescription

@@ -1,1 +1,1 @@
-"""Commands on their way: admitted, planned, and handed to what carries them out."""
+"""Commands on their way: who may send them, their plans, and the parts of a robot that they act on."""

@@ -9,16 +9,18 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from tvist_controller.authority.session import Lease, NoControlError, check_free, check_token, is_holders
-from tvist_controller.authority.stepping import (
-    ClockHold,
-    check_clock_free,
-    check_clock_token,
+from tvist_controller.dispatch.rights import (
+    CLOCK,
+    Lease,
+    NoControlError,
+    check_free,
     check_step,
     check_step_token,
+    check_token,
+    is_holders,
 )
-from tvist_controller.dispatch.setpoints import Unreadable
 from tvist_controller.dispatch.table import COMMANDS
+from tvist_controller.motion.setpoints import Unreadable
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import Envelope, decode_command, decode_envelope, decode_setpoint, refusal
 from tvist_protocol.commands import Command, ReleaseClock, Setpoint, TakeClock, TakeControl
@@ -46,7 +48,7 @@ class Admitted(NamedTuple):
     """IP address of the machine that sent it; None if the network does not tell."""
 
 
-def admit(data: bytes, lease: Lease | None, clock: ClockHold | None = None) -> Admitted | Refused:
+def admit(data: bytes, lease: Lease | None, clock: Lease | None = None) -> Admitted | Refused:
     """Decode a command, and check that its sender may send it.
 
     Of a long command only the type and token are decoded until its sender is known to have control or the clock.
@@ -54,17 +56,14 @@ def admit(data: bytes, lease: Lease | None, clock: ClockHold | None = None) -> A
     try:
         if len(data) > EXPLAINED_BYTES:
             _check_envelope(decode_envelope(data), len(data), lease, clock)
-        command = decode_command(data)
+        return admit_command(decode_command(data), lease, clock)
     except ProtocolError as error:
         return refusal(error)
     except NoControlError as error:
         return error.reply
-    return admit_command(command, lease, clock)
 
 
-def admit_command(
-    command: Command, lease: Lease | None, clock: ClockHold | None = None
-) -> Admitted | Refused:
+def admit_command(command: Command, lease: Lease | None, clock: Lease | None = None) -> Admitted | Refused:
     """Check that the sender of a command may send it."""
     try:
         client = _authorize(command, lease, clock)
@@ -76,7 +75,7 @@ def admit_command(
 def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | None:
     """Decode a set-point; return None if its sender is not known to have control, to spare the controller's thread.
 
-    Whose it is decides the lease at the moment at which it is carried out: see `Setpoints`.
+    Whose it is decides the lease at the moment at which it is carried out.
     """
     if lease is None or len(data) > EXPLAINED_BYTES:
         return None
@@ -84,35 +83,31 @@ def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | 
     try:
         setpoint = decode_setpoint(data)
     except ProtocolError as error:
-        setpoint = Unreadable(_token(data), error.why)
+        token = None
+        with contextlib.suppress(ProtocolError):
+            token = decode_envelope(data).token
+        setpoint = Unreadable(token, error.why)
     return setpoint if is_holders(lease, setpoint.token) else None
 
 
-def _token(data: bytes) -> str | None:
-    """Return the token of a message that cannot be decoded, if one is found."""
-    with contextlib.suppress(ProtocolError):
-        return decode_envelope(data).token
-    return None
-
-
-def _authorize(command: Command, lease: Lease | None, clock: ClockHold | None) -> str | None:
+def _authorize(command: Command, lease: Lease | None, clock: Lease | None) -> str | None:
     """Check that a command's sender may send it; return the sender's name, if the command contains it."""
     match command:
         case TakeControl():
             check_free(lease, command.client)
             return command.client
         case TakeClock():
-            check_clock_free(clock, command.client)
+            check_free(clock, command.client, CLOCK)
             return command.client
         case ReleaseClock():
-            return check_clock_token(clock, command.token).client
+            return check_token(clock, command.token, words=CLOCK).client
         case SimulationStep():
             return check_step(clock, lease, command)
     token = getattr(command, "token", None)
     return None if token is None else check_token(lease, token).client
 
 
-def _check_envelope(envelope: Envelope, size: int, lease: Lease | None, clock: ClockHold | None) -> None:
+def _check_envelope(envelope: Envelope, size: int, lease: Lease | None, clock: Lease | None) -> None:
     if envelope.type not in LONG:
         of = "message" if envelope.type is None else f"{envelope.type:.40}"
         why = f"the {of} has {size} bytes, at most {EXPLAINED_BYTES} are allowed"

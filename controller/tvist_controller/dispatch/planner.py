@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.dispatch.table import COMMANDS
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.move_planner import MovePlanner
@@ -11,6 +10,7 @@ from tvist_controller.planning.plan import Found, Plan
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.snapshot import FilterState, Snapshot
 from tvist_controller.programs.compiling import ScriptCompiler
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup
 from tvist_protocol.commands import Command
 from tvist_protocol.lessons import PayloadLesson

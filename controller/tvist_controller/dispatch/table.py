@@ -1,30 +1,120 @@
-"""The table of commands: the rows of all parts of a robot.
+"""The table of commands.
 
 The rows are known without a robot, since admission and planning need them in other threads.
 """
 
-from abc import ABC, abstractmethod
-from typing import ClassVar, Protocol
+from typing import Any
 
-from tvist_controller.authority.rights import Authority
-from tvist_controller.commands.refusal import check_body, check_joints
-from tvist_controller.dispatch.guided_commands import ForceCommands, GuidedCommands
-from tvist_controller.dispatch.motion_commands import MotionCommands
-from tvist_controller.dispatch.payload_control import PayloadControl
-from tvist_controller.dispatch.program_commands import ProgramCommands
-from tvist_controller.instruments.peripherals import Peripherals
-from tvist_controller.motion.filter_control import Filters
+import numpy as np
+
+from tvist_controller.dispatch import motion_commands, program_commands
+from tvist_controller.dispatch.assumptions import payload_of
+from tvist_controller.dispatch.robot import Robot
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import Planning
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.snapshot import FILTER, TOOL
-from tvist_controller.safety.faults import Faults
+from tvist_controller.refusal import RefusalError, check_body, check_joints
+from tvist_controller.safety.faults import check_fault
+from tvist_controller.setup import body
 from tvist_plant.description import RobotDescription
-from tvist_protocol.commands import Command
+from tvist_plant.plant import SimulatedArm
+from tvist_protocol import commands as c
+from tvist_protocol import io
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
-from tvist_protocol.replies import Reply
-from tvist_protocol.simulation import SimulationReset, SimulationStep
+from tvist_protocol.replies import Accepted, Done, Reply
+from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
+from tvist_protocol.values import PROTOCOL_VERSION
+
+# ---------------------------------------------------------------------- rights
+
+
+def _check_version(command: c.TakeControl | c.TakeClock, _: RobotDescription) -> None:
+    if command.protocol != PROTOCOL_VERSION:
+        why = f"protocol is {command.protocol}; this server speaks {PROTOCOL_VERSION}"
+        raise RefusalError("unsupported_version", "protocol", why, PROTOCOL_VERSION)
+
+
+def _take_control(robot: Robot, call: Call[c.TakeControl]) -> Reply:
+    lease = robot.session.take(call.command.client, call.command.lease_s, call.now, call.session)
+    return Accepted(token=lease.token, lease_s=lease.seconds)
+
+
+_RIGHTS = (
+    Row(c.TakeControl, _take_control, lease="none", check=_check_version),
+    Row(c.KeepAlive, lambda _, __: None),  # every command renews the lease
+    # Who takes control from the new holder gets a token of its own.
+    Row(c.HandOver, lambda robot, call: robot.session.hand_over(call.command.client, call.now, call.session)),
+    Row(c.ReleaseControl, lambda robot, _: robot.session.release()),
+    Row(
+        c.TakeClock,
+        lambda robot, call: Accepted(token=robot.session.take_clock(call.command.client, call.session)),
+        lease="none",
+        check=_check_version,
+    ),
+    Row(c.ReleaseClock, lambda robot, call: robot.session.release_clock(call.command.token), lease="none"),
+)
+
+# ---------------------------------------------------------------------- filter, payload, terminals
+
+
+def _check_payload(command: c.SetPayload, description: RobotDescription) -> None:
+    check_body(payload_of(command), rated=description.limits.payload)
+
+
+def _filter(make: Any) -> Planning:
+    """A plan by the planner of filters, from the command and the state of the present filter."""
+    return Planning(FILTER, FilterPlanner, lambda planner, command, now: make(planner, command, now.filter))
+
+
+_FILTERS = (
+    Row(
+        c.SetShaper,
+        lambda robot, call: robot.assumed.choose(call.planned()),
+        plan=_filter(
+            lambda planner, command, now: planner.choose(
+                command.name, command.modes, now.source, now.declared, "name"
+            )
+        ),
+    ),
+    Row(
+        c.SetEstimator,
+        lambda robot, call: robot.assumed.estimate(call.planned()),
+        plan=Planning(FILTER, FilterPlanner, FilterPlanner.estimate),
+        long=True,
+    ),
+)
+_SETTINGS = (
+    Row(
+        c.SetPayload,
+        lambda robot, call: robot.assumed.declare(call.command, call.planned()),
+        changes_io=True,
+        check=_check_payload,
+        plan=_filter(lambda planner, command, now: planner.with_payload(payload_of(command), now)),
+    ),
+    Row(
+        c.Forget,
+        lambda robot, call: robot.assumed.forget(call.planned),
+        changes_io=True,
+        plan=_filter(lambda planner, _, now: planner.with_payload(now.given, now)),
+    ),
+    Row(io.SetIo, lambda robot, call: robot.peripherals.set_outputs(call.command), changes_io=True),
+    Row(
+        io.SetRegisters,
+        lambda robot, call: robot.peripherals.write_registers(call.command, call.tick),
+        lease="if named",
+        changes_io=True,
+    ),
+    Row(io.SetTcp, lambda robot, call: robot.peripherals.set_tcp(call.command.offset), changes_io=True),
+    Row(
+        io.SimulationSetInputs,
+        lambda robot, call: robot.peripherals.set_inputs(call.command),
+        changes_io=True,
+    ),
+)
+
+# ---------------------------------------------------------------------- simulation and kinematics
 
 
 def _check_reset(command: SimulationReset, description: RobotDescription) -> None:
@@ -34,50 +124,92 @@ def _check_reset(command: SimulationReset, description: RobotDescription) -> Non
         check_body(command.payload, "payload")
 
 
-class Part(Protocol):
-    """Part of a robot that carries out commands."""
+def _place(robot: Robot, call: Call[SimulationReset]) -> Reply:
+    """Place the simulated arm somewhere at rest."""
+    command, chosen, cycle = call.command, call.planned(), robot.cycle
+    plant, motion, cell = cycle.plant, robot.motion, robot.cell
+    if not isinstance(plant, SimulatedArm):
+        why = f"the plant {type(plant).__name__} cannot be put anywhere: it has no reset"
+        raise RefusalError("unknown_type", "type", why)
+    q = cycle.position if command.q is None else np.array(command.q, dtype=float)
+    carried = None if command.payload is None else body(command.payload)
+    if cell is not None:
+        carried = carried or cell.empty
+    placed = [] if carried is None else [carried]
+    if command.q is not None:
+        placed = [motion.collisions.declared, *(placed or [plant.payload])]
+    blamed = "payload" if command.q is None and command.payload is not None else "q"
+    motion.collisions.check_place(q, placed, blamed)
+    met = plant.obstacle(q, carried)
+    if met is not None:
+        raise RefusalError("collision", blamed, f"{met}: choose a posture in which the arm is clear")
+    robot.programs.end("simulation.reset")
+    motion.abandon("simulation.reset")
+    robot.faults.clear()
+    if chosen is not None:
+        robot.assumed.use(chosen)
+    if command.seed is not None:
+        robot.seed = command.seed
+    cycle.reset(q, carried=carried, seed=robot.seed)
+    if cell is not None and carried is not None:
+        cell.begin(carried)
+    robot.safety.put(command.mode)
+    if command.mode is not None:
+        robot.modes.forget_stops()
+    robot.true_modes = {}
+    robot.modes.update()
+    robot.report = robot.reported(cycle.sample)
+    robot.force_control.begin_anew()
+    motion.past.clear()
+    return Done(tick=robot.tick_number)
 
-    rows: ClassVar[tuple[Row, ...]]
-    """Its commands."""
+
+def _check_step(robot: Robot, call: Call[SimulationStep]) -> Reply:
+    """Check that a client may advance time; the host then does so."""
+    command = call.command
+    robot.session.check_step(command, call.now)
+    if command.setpoints is not None and not robot.motion.streaming:
+        raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
+    setpoints = command.setpoints or ()
+    if len(setpoints) > command.ticks:
+        why = (
+            f"setpoints has {len(setpoints)} entries; it must have one per tick, and ticks is {command.ticks}"
+        )
+        raise RefusalError("out_of_range", "setpoints", why, command.ticks)
+    for number, setpoint in enumerate(setpoints):
+        check_joints(setpoint.q, robot.setup.description, f"setpoints[{number}].q")
+    return Done(tick=robot.tick_number + command.ticks)
 
 
-class WholeRobot(ABC):
-    """Commands that concern all parts of a robot; the controller, which knows these, carries them out."""
-
-    @abstractmethod
-    def place(self, call: Call[SimulationReset]) -> Reply:
-        """Place the simulated arm somewhere at rest."""
-
-    @abstractmethod
-    def check_step(self, call: Call[SimulationStep]) -> Reply:
-        """Check that a client may advance time; the host then does so."""
-
-    rows: ClassVar[tuple[Row, ...]] = (
-        Row(
-            SimulationReset,
-            lambda self, call: self.place(call),
-            check=_check_reset,
-            plan=Planning(FILTER, FilterPlanner, lambda planner, command, now: None if command.shaper is None
-                          else planner.choose(command.shaper, 1, now.filter.source, now.filter.declared)),
+_SIMULATION = (
+    Row(
+        SimulationReset,
+        _place,
+        check=_check_reset,
+        plan=_filter(
+            lambda planner, command, now: None if command.shaper is None
+            else planner.choose(command.shaper, 1, now.source, now.declared)
         ),
-        Row(SimulationStep, lambda self, call: self.check_step(call), lease="none", long=True),
-        Row(InverseKinematics, lambda _, call: call.planned(), lease="none",
-            plan=Planning(TOOL, Reachable, Reachable.posture)),
-        Row(ForwardKinematics, lambda _, call: call.planned(), lease="none",
-            plan=Planning(TOOL, Reachable, Reachable.pose)),
-    )  # fmt: skip
-
-
-_PARTS: tuple[type[Part], ...] = (
-    Authority, MotionCommands, GuidedCommands, ForceCommands, Filters, PayloadControl, Peripherals, Faults,
-    ProgramCommands, WholeRobot,
+    ),
+    Row(SimulationStep, _check_step, lease="none", long=True),
+    Row(
+        SimulationInject,
+        lambda robot, call: robot.faults.inject(call.command, call.tick),
+        check=check_fault,
+    ),
 )  # fmt: skip
-COMMANDS: dict[type[Command], Row] = {row.message: row for part in _PARTS for row in part.rows}
-"""The row of each command."""
-HARMLESS: frozenset[type[Command]] = frozenset(
-    row.message
-    for part in (Authority, Filters, WholeRobot)
-    for row in part.rows
-    if part is not WholeRobot or row.asks
+_QUESTIONS = tuple(
+    Row(kind, lambda _, call: call.planned(), lease="none", plan=Planning(TOOL, Reachable, make))
+    for kind, make in ((InverseKinematics, Reachable.posture), (ForwardKinematics, Reachable.pose))
 )
+
+COMMANDS: dict[type[c.Command], Row] = {
+    row.message: row
+    for row in (
+        *_RIGHTS, *motion_commands.ROWS, *_FILTERS, *_SETTINGS, *program_commands.ROWS,
+        *_SIMULATION, *_QUESTIONS,
+    )
+}  # fmt: skip
+"""The row of each command."""
+HARMLESS: frozenset[type[c.Command]] = frozenset(row.message for row in (*_RIGHTS, *_FILTERS, *_QUESTIONS))
 """Commands that do not concern the arm, so that a robot that is only watched takes them."""

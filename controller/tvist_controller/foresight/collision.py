@@ -7,7 +7,6 @@ from itertools import combinations
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.clearance import (
     ARMS,
     BODY,
@@ -21,6 +20,7 @@ from tvist_controller.foresight.clearance import (
     stop_has_room,
 )
 from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory import Way
 from tvist_plant.chain import AXES, chain_of
 from tvist_plant.description import Payload, RobotDescription

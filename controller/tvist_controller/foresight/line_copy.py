@@ -14,7 +14,7 @@ MAX_AHEAD = 4000
 """Largest number of ticks that a motion is simulated ahead to find its end."""
 
 
-class Ahead:
+class LineSimulation:
     """A control line without its arm, simulated ahead of time; what it is made of is consumed.
 
     A stop has no filter, since it bypasses that.

@@ -4,38 +4,38 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_controller.foresight.line_copy import resting_after
-from tvist_controller.foresight.stop_guard import LookAhead
-from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.foresight.stop_guard import StreamGuard
+from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.limits import StreamTorqueRoom
+from tvist_controller.line.limits import TorqueRoom
+from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory import JointStop, PlannedMotion, Way
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
 
-class WayAhead:
+class RemainingMotion:
     """Examines the future motion of the control line."""
 
-    def __init__(self, cycle: ControlCycle, outlook: Outlook, collisions: CollisionModel) -> None:
+    def __init__(self, cycle: ControlCycle, outlook: Stopper, collisions: CollisionModel) -> None:
         self._cycle, self._collisions = cycle, collisions
         self._outlook = outlook
-        room = StreamTorqueRoom(cycle.description, cycle.dynamics)
-        self._guard = LookAhead(collisions, outlook.stops, room)
+        room = TorqueRoom(cycle.description, cycle.dynamics)
+        self._guard = StreamGuard(collisions, outlook.stops, room)
         reach = np.array(cycle.description.limits.position)
-        self._guide_guard = LookAhead(collisions, outlook.stops, room, reach=reach)
+        self._guide_guard = StreamGuard(collisions, outlook.stops, room, reach=reach)
 
-    def guard_of_stream(self) -> LookAhead:
+    def guard_of_stream(self) -> StreamGuard:
         """Return the guard of a stream that begins from rest."""
         self._guard.begin(self._cycle.newest)
         return self._guard
 
-    def guard_of_guided(self) -> LookAhead:
+    def guard_of_guided(self) -> StreamGuard:
         """Return the guard of a guided motion from the present state of motion, whatever that is.
 
         Raises:

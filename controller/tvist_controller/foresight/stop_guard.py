@@ -6,7 +6,7 @@ from tvist_controller.foresight.collision import CollisionModel, Meeting
 from tvist_controller.foresight.stops import StopPlanner
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.guard import Guard, Obstacle
-from tvist_controller.line.limits import GENTLEST_STOP, StreamTorqueRoom
+from tvist_controller.line.limits import GENTLEST_STOP, TorqueRoom
 from tvist_controller.trajectory import JointStop, Way
 
 MARGIN = 0.8
@@ -15,7 +15,7 @@ acceleration changes on the way [-].
 """
 
 
-class LookAhead(Guard):
+class StreamGuard(Guard):
     """Checks the stop from the state of motion that a reference would lead to.
 
     As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the
@@ -30,7 +30,7 @@ class LookAhead(Guard):
         self,
         collisions: CollisionModel,
         stops: StopPlanner,
-        room: StreamTorqueRoom,
+        room: TorqueRoom,
         *,
         reach: Floats | None = None,  # shape (n,) [rad]
     ) -> None:
@@ -38,14 +38,13 @@ class LookAhead(Guard):
         self._collisions, self._stops, self._torque = collisions, stops, room
         self._before: tuple[Target, float | JointStop] | None = None
         self.met: Meeting | None = None
-        """Meeting that the latest refused reference would have led to."""
-        self._outside: str | None = None
-        self._stuck: str | None = None
+        """Meeting on the way of the latest stop that is not clear; None if it leaves the joints' range."""
+        self.obstacle = Obstacle("", "collision")
+        """Why the latest reference was refused."""
 
     def begin(self, state: Target) -> None:
         """Start from rest."""
-        self._before = state, GENTLEST_STOP
-        self.met = self._outside = self._stuck = None
+        self._before, self.met = (state, GENTLEST_STOP), None
 
     def __call__(self, state: Target) -> JointStop | None:
         """Decide whether a reference that leads to this state may be played; see `Guard`."""
@@ -67,38 +66,28 @@ class LookAhead(Guard):
 
     def give_up(self, why: str) -> JointStop:
         """Return the stop as in `fallback`, since no reference follows for this reason."""
-        self._stuck = why
+        self.obstacle = Obstacle(why, "singular")
         return self.fallback()
-
-    @property
-    def obstacle(self) -> Obstacle:
-        """Why the latest reference was refused."""
-        if self._stuck is not None:
-            return Obstacle(self._stuck, "singular")
-        if self._outside is not None:
-            return Obstacle(self._outside, "limit_position")
-        return Obstacle(str(self.met), "collision")
 
     def clear(self, stop: JointStop) -> bool:
         """Return whether the whole way of a stop is clear."""
         q, qd, qdd = stop.at(0.0)
         turned = self.turned(qd, qdd, stop.acceleration)
-        self._outside = None if self._is_inside(q, turned) else self._beyond(stop)
-        if self._outside is not None:
+        if not self._is_inside(q, turned) and (beyond := self._beyond(stop)) is not None:
+            self.obstacle = Obstacle(beyond, "limit_position")
             return False
         if self._collisions.is_spacious(q, turned):
             return True
-        self.met = self.meeting(stop)
-        return self.met is None
-
-    def meeting(self, stop: JointStop) -> Meeting | None:
-        """Return the first pair of bodies that meets on the way of a stop."""
-        _, qd, qdd = stop.at(0.0)
-        turned = _fastest(qd, qdd, stop.jerk) * stop.duration
         before = None if self._before is None else self._before[0].q
-        way = Way(lambda share: stop.at(share * stop.duration)[0], turned)
+        way = Way(
+            lambda share: stop.at(share * stop.duration)[0], _fastest(qd, qdd, stop.jerk) * stop.duration
+        )
         found = self._collisions.on_way(way, before=before)
-        return None if found is None else found[1]
+        if found is None:
+            return True
+        self.met = found[1]
+        self.obstacle = Obstacle(str(self.met), "collision")
+        return False
 
     def _permitted(self, state: Target) -> float | JointStop | None:
         """Return a clear stop, or the acceleration of one that is made when it is needed; None if there is none."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tvist_controller.foresight.line_copy import MAX_AHEAD, Ahead
+from tvist_controller.foresight.line_copy import MAX_AHEAD, LineSimulation
 from tvist_controller.foresight.stops import StopPlan, StopPlanner
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
@@ -25,7 +25,7 @@ def _anywhere(_: JointStop) -> bool:
     return True
 
 
-class Outlook:
+class Stopper:
     """Looks ahead on a control line, and stops it."""
 
     def __init__(self, cycle: ControlCycle) -> None:
@@ -41,7 +41,7 @@ class Outlook:
         The result is None if that takes more than `MAX_AHEAD` ticks, or the trajectory cannot go on. Stops
         bypass every filter.
         """
-        ahead = Ahead(*self._cycle.fork(tvist, trajectory))
+        ahead = LineSimulation(*self._cycle.fork(tvist, trajectory))
         with suppress(StuckError):
             ahead.until(MAX_AHEAD)
         return np.array(ahead.references) if ahead.rests else None
@@ -97,7 +97,7 @@ class Outlook:
         lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
         ahead = None
         if stop is None:
-            ahead = Ahead(*cycle.fork())
+            ahead = LineSimulation(*cycle.fork())
             # A motion that cannot turn back has to be simulated only for as long as a stop lasts.
             ahead.until(MAX_AHEAD if forecast.turns else 0)
             stop = self.stops.under(ahead, state, forecast, deceleration)

@@ -4,10 +4,11 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
+from tvist_controller.foresight.line_copy import LineSimulation
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import GENTLEST_STOP, StopTorque, torque_along
@@ -30,24 +31,6 @@ COUNTED = 0.9
 """Share of its present velocity that a motion is assumed to keep until it brakes [-]."""
 ROUNDING = 1e-12
 """Differences between positions below this are rounding errors [rad]."""
-
-
-class References(Protocol):
-    """Future references of a motion."""
-
-    samples: list[Floats]
-    """The path's parameter at the last two shaped references played and at the known future ones, one for each tick,
-    each of shape (m,) [rad].
-    """
-    rests: bool
-    """Whether the references are known until they come to rest."""
-
-    def until(self, ticks: int) -> None:
-        """Ensure that this many future references are known, or all of them until they come to rest."""
-
-    @property
-    def last(self) -> int:
-        """Index of the last reference that moved, if they come to rest; 0 if none moved."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +97,7 @@ class StopPlanner:
 
     def under(
         self,
-        ahead: References,  # simulated for as long as a stop lasts; until rest if the motion may turn back
+        ahead: LineSimulation,  # simulated for as long as a stop lasts; until rest if the motion may turn back
         state: Target,  # for this and the next two see `on_path`
         forecast: Forecast,
         wanted: float | None,
@@ -141,7 +124,12 @@ class StopPlanner:
         return self._quickest_on_path(state, newest, forecast, wanted, permitted, asked)
 
     def slowed(
-        self, ahead: References, state: Target, forecast: Forecast, wanted: float | None, asked: Floats | None
+        self,
+        ahead: LineSimulation,
+        state: Target,
+        forecast: Forecast,
+        wanted: float | None,
+        asked: Floats | None,
     ) -> SlowedStop | None:
         """Return the quickest stop that plays a motion more and more slowly, see `SlowedStop`; arguments as of `under`.
 

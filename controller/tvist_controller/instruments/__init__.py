@@ -1,1 +1,1 @@
-"""Values that UR's interfaces report beyond the robot's state, computed plausibly from it, without clock or I/O."""
+"""What is measured and reported: states, terminals, and the values of UR's interfaces, without clock or I/O."""

@@ -1,10 +1,9 @@
 """Terminals, registers and tool centre point of a robot: set by commands, and published as `Io`."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, get_args
+from typing import Any, get_args
 
-from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.planning.command_row import Call, Row
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.io import (
     BITS,
     NUMBERS,
@@ -14,7 +13,6 @@ from tvist_protocol.io import (
     Registers,
     SetIo,
     SetRegisters,
-    SetTcp,
     SimulationSetInputs,
 )
 from tvist_protocol.values import Payload
@@ -42,12 +40,9 @@ def analog_share(value: float, *, voltage: bool) -> float:
 
 
 class Peripherals:
-    """Everything connected to the control box except the arm. Initially everything is off or zero.
+    """Everything connected to the control box except the arm. Initially everything is off or zero."""
 
-    The tool centre point is passed on to `on_tcp` when it is set.
-    """
-
-    def __init__(self, *on_tcp: Callable[[tuple[float, ...]], None]) -> None:
+    def __init__(self, on_tcp: Callable[[tuple[float, ...]], None]) -> None:
         self._on_tcp = on_tcp
         self.digital_inputs = self.digital_outputs = 0
         """Digital terminals: bits 0–7 standard, 8–15 configurable, 16–17 tool."""
@@ -104,8 +99,7 @@ class Peripherals:
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self.tcp_offset, self.changed = offset, True
-        for tell in self._on_tcp:
-            tell(offset)
+        self._on_tcp(offset)
 
     # ------------------------------------------------------------------ for programs
 
@@ -175,9 +169,8 @@ class Peripherals:
 
     # ------------------------------------------------------------------ for clients
 
-    def _set_registers(self, call: Call[SetRegisters]) -> None:
-        """Write registers; input registers may be written without control."""
-        command = call.command
+    def write_registers(self, command: SetRegisters, tick: int) -> None:
+        """Write registers for a client; input registers may be written without control."""
         runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
         for bank in (run.bank for run in runs if command.token is None and run.bank.startswith("output")):
             why = f"token is missing: {bank} registers belong to the robot, and writing them needs control"
@@ -185,7 +178,7 @@ class Peripherals:
         self.set_registers(command)
         for run in runs:
             for place in range(run.first, run.first + len(run.values)):
-                self._written[run.bank, place] = call.tick
+                self._written[run.bank, place] = tick
 
     def set_registers(self, command: SetRegisters) -> None:
         """Write registers: all of them, or none."""
@@ -256,13 +249,6 @@ class Peripherals:
 
     def _analog_output(self, number: int) -> float:
         return analog_value(self.analog_shares[number], voltage=self.output_is_voltage(number))
-
-    rows: ClassVar[tuple[Row, ...]] = (
-        Row(SetIo, lambda self, call: self.set_outputs(call.command), changes_io=True),
-        Row(SetRegisters, _set_registers, lease="if named", changes_io=True),
-        Row(SetTcp, lambda self, call: self.set_tcp(call.command.offset), changes_io=True),
-        Row(SimulationSetInputs, lambda self, call: self.set_inputs(call.command), changes_io=True),
-    )
 
 
 def _check(k: int, value: Register, bank: Bank) -> None:

@@ -6,17 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tvist_controller.instruments.joint_lists import (
+from tvist_controller.instruments.motors import JointRating, Meters
+from tvist_controller.instruments.rigid_body import RigidBody
+from tvist_controller.instruments.wrench import (
     ACTUAL_Q,
     ACTUAL_QD,
+    RUNNING,
     SHAPED,
     UNSHAPED,
+    ToolWrench,
     as_rows,
     joint_lists,
 )
-from tvist_controller.instruments.motors import JointRating, Meters
-from tvist_controller.instruments.rigid_body import RigidBody
-from tvist_controller.instruments.wrench import RUNNING, ToolWrench
 from tvist_plant.model import Floats
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode

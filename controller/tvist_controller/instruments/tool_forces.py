@@ -4,11 +4,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tvist_controller.instruments.force_sensor import at_tool, without_weight
-from tvist_controller.instruments.joint_lists import ACTUAL_Q, ROWS, SHAPED
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.rigid_body import RigidBody
-from tvist_controller.instruments.wrench import ToolWrench, since_zeroed
+from tvist_controller.instruments.wrench import (
+    ACTUAL_Q,
+    ROWS,
+    SHAPED,
+    ToolWrench,
+    at_tool,
+    since_zeroed,
+    without_weight,
+)
 from tvist_controller.line.line_tick import QDD, TORQUE, Q
 from tvist_controller.line.sample import Sample
 from tvist_plant.description import RobotDescription

@@ -7,12 +7,18 @@ from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
-from tvist_controller.instruments.force_sensor import at_tool, without_weight
-from tvist_controller.instruments.joint_lists import ACTUAL_Q, ACTUAL_QD, SHAPED, UNSHAPED
 from tvist_controller.instruments.motors import BUS_VOLTAGE
 from tvist_controller.instruments.reading import Reading
 from tvist_controller.instruments.rigid_body import add, carried, cross
-from tvist_controller.instruments.wrench import since_zeroed
+from tvist_controller.instruments.wrench import (
+    ACTUAL_Q,
+    ACTUAL_QD,
+    SHAPED,
+    UNSHAPED,
+    at_tool,
+    since_zeroed,
+    without_weight,
+)
 from tvist_plant.plant import GRAVITY
 from tvist_protocol.io import BITS, NUMBERS
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode

@@ -1,27 +1,52 @@
-"""The wrench at the tool: the external force and torque, estimated from the drives' torques."""
+"""The wrench at the tool, by a force sensor in the flange or estimated from the drives' torques."""
 
 from collections.abc import Sequence
+from struct import pack
 
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.instruments.joint_lists import (
-    ACTUAL_MOMENT,
-    ACTUAL_Q,
-    ROWS,
-    SHAPED_MOMENT,
-    SHAPED_QD,
-    SHAPED_QDD,
-    as_rows,
-    joint_lists,
-)
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.least_squares import solve_in_place
 from tvist_controller.kinematics.pose import locate
+from tvist_kernels.compiling import inlined
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
+from tvist_plant.plant import GRAVITY
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State
+from tvist_protocol.values import Payload
+
+JOINT_LISTS = (
+    "target_q", "target_qd", "target_qdd", "shaped_q", "shaped_qd", "shaped_qdd", "shaped_moment", "actual_q",
+    "actual_qd", "actual_moment",
+)  # fmt: skip
+"""Rows by the names of RTDE's variables: the reference before shaping, the one after it with the torques that it needs,
+and what is measured."""
+ROWS = len(JOINT_LISTS)
+UNSHAPED, SHAPED = slice(0, 3), slice(3, 6)
+"""Rows of the two references: positions, velocities and accelerations."""
+SHAPED_QD, SHAPED_QDD, SHAPED_MOMENT, ACTUAL_Q, ACTUAL_QD, ACTUAL_MOMENT = range(4, ROWS)
+"""Single rows."""
+
+
+def joint_lists(state: State) -> bytearray:
+    """Return the rows one behind the other, as doubles in the machine's order."""
+    q, qd, qdd = state.target_q, state.target_qd, state.target_qdd
+    unshaped = (
+        *(q if state.unshaped_q is None else state.unshaped_q),
+        *(qd if state.unshaped_qd is None else state.unshaped_qd),
+        *(qdd if state.unshaped_qdd is None else state.unshaped_qdd),
+    )
+    shaped = *q, *qd, *qdd, *state.target_moment
+    measured = *state.actual_q, *state.actual_qd, *state.actual_moment
+    return bytearray(pack(f"{ROWS * len(q)}d", *unshaped, *shaped, *measured))
+
+
+def as_rows(lists: bytearray) -> Floats:
+    """Return what `joint_lists` has made as an array, shape (10, n)."""
+    return np.ndarray((ROWS, len(lists) // (8 * ROWS)), buffer=lists)
+
 
 NEAR_SINGULAR = 0.01
 """Manipulability √det(J Jᵀ) below which forces are damped; a UR5e reaches 0.11 [m³ with six joints]."""
@@ -47,7 +72,7 @@ def product(A: Floats, B: Floats) -> Floats:
     return found
 
 
-@compiled_for_ticks
+@inlined
 def force_at(chain: Floats, q: Floats, torque: Floats, force: Floats) -> None:
     """Compute force and torque [N, N m], shape (6,), at a chain's end that cause torques on the joints, shape (n,).
 
@@ -136,3 +161,30 @@ class ToolWrench:
         if state.robot_mode != RUNNING:
             return np.zeros(6 + len(state.actual_q))
         return self.estimate(as_rows(joint_lists(state)), offset)
+
+
+def without_weight(raw: Floats, rotation: Floats, payload: Payload) -> Floats:
+    """Return what a sensor feels beside the weight of the payload, in its own frame, shape (6,) [N, N m].
+
+    As on UR's e-Series, only the weight is taken away, not what it takes to accelerate the payload.
+
+    Args:
+        raw: Force and torque about the flange's origin in its frame, shape (6,) [N, N m].
+        rotation: Rotation from the flange to the base frame, shape (3, 3).
+        payload: Declared payload.
+    """
+    weight = -payload.mass * GRAVITY * rotation[2]
+    felt: Floats = raw - np.concatenate((weight, np.cross(payload.com, weight)))
+    return felt
+
+
+def at_tool(felt: Floats, rotation: Floats, offset: Sequence[float]) -> Floats:
+    """Return a wrench at the tool centre point in the base frame, shape (6,) [N, N m].
+
+    Args:
+        felt: Force and torque about the flange's origin in its frame, shape (6,) [N, N m].
+        rotation: Rotation from the flange to the base frame, shape (3, 3).
+        offset: Tool centre point in the flange frame [m, rad].
+    """
+    force = felt[:3]
+    return np.concatenate((rotation @ force, rotation @ (felt[3:] - np.cross(offset[:3], force))))

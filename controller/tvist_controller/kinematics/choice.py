@@ -6,9 +6,10 @@ import numpy as np
 
 from tvist_controller._compiled import compiled
 from tvist_controller.kinematics.geometry import representation
-from tvist_controller.kinematics.least_squares import ACCURACY, AIM, approach, descend
+from tvist_controller.kinematics.least_squares import ACCURACY, AIM, approach, descend, put
 from tvist_controller.kinematics.pose import locate, pose_error
 from tvist_controller.kinematics.postures import DEFINITE, FREE, postures
+from tvist_kernels.compiling import inlined
 from tvist_plant.model import Floats
 
 FOUND, NO_SOLUTION, OUT_OF_RANGE = 0, 1, 2
@@ -36,7 +37,7 @@ def represent(arm: Floats, near: Floats, q: Floats) -> tuple[float, bool]:
     return square, inside
 
 
-@compiled
+@inlined
 def all_postures(
     arm: Floats,  # see `arm_table`, shape (7, 5)
     chain: Floats,  # the links to the flange, see `tvist_plant.chain`, shape (7, 22)
@@ -52,13 +53,14 @@ def all_postures(
     return freedom
 
 
-@compiled
+@inlined
 def _sample_curves(
     arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats
 ) -> None:
     """Compute the postures at many values of the free angle, and move the nearest of each kind along its curve."""
-    sample, least = np.empty((8, 6)), np.full(8, math.inf)
-    table[:8, 0] = math.nan
+    sample, least = np.empty((8, 6)), np.empty(8)
+    for row in range(8):
+        table[row, 0], least[row] = math.nan, math.inf
     for number in range(SAMPLES):
         postures(arm, rotation, position, 2.0 * math.pi * number / SAMPLES, sample)
         for row in range(8):
@@ -68,7 +70,7 @@ def _sample_curves(
             square += 0.0 if inside else OUTSIDE
             if square < least[row]:
                 least[row] = square
-                table[row] = sample[row]
+                put(sample[row], table[row])
     for row in range(8):
         if math.isnan(table[row, 0]):
             continue
@@ -77,7 +79,7 @@ def _sample_curves(
             _, inside = represent(arm, near, posture)
             # The way from a posture within the ranges to the nearest one may lead out of them.
             if inside or least[row] >= OUTSIDE:
-                table[row] = posture
+                put(posture, table[row])
 
 
 @compiled
@@ -97,7 +99,7 @@ def improved_postures(
             table[row, 0] = math.nan
 
 
-@compiled
+@inlined
 def _start_from_near(
     chain: Floats, rotation: Floats, position: Floats, near: Floats, on_curve: bool, row: Floats
 ) -> None:
@@ -106,7 +108,7 @@ def _start_from_near(
     if descend(chain, rotation, position, near, 0.0, 30, posture) <= ACCURACY:
         if on_curve:
             approach(chain, rotation, position, near, posture)
-        row[:] = posture
+        put(posture, row)
 
 
 @compiled
@@ -139,11 +141,11 @@ def closest(arm: Floats, chain: Floats, rotation: Floats, position: Floats, near
                     best, least = row, squares[row]
             if best < 0:
                 break
-            q[:] = table[best]
+            put(table[best], q)
             locate(chain, q, now, place, J)
             far, angle = pose_error(rotation, position, now, place, error)
             # Written so that a number that is none does not pass.
-            if max(far, angle) <= AIM or descend(chain, rotation, position, q, 0.0, 5, q) <= ACCURACY:
+            if max(far, angle) <= AIM or descend(chain, rotation, position, near, 0.0, 5, q) <= ACCURACY:
                 return (OUT_OF_RANGE if wrong else FOUND) + curve
             squares[best] = math.inf
     return NO_SOLUTION + curve
@@ -168,13 +170,13 @@ def search(
     best, least = -1, math.inf
     for start in range(len(starts) + 1):
         first, second = found[2 * start], found[2 * start + 1]
-        first[:] = near if start == 0 else starts[start - 1]
+        put(near if start == 0 else starts[start - 1], first)
         second[0] = math.nan
         if not descend(chain, rotation, position, near, 0.0, 100, first) <= ACCURACY:
             first[0] = math.nan
             continue
         represent(arm, near, first)
-        second[:] = first
+        put(first, second)
         if not approach(chain, rotation, position, near, second) <= ACCURACY:
             second[0] = math.nan
         for row in range(2 * start, 2 * start + 2):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from tvist_controller._compiled import compiled
+from tvist_kernels.compiling import inlined
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 
@@ -61,7 +61,7 @@ def _form(dh: Floats) -> float:
     return ANY
 
 
-@compiled
+@inlined
 def representation(angle: float, near: float, limit: float) -> float:
     """Add the whole turns to an angle that bring it nearest to `near` within ± limit.
 

@@ -1,9 +1,8 @@
 """Inverse kinematics: joint positions from a pose of the flange."""
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numba import float64, types
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.choice import (
@@ -56,9 +55,6 @@ class InverseKinematics:
 
     UR arms, and arms with a spherical wrist, are solved in closed form (`postures`), others by damped least squares
     from 64 starts, which are the same for every call. There, a posture that no start leads to is missed.
-
-    `prepare` compiles what `solve` uses, or loads it from numba's cache; else
-    the first call does so.
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -67,15 +63,9 @@ class InverseKinematics:
         self._limits = self._arm[:-1, 4]
         self._closed = bool(self._arm[-1, 0] != ANY)
         span = np.minimum(self._limits, np.pi)
-        self._prepared = False
         self.searched = not self._closed
         """Whether the last call of `solve` had to search a curve of postures, or without a closed form."""
         self._starts = np.random.default_rng(1).uniform(-span, span, (STARTS, description.joints))
-
-    def prepare(self) -> None:
-        """Compile what `solve` uses; this takes half a minute once, and then half a second in each process."""
-        _compile(*(CLOSED_FORM if self._closed else NUMERICAL))
-        self._prepared = True
 
     def solve(self, rotation: Floats, position: Floats, near: Floats) -> Floats:
         """Return the posture nearest to another one, of all that have a pose of the flange.
@@ -87,10 +77,9 @@ class InverseKinematics:
 
         Raises:
             InverseKinematicsError: No posture within the joints' ranges has this pose.
-            TypeError: An array does not have 64-bit floats.
         """
-        if not self._prepared:
-            self.prepare()
+        # Of one layout, so that the kernels are compiled once.
+        rotation, position, near = (np.array(given, float, order="C") for given in (rotation, position, near))
         if not self._closed:
             return self._search(rotation, position, near)
         q = near.copy()
@@ -152,16 +141,3 @@ def _distinct(found: Floats) -> Floats:
         if not differences or min(differences) > SAME:
             kept.append(q)
     return np.array(kept).reshape(len(kept), found.shape[1])
-
-
-_TABLE, _RESULT = types.Array(float64, 2, "C"), types.Array(float64, 1, "C")
-_MATRIX, _VECTOR = (types.Array(float64, axes, "A", readonly=True) for axes in (2, 1))
-CLOSED_FORM = closest, (_TABLE, _TABLE, _MATRIX, _VECTOR, _VECTOR, _RESULT)
-NUMERICAL = search, (_TABLE, _TABLE, _TABLE, _MATRIX, _VECTOR, _VECTOR, _TABLE)
-"""Kernels of `solve`, with the types of their arguments: arrays of any layout."""
-
-
-def _compile(kernel: Any, signature: tuple[Any, ...]) -> None:
-    if signature not in kernel.overloads:
-        kernel.compile(signature)
-    kernel.disable_compile()  # arrays of another type are refused, not compiled for

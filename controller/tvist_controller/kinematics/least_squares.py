@@ -6,6 +6,7 @@ import numpy as np
 
 from tvist_controller._compiled import compiled
 from tvist_controller.kinematics.pose import locate, pose_error
+from tvist_kernels.compiling import inlined
 from tvist_plant.model import Floats
 
 ACCURACY = 1e-9
@@ -54,7 +55,14 @@ def _linearize(
     return pose_error(rotation, position, now, place, error)
 
 
-@compiled
+@inlined
+def put(values: Floats, place: Floats) -> None:
+    """Copy a vector in a loop, since numba takes seconds to compile an assignment of arrays."""
+    for i in range(len(values)):
+        place[i] = values[i]
+
+
+@inlined
 def _normal_matrix(J: Floats, added: float, A: Floats) -> None:
     """Compute the lower half of JᵀJ + added 1."""
     n = J.shape[1]
@@ -64,6 +72,14 @@ def _normal_matrix(J: Floats, added: float, A: Floats) -> None:
             for k in range(6):
                 A[i, j] += J[k, i] * J[k, j]
         A[i, i] += added
+
+
+@compiled
+def _square_distance(a: Floats, b: Floats) -> float:
+    square = 0.0
+    for i in range(len(a)):
+        square += (a[i] - b[i]) * (a[i] - b[i])
+    return square
 
 
 @compiled
@@ -87,7 +103,7 @@ def descend(
     trial, step, A = np.empty(n), np.empty(n), np.empty((n, n))
     far, angle = _linearize(chain, rotation, position, q, J, error)
     square = far * far + angle * angle
-    cost = square + pull * np.sum((q - near) ** 2)
+    cost = square + pull * _square_distance(q, near)
     damping = 1.0
     for _ in range(iterations):
         if damping > 1e12 or (pull == 0.0 and square < 1e-30):
@@ -98,19 +114,22 @@ def descend(
             for k in range(6):
                 step[i] += J[k, i] * error[k]
         solve_in_place(A, step)
-        trial[:] = q + step
+        most = 0.0
+        for i in range(n):
+            trial[i] = q[i] + step[i]
+            most = max(most, abs(step[i]))
         far, angle = _linearize(chain, rotation, position, trial, J, error)
         trial_square = far * far + angle * angle
-        trial_cost = trial_square + pull * np.sum((trial - near) ** 2)
+        trial_cost = trial_square + pull * _square_distance(trial, near)
         if trial_cost < cost:
             stalled = trial_cost > cost * (1.0 - 1e-9)
-            q[:] = trial
+            put(trial, q)
             square, cost = trial_square, trial_cost
             damping = max(0.1 * damping, 1e-6)
             if stalled:
                 break
         else:
-            if np.max(np.abs(step)) < 1e-13:
+            if most < 1e-13:
                 break
             damping *= 10.0
             _linearize(chain, rotation, position, q, J, error)

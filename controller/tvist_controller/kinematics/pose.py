@@ -115,15 +115,17 @@ def newton(
     Directions that this inverse lacks are left as they are, so that a singular posture lets no joint turn far.
     Return the largest entry of the error.
     """
-    n = q.shape[0]
+    n, off = q.shape[0], 0.0
     R, o, J = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     for step in range(steps + 1):
         locate(chain, q, R, o, J)
         pose_error(rotation, position, R, o, error)
-        off = np.max(np.abs(error))
+        off = 0.0
+        for m in range(6):
+            off = max(off, abs(error[m]))
         if off <= ACCURATE or step == steps:
             break
         for i in range(n):
             for m in range(6):
                 q[i] += inverse[i, m] * error[m]
-    return float(off)
+    return off

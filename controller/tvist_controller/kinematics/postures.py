@@ -19,6 +19,7 @@ import math
 
 from tvist_controller._compiled import compiled
 from tvist_controller.kinematics.geometry import PARALLEL
+from tvist_kernels.compiling import inlined
 from tvist_plant.model import Floats
 
 AT_BORDER = 1e-10
@@ -130,7 +131,7 @@ def postures(
     return freedom
 
 
-@compiled
+@inlined
 def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: float, rows: Floats) -> int:
     """Compute the four postures of an arm whose axes 2, 3 and 4 are parallel, at one position of its shoulder."""
     (px, py), (xx, xy, xu), (zx, zy, zu) = pose
@@ -170,7 +171,7 @@ def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: 
     return freedom
 
 
-@compiled
+@inlined
 def _spherical(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: float, rows: Floats) -> int:
     """Compute the four postures of an arm with a spherical wrist, at one position of its shoulder."""
     (px, py), (xx, xy, xu), (zx, zy, zu) = pose

@@ -18,8 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.kinematics.least_squares import solve_in_place
+from tvist_controller.kinematics.least_squares import put, solve_in_place
 from tvist_controller.line.joint_controllers import LAWS, friction_at, stiction_at
+from tvist_kernels.compiling import inlined
 from tvist_plant.chain import SCRATCH, WIDTH, torques
 from tvist_plant.model import Floats
 
@@ -68,18 +69,9 @@ class Lead(NamedTuple):
     """Bending at the last three ticks, the newest first, shape (3, m) [rad]."""
 
 
-def shapes(N: int, n: int, m: int) -> Lead:
-    """Shapes of the parts."""
-    sizes = (
-        (n,), (m,), (N + 1, WIDTH), (N + 1, SCRATCH), (2, N), (LAW + LAWS, n), (4, n), (2, 3, n), (N,), (3, N),
-        (3, N), (2, N), (3, m),
-    )  # fmt: skip
-    return Lead(*sizes)  # type: ignore[arg-type]
-
-
 def memory_for(N: int, n: int, m: int) -> Floats:
     """Return memory for an arm with N coordinates, n joints and m ways in which links bend, full of zeros."""
-    memory = np.zeros(HEAD + sum(int(np.prod(shape)) for shape in shapes(N, n, m)))
+    memory = np.zeros(HEAD + (N + 1) * (WIDTH + SCRATCH) + 11 * N + (LAW + LAWS + 11) * n + 4 * m)
     memory[COORDINATES], memory[JOINTS], memory[FLEXES] = N, n, m
     return memory
 
@@ -133,7 +125,7 @@ def move_back(lead: Lead, moved: Floats, back: Floats) -> None:
             back[j] += lead.jacobian[row, int(lead.joints[j])] * moved[row]
 
 
-@compiled_for_ticks
+@inlined
 def bending_accelerations(lead: Lead, period: float, found: Floats) -> None:
     """Compute the accelerations of bending links, and of the joints that move the flange back meanwhile, shape (N,).
 
@@ -151,7 +143,7 @@ def bending_accelerations(lead: Lead, period: float, found: Floats) -> None:
         found[int(lead.joints[j])] = back[j]
 
 
-@compiled_for_ticks
+@inlined
 def loads_of(lead: Lead) -> None:
     """Compute the first torques on all springs, without gravity, which is static, and the Jacobian."""
     motion, bodies, jacobian, load = lead.motion, lead.bodies, lead.jacobian, lead.loads[0]
@@ -165,7 +157,7 @@ def loads_of(lead: Lead) -> None:
         jacobian[2, c] = S[5] + S[0] * y - S[1] * x
 
 
-@compiled_for_ticks
+@inlined
 def wanted_lead(lead: Lead, load: Floats, found: Floats) -> None:
     """Compute w, shape (n,) [rad], from torques on the springs, shape (N,) [N m]."""
     n, m = lead.joints.shape[0], lead.flexes.shape[0]
@@ -187,8 +179,8 @@ def wanted_lead(lead: Lead, load: Floats, found: Floats) -> None:
         before[c] = own
 
 
-@compiled_for_ticks
-def lead_of(
+@inlined
+def lead_of(  # noqa: C901  a kernel: its branches are loops
     lead: Lead,  # its wanted leads are moved on by one
     target: Floats,  # q, q̇ and q̈, and τ* of the rigid arm, shape (4, n)
     first: bool,  # whether there was no tick before
@@ -215,15 +207,18 @@ def lead_of(
             lead.before[c] = loads[0, c] / lead.springs[0, c]
         for k in range(m):
             lead.before[int(lead.flexes[k])] *= -1.0
-            lead.bent[:, k] = lead.before[int(lead.flexes[k])]
-    loads[1] = loads[0]
+            for row in range(lead.bent.shape[0]):
+                lead.bent[row, k] = lead.before[int(lead.flexes[k])]
+    put(loads[0], loads[1])
     if m > 0:
         more = np.empty(loads.shape[1])
         bending_accelerations(lead, memory[PERIOD], more)
         if smooth:
-            motion[2] += more
+            for c in range(len(more)):
+                motion[2, c] += more[c]
             torques(lead.chain, motion[0], motion[1], motion[2], 0.0, lead.bodies, loads[1])
-    wanted[2], wanted[1] = wanted[1], wanted[0]
+    put(wanted[1], wanted[2])
+    put(wanted[0], wanted[1])
     wanted_lead(lead, loads[1], wanted[0])
     for j in range(n):
         needed[j] = target[3, j] + lead.drives[ROTOR, j] * target[2, j]
@@ -258,7 +253,7 @@ def follow(
 
 
 @compiled_for_ticks
-def command_motors(
+def command_motors(  # noqa: C901  a kernel: its branches are loops
     memory: Floats,  # see `parts`
     target: Floats,  # see `lead_of`
     ticks: int,  # number of targets before this one; the first three leads are as wanted
@@ -271,11 +266,14 @@ def command_motors(
     needed, limited = np.empty(n), False
     lead_of(lead, target, ticks == 0, smooth, memory, needed)
     if ticks == 0:
-        late[:3], late[3] = target[:3], needed
+        for row in range(3):
+            put(target[row], late[row])
+        put(needed, late[3])
     if ticks < 3:
         for row in range(ticks + 1, 3):
-            wanted[row] = wanted[0]
-        led[:] = wanted
+            put(wanted[0], wanted[row])
+        for row in range(3):
+            put(wanted[row], led[row])
     else:
         room = np.empty(n)
         for j in range(n):
@@ -296,5 +294,7 @@ def command_motors(
             motors[3, j] = late[3, j] + drives[FRICTION, j] * share
         if with_torques:
             motors[3, j] += drives[ROTOR, j] * rise
-    late[:3], late[3] = target[:3], needed
+    for row in range(3):
+        put(target[row], late[row])
+    put(needed, late[3])
     return limited

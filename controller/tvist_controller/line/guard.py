@@ -19,6 +19,9 @@ class Obstacle(NamedTuple):
 class Guard(Protocol):
     """Decides whether a shaped reference may be played, and knows a stop that may be made instead."""
 
+    obstacle: Obstacle
+    """Why the latest reference was refused."""
+
     def __call__(self, state: Target) -> JointStop | None:
         """Return the stop from the previous state to make instead of a reference that must not be played."""
 
@@ -30,7 +33,3 @@ class Guard(Protocol):
 
     def clear(self, stop: JointStop) -> bool:
         """Return whether the whole way of a stop is clear."""
-
-    @property
-    def obstacle(self) -> Obstacle:
-        """Why the latest reference was refused."""

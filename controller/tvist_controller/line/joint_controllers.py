@@ -6,6 +6,7 @@ import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.differentiator import Floats
+from tvist_kernels.compiling import inlined
 from tvist_plant.description import RobotDescription
 from tvist_plant.imperfections import GearLaw, Imperfections
 from tvist_plant.stiction import stiction_after
@@ -48,7 +49,7 @@ def stiction_at(law: Floats, j: int, d: float, period: float, speed: float, load
     return stiction_after(d, period * speed, speed, load, law[5, j], law[6, j], law[7, j], law[8, j])
 
 
-@compiled_for_ticks
+@inlined
 def command_drives(
     q: Floats,  # q*, shape (n,) [rad]
     rates: Floats,  # q̇* and q̈*, shape (2, n)

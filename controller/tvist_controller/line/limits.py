@@ -74,24 +74,39 @@ def torque_room(chain: Floats, q: Floats, qd: Floats, scratch: Floats, most: Flo
     return least
 
 
-class StreamTorqueRoom:
-    """The acceleration of a stream that the joints' torques permit, after gravity and velocities."""
+class TorqueRoom:
+    """The acceleration of a stream or a guided motion that the joints' torques permit, after gravity and velocities.
 
-    def __init__(self, description: RobotDescription, dynamics: InverseDynamics) -> None:
-        self._most = TORQUE_SHARE * np.array(description.limits.torque)
+    A guided motion may change suddenly, since neither its client nor a filter smooths it. The flexible arm's torque
+    overshoots after each change, by its share `rebound`: then the torque of the acceleration, and what the arm adds to
+    it, have to stay within the limits as well.
+    """
+
+    def __init__(
+        self, description: RobotDescription, dynamics: InverseDynamics, rebound: float = 0.0
+    ) -> None:
+        self._limits, self._rebound = np.array(description.limits.torque), rebound
+        self._most = TORQUE_SHARE * self._limits
         self._dynamics = dynamics
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
-        """Return whether a state of motion keeps all torques within their share, or is as gentle as any stop."""
-        return self._keeps(q, qd, qdd, self._most) or bool(np.abs(qdd).max() <= GENTLEST_STOP)
+        """Return whether a state of motion keeps all torques, or is as gentle as any stop."""
+        swung = (1.0 + self._rebound) * qdd
+        keeps = self._keeps(q, qd, qdd, self._most) and (
+            self._rebound == 0.0 or self._keeps(q, qd, swung, self._limits)
+        )
+        return keeps or bool(np.abs(qdd).max() <= GENTLEST_STOP)
 
     def acceleration(self, q: Floats, qd: Floats) -> float:
-        """Largest a such that every q̈ with |q̈ᵢ| ≤ a keeps the torques within their share [rad/s^2].
+        """Largest a such that every q̈ with |q̈ᵢ| ≤ a is allowed [rad/s^2].
 
         With τ = M q̈ + h, such a q̈ needs at most |hᵢ| + a Σⱼ|Mᵢⱼ| at joint i. The result is at least that of the
         gentlest stop.
         """
-        return max(self._room(q, qd, self._most, 1.0), GENTLEST_STOP)
+        room = self._room(q, qd, self._most, 1.0)
+        if self._rebound > 0.0:
+            room = min(self._room(q, qd, self._limits, 1.0 + self._rebound), room)
+        return max(room, GENTLEST_STOP)
 
     def _keeps(self, q: Floats, qd: Floats, qdd: Floats, most: Floats) -> bool:
         dynamics = self._dynamics
@@ -105,30 +120,6 @@ class StreamTorqueRoom:
             left = most - dynamics.effort(q, qd, np.zeros_like(q))
             return float((left / (share * np.abs(dynamics.inertia(q)).sum(axis=1))).min())
         return torque_room(dynamics.chain, q, qd, dynamics.scratch, most, share)
-
-
-class GuidedTorqueRoom(StreamTorqueRoom):
-    """The acceleration of a motion that may change suddenly, since neither its client nor a filter smooths it.
-
-    The flexible arm's torque overshoots after each change, so the torque of the acceleration, and what the arm adds
-    to it, have to stay within the limits as well.
-    """
-
-    def __init__(self, description: RobotDescription, dynamics: InverseDynamics) -> None:
-        super().__init__(description, dynamics)
-        self._limits = np.array(description.limits.torque)
-
-    def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
-        """Return whether a state of motion keeps all torques within their limits, or is as gentle as any stop."""
-        gentle = bool(np.abs(qdd).max() <= GENTLEST_STOP)
-        swung = (1.0 + REBOUND) * qdd
-        return gentle or (self._keeps(q, qd, qdd, self._most) and self._keeps(q, qd, swung, self._limits))
-
-    def acceleration(self, q: Floats, qd: Floats) -> float:
-        """Largest a such that every q̈ with |q̈ᵢ| ≤ a is allowed [rad/s^2]."""
-        return max(
-            min(self._room(q, qd, self._limits, 1.0 + REBOUND), super().acceleration(q, qd)), GENTLEST_STOP
-        )
 
 
 class StopTorque:
@@ -188,47 +179,23 @@ class StopTorque:
         return within
 
 
-def largest_torque(dynamics: InverseDynamics, path: Path, velocity: float, acceleration: float) -> Floats:
-    """Upper bound of the torques of a motion along a path with any profile, shape (n,) [N m].
-
-    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), so it is largest at a corner of the range of ẋ² and ẍ. Seventeen
-    points of the path are checked.
-    """
-    way = path.end - path.start
-    resting, pushed = _on_way(dynamics, path, path.start, way, velocity, acceleration)
-    most: Floats = (resting + acceleration * pushed).max(axis=0)
-    return most
-
-
 def acceleration_on_way(
     dynamics: InverseDynamics, path: Path, start: Floats, way: Floats, velocity: float, limits: Floats
 ) -> float:
     """Largest acceleration of a path's parameter that keeps the torques within their share [rad/s^2].
 
-    Args:
-        dynamics: Inverse dynamics with the declared payload.
-        path: Path of the motion.
-        start: Parameter at the first point to check, shape (m,) [rad].
-        way: Difference from there to the last point to check, shape (m,) [rad].
-        velocity: Largest velocity on this part [rad/s].
-        limits: Torque limits of the joints, shape (n,) [N m].
+    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), so it is largest at a corner of the range of ẋ² and ẍ. Seventeen
+    points are checked of the way that begins at a parameter, both of shape (m,); `limits` are those of the joints'
+    torques.
     """
-    resting, pushed = _on_way(dynamics, path, start, way, velocity, math.inf)
-    room = float(((TORQUE_SHARE * limits - resting) / np.maximum(pushed, 1e-9)).min())
-    return max(room, 0.0)
-
-
-def _on_way(
-    dynamics: InverseDynamics, path: Path, start: Floats, way: Floats, velocity: float, acceleration: float
-) -> tuple[Floats, Floats]:
-    """Torques at points of a path, shape (k, n): at rest or speed [N m], and per unit of acceleration."""
     farthest, x = float(np.abs(way).max()), start + _POINTS * way
     still = np.zeros_like(x)
     along = still + (way / farthest if farthest > 0.0 else 0.0)
-    speed = min(velocity, math.sqrt(acceleration * farthest)) * along
     gravity = dynamics.gravities(path.states(x, still, still)[0])
-    resting = np.maximum(np.abs(gravity), np.abs(dynamics.torques(*path.states(x, speed, still))))
-    return resting, np.abs(dynamics.torques(*path.states(x, still, along)) - gravity)
+    resting = np.maximum(np.abs(gravity), np.abs(dynamics.torques(*path.states(x, velocity * along, still))))
+    pushed = np.abs(dynamics.torques(*path.states(x, still, along)) - gravity)
+    room = float(((TORQUE_SHARE * limits - resting) / np.maximum(pushed, 1e-9)).min())
+    return max(room, 0.0)
 
 
 def torque_along(dynamics: InverseDynamics, references: Floats, period: float) -> Floats:

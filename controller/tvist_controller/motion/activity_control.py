@@ -3,29 +3,30 @@
 `tvist_protocol.transitions` defines which trigger leads to which activity; this module carries the transitions out.
 """
 
+from collections import deque
 from typing import Unpack
 
 import numpy as np
 from msgspec.structs import replace
 
-from tvist_controller.commands.events import Emit, Told
-from tvist_controller.commands.refusal import RefusalError, out_of_turn
+from tvist_controller.events import Emit, Told
 from tvist_controller.foresight.collision import CollisionModel
-from tvist_controller.foresight.rest_of_motion import WayAhead
-from tvist_controller.foresight.stopper import Outlook
+from tvist_controller.foresight.rest_of_motion import RemainingMotion
+from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.foresight.stops import StopPlan
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.limits import StreamTorqueRoom
+from tvist_controller.line.limits import TorqueRoom
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
-from tvist_controller.motion.activities import PUT, runtime_of
 from tvist_controller.motion.arm_power import ArmPower
 from tvist_controller.motion.motions import Motions
-from tvist_controller.motion.safety_system import SafetySystem
-from tvist_controller.motion.streaming import Streaming
+from tvist_controller.motion.safety_system import PUT, SafetySystem, runtime_of
+from tvist_controller.motion.setpoints import Setpoints
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.snapshot import FilterState, Snapshot
+from tvist_controller.refusal import RefusalError, out_of_turn
 from tvist_controller.trajectory import MotionLimits, SetpointStream
 from tvist_plant.plant import PERIOD
 from tvist_protocol.modes import RuntimeState, SafetyMode
@@ -34,6 +35,11 @@ from tvist_protocol.stream import EventKind
 from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
 from tvist_urscript import Script
+
+HISTORY = 1000
+"""Number of past postures that are kept: two seconds."""
+STEADY = 250
+"""Ticks for which the target must be at rest before the arm counts as steady: 500 ms, as on UR's robots."""
 
 
 class MotionControl:
@@ -45,23 +51,28 @@ class MotionControl:
         self.cycle = cycle
         self.collisions = collisions
         self.changed = True
-        """Whether the activity may have changed since somebody has set this to False."""
+        """Whether activity or modes may have changed since somebody has set this to False."""
         self.activity = PUT[mode]
         self.safety = SafetySystem()
         """The safety system."""
         self._emit = emit
-        self.outlook = Outlook(cycle)
+        self.outlook = Stopper(cycle)
         """Forecast of the control line's motion."""
-        self.ahead = WayAhead(cycle, self.outlook, collisions)
+        self.ahead = RemainingMotion(cycle, self.outlook, collisions)
         """Collision check of that motion."""
         self.power = ArmPower.of(cycle.plant)
         """Power of an arm that has one."""
         self.motions = Motions(cycle, self.safety, emit)
         """Motions by number, and their speed."""
-        self.streams = Streaming()
+        self.streams = Setpoints(cycle.description)
         """The present stream of set-points, if there is one."""
         self.tcp: tuple[float, ...] = (0.0,) * 6
         """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
+        self.tool = Arm(cycle.description)
+        """Kinematics of that point, which threads share, so that another one replaces it."""
+        self.past = deque[Floats](maxlen=HISTORY)
+        """Measured postures of the past ticks since the arm was placed, the newest last [rad]."""
+        self._still = 0
 
     @property
     def activity(self) -> Activity:
@@ -76,7 +87,7 @@ class MotionControl:
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point for the motions that begin from now on; see `tcp`."""
-        self.tcp = offset
+        self.tcp, self.tool = offset, self.tool.with_tool(offset)
 
     @property
     def streaming(self) -> bool:
@@ -199,7 +210,7 @@ class MotionControl:
             cycle.filter.spared(limits),
             PERIOD,
             reach=np.array(cycle.description.limits.position),
-            torque=StreamTorqueRoom(cycle.description, cycle.dynamics),
+            torque=TorqueRoom(cycle.description, cycle.dynamics),
         )
         return cycle.begin(stream, LineMode.GUARDED, self.ahead.guard_of_stream())
 
@@ -309,6 +320,16 @@ class MotionControl:
                 self.activity = target
                 self.motions.done()
         return sample
+
+    def note(self, sample: Sample) -> None:
+        """Remember a tick."""
+        self.past.append(sample.measured.q)
+        self._still = self._still + 1 if self.cycle.mode.at_rest else 0
+
+    @property
+    def steady(self) -> bool:
+        """Whether the target has been at rest for half a second since the arm was placed."""
+        return min(self._still, len(self.past)) >= STEADY
 
     def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:
         if self.streams.end():

@@ -1,11 +1,10 @@
 """Force mode and freedrive: guided motions that give way to the force at the tool, and what ends them."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.kinematics.rotation import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
@@ -13,9 +12,9 @@ from tvist_controller.motion.force_sensing import SILENT, ContactWatch, External
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.monitor import Finding, Monitor
 from tvist_controller.motion.task_frame import Feature, frame_of
-from tvist_controller.trajectory import Compliant, ForceTask, Guided, Rest, Speed
-from tvist_controller.trajectory.compliant import CRAWL
-from tvist_controller.trajectory.force_law import FREE_DAMPING
+from tvist_controller.refusal import RefusalError
+from tvist_controller.trajectory import Compliant, ForceTask
+from tvist_controller.trajectory.compliant import CRAWL, FREE_DAMPING
 from tvist_plant.plant import PERIOD
 
 SMOOTHED = 0.04
@@ -39,33 +38,11 @@ GENTLE = 1.0
 """Deceleration of the fastest joint where force mode ends, the lowest of any stop [rad/s^2]."""
 
 
-class Forces(Protocol):
-    """What acts on the arm from outside."""
-
-    @property
-    def basis(self) -> object:
-        """What forces are reckoned from: one that changes makes them jump."""
-
-    def felt(self, sample: Sample) -> Floats:
-        """Return force and torque at the tool centre point in a tick, base frame, shape (6,) [N, N m]."""
-
-    def estimated(self, sample: Sample, qd_before: Floats) -> Floats:
-        """Return the force that the drives' torques and, with the velocities before, the accelerations tell [N]."""
-
-    def unexplained(self, sample: Sample, wrench: Floats, *, zeroed: bool) -> Floats:
-        """Return the force in a sensor's wrench that is neither weight nor inertia of the payload, shape (3,) [N]."""
-
-    def forget_zero(self) -> None:
-        """Take nothing as zero any longer."""
-
-
 class ForceControl(Monitor):
     """Begins and ends force mode, and watches its limits; `timeouts` as in `ExternalSensor`."""
 
-    def __init__(self, guidance: Guidance, forces: Forces, *, timeouts: bool) -> None:
-        self.guidance = self._guidance = guidance
-        """Guided motions."""
-        self._forces = forces
+    def __init__(self, guidance: Guidance, forces: ToolForces, *, timeouts: bool) -> None:
+        self._guidance, self._forces = guidance, forces
         self.external = ExternalSensor(timeouts=timeouts)
         """A force sensor of the user's own."""
         self._motion, self._cycle = guidance.motion, guidance.motion.cycle
@@ -106,6 +83,7 @@ class ForceControl(Monitor):
             raise RefusalError("wrong_mode", "", why)
         self.check_sensor()
         self._guidance.check(trigger)
+        self.awake = True
         lead = self.compliant or self._new()
         lead.aim(task, frame_of(feature, kind))
         self._by_hand = trigger == "freedrive"
@@ -133,6 +111,11 @@ class ForceControl(Monitor):
             why = "the external force sensor has told nothing yet: send its values, every 100 ms at least"
             raise RefusalError("wrong_mode", "", why)
 
+    def sensed(self) -> Floats | None:
+        """Return what the user's own sensor feels in the next tick; needed in each while it has a latest value."""
+        self.awake = True
+        return self.external.next()
+
     def begin_anew(self) -> None:
         """Use the arm's own sensor, and take nothing as zero, since the arm was placed somewhere."""
         self.external.use(None)
@@ -145,7 +128,7 @@ class ForceControl(Monitor):
         """
         estimated = self._cycle.sample.wrench is None
         if self._contact is None:
-            self._contact = ContactWatch()
+            self._contact, self.awake = ContactWatch(), True
             self._basis, self._qd = self._forces.basis, self._cycle.sample.measured.qd
         return self._contact.steps(direction, *(ESTIMATED_TOUCH if estimated else TOUCH))
 
@@ -153,14 +136,10 @@ class ForceControl(Monitor):
         guidance = self._guidance
         state, present = guidance.state, guidance.guided
         self._smooth = self._forces.felt(self._cycle.sample)
-        inner: Guided | Rest
         if present is not None and not self._cycle.mode.shaped:
             inner = present
-        elif self._cycle.mode.at_rest:
-            inner = Rest(state[0])
         else:
-            inner = stop = Speed(state, guidance.limits, guidance.torque, PERIOD)
-            stop.aim(np.zeros_like(state[0]), guidance.limits.acceleration)
+            inner = guidance.halting(state, guidance.limits.acceleration)
         return Compliant(
             state, guidance.limits, guidance.reach, guidance.torque, PERIOD, tool=lambda: guidance.tool, inner=inner,
             felt=self._felt,
@@ -171,16 +150,18 @@ class ForceControl(Monitor):
         sample = self._cycle.sample
         found = self._forces.felt(sample)
         if sample.wrench is None:
-            found = self._smooth = self._smooth + PERIOD / (PERIOD + SMOOTHED) * (found - self._smooth)
+            found = np.asarray(self._smooth + PERIOD / (PERIOD + SMOOTHED) * (found - self._smooth))
+            self._smooth = found
         return found
 
     def look(self, sample: Sample) -> Finding | None:
         """Find an arm that presses too hard, or leaves its way in an axis that does not give way."""
-        # Most arms have no sensor, and give way seldom.
+        # Most arms have no sensor, and give way seldom: it then sleeps until something else is asked of it.
         leads = isinstance(self._cycle.trajectory, Compliant)
         if sample.wrench is None and self._contact is None and self._source == DRIVES and not leads:
-            self._beyond = 0
+            self._beyond, self.awake = 0, False
             return None
+        self.awake = True
         changed = self._follow_source(self._source_of(sample))
         if changed is not None:
             return changed

@@ -4,13 +4,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.rotation import turn, turned
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.limits import GENTLEST_STOP, GuidedTorqueRoom, arm_limits
+from tvist_controller.line.limits import GENTLEST_STOP, REBOUND, TorqueRoom, arm_limits
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory import Compliant, Guided, MotionLimits, Servo, Speed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.transitions import Activity
@@ -33,14 +33,13 @@ class Guidance:
         """Limits of every joint."""
         self.reach = np.array(motion.cycle.description.limits.position)
         """Largest position of each joint in either direction, shape (n,) [rad]."""
-        self.torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.dynamics)
+        self.torque = TorqueRoom(motion.cycle.description, motion.cycle.dynamics, REBOUND)
         """Motion that the torque permits."""
-        self._tcp, self._kinematics = motion.tcp, Arm(motion.cycle.description)
         self._rehearse()
 
     def _rehearse(self) -> None:
         """Compile what a motion of the tool uses, or load it from disk, before a tick needs it."""
-        q, still, arm = self.reach * 0.1, np.zeros(len(self.reach)), self._kinematics
+        q, still, arm = self.reach * 0.1, np.zeros(len(self.reach)), self.tool
         speed = Speed((q, still, still), self.limits, self.torque, PERIOD, arm=arm)
         speed.aim(arm.jacobian(q)[:, 0] * 1e-3, 1.0, 1.0)
         speed.next()
@@ -104,9 +103,7 @@ class Guidance:
             motion.end(trigger, f"{trigger} was commanded", deceleration=acceleration)
             return
         acceleration = min(max(acceleration, GENTLEST_STOP), self.limits.acceleration)
-        state = self.state
-        stop = Speed(state, self.limits, self.torque, PERIOD)
-        stop.aim(np.zeros_like(state[0]), acceleration)
+        stop = self.halting(self.state, acceleration)
         stop.acceleration = acceleration
         self._halt(trigger, stop, stop.duration)
 
@@ -138,10 +135,7 @@ class Guidance:
     @property
     def tool(self) -> Arm:
         """Kinematics of the present tool centre point."""
-        if self.motion.tcp != self._tcp:
-            self._tcp = self.motion.tcp
-            self._kinematics = self._kinematics.with_tool(self._tcp)
-        return self._kinematics
+        return self.motion.tool
 
     def _most(self, shaped: bool) -> MotionLimits:
         """Limits of a reference."""
@@ -173,11 +167,9 @@ class Guidance:
     @property
     def guided(self) -> Guided | None:
         """The present guided motion, which is the inner one of a motion that gives way; None if none can go on."""
-        lead, present = self.compliant, self._cycle.trajectory
-        found = present if lead is None else lead.inner
-        return (
-            found if self._continues(shaped=self._cycle.mode.shaped) and isinstance(found, Guided) else None
-        )
+        lead = self.compliant
+        found = self._cycle.trajectory if lead is None else lead.inner
+        return found if self.motion.activity is Activity.GUIDED and isinstance(found, Guided) else None
 
     @property
     def reference(self) -> Floats:
@@ -200,9 +192,13 @@ class Guidance:
         lead = self.compliant
         if lead is None or lead.inner.finished:
             return
-        stop = Speed(self._start(shaped=False), self.limits, self.torque, PERIOD)
-        stop.aim(np.zeros(len(self.reach)), deceleration)
-        lead.take(stop)
+        lead.take(self.halting(self._start(shaped=False), deceleration))
+
+    def halting(self, state: tuple[Floats, Floats, Floats], deceleration: float) -> Speed:
+        """Return a trajectory that comes to rest from a state of motion with a deceleration [rad/s^2]."""
+        stop = Speed(state, self.limits, self.torque, PERIOD)
+        stop.aim(np.zeros_like(state[0]), deceleration)
+        return stop
 
     def slow_down(self) -> None:
         """Let a commanded velocity end until the next command; a commanded posture is one where the arm may stay."""

@@ -24,6 +24,9 @@ class Monitor(ABC):
     needs: ClassVar[Literal["nothing", "drives", "drives alone"]] = "nothing"
     """When it looks: in every tick, while the drives hold the arm, or while no motion gives way to forces either."""
 
+    awake = True
+    """Whether it looks in ticks in which the arm measures no force."""
+
     @abstractmethod
     def look(self, sample: Sample) -> Finding | None:
         """Return what the latest tick has shown; None if all is well."""

@@ -5,7 +5,7 @@ from typing import Protocol, Unpack
 
 import numpy as np
 
-from tvist_controller.commands.events import Emit, Told
+from tvist_controller.events import Emit, Told
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import STILL
 from tvist_controller.line.limits import REDUCED_SHARE, acceleration_on_way, rate_of
@@ -184,8 +184,8 @@ class Motions:
 
     def extend(self, planned: PlannedMove) -> None:
         """Let the running motion go on to further parts of its path; the plan holds for the present state."""
-        assert isinstance(self._running, RunningMove)
-        self._running.extend(planned, self.wanted_speed, self.slowest)
+        assert self._move is not None
+        self._move.extend(planned, self.wanted_speed, self.slowest)
         self._warn(planned)
 
     def _warn(self, planned: PlannedMove) -> None:
@@ -211,31 +211,36 @@ class Motions:
 
     def go_on(self) -> bool:
         """Start the next part of the running motion, since one has come to rest; return whether there was one."""
-        if not self.coming:
+        move = self._move
+        if move is None or not move.coming:
             return False
-        assert isinstance(self._running, RunningMove)
-        self._running.go_on(self.wanted_speed, self.slowest)
+        move.go_on(self.wanted_speed, self.slowest)
         return True
+
+    @property
+    def _move(self) -> RunningMove | None:
+        """The running motion, if it is a planned one."""
+        return self._running if isinstance(self._running, RunningMove) else None
 
     @property
     def coming(self) -> tuple[PlannedMotion, ...]:
         """Parts of the running motion that have not begun."""
-        return self._running.coming if isinstance(self._running, RunningMove) else ()
+        return () if self._move is None else self._move.coming
 
     @property
     def course(self) -> tuple[Course | None, float]:
         """What the running motion may go on from, and its time [s]; None if it cannot go on."""
-        return self._running.course if isinstance(self._running, RunningMove) else (None, 0.0)
+        return (None, 0.0) if self._move is None else self._move.course
 
     @property
     def progress(self) -> tuple[int, float] | None:
         """Number of the running motion's present part, and the length covered on it [m]; None if it has no length."""
-        return self._running.progress if isinstance(self._running, RunningMove) else None
+        return None if self._move is None else self._move.progress
 
     @property
     def stops_at(self) -> tuple[int, float] | None:
         """Progress at which a stop of the running motion ends; None if no stop on its path has begun."""
-        return self._running.stops_at if isinstance(self._running, RunningMove) else None
+        return None if self._move is None else self._move.stops_at
 
     def set_speed(self, fraction: float) -> None:
         """Scale the time of the running motion and of later ones."""
@@ -254,13 +259,13 @@ class Motions:
 
     def hold(self) -> None:
         """Bring a planned motion to a standstill on its path."""
-        if isinstance(self._running, RunningMove):
-            self._running.hold()
+        if self._move is not None:
+            self._move.hold()
 
     def release(self) -> None:
         """Resume a planned motion."""
-        if isinstance(self._running, RunningMove):
-            self._running.release(self.wanted_speed, self.slowest)
+        if self._move is not None:
+            self._move.release(self.wanted_speed, self.slowest)
 
     def done(self) -> None:
         """Report that the shaped reference has come to rest at the motion's target."""

@@ -1,11 +1,12 @@
-"""State of the safety system: inputs that restrict motion, and faults that are latched until a restart."""
+"""State of the safety system, and the activities of an arm at rest."""
 
 from dataclasses import dataclass, field
 from typing import Literal
 
-from tvist_controller.commands.refusal import RefusalError
-from tvist_protocol.modes import SafetyMode
+from tvist_controller.refusal import RefusalError
+from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_protocol.transitions import TRANSITIONS, Activity
+from tvist_protocol.values import ResetMode
 
 Emergency = Literal["robot", "system"]
 Latched = Literal["violation", "fault"]
@@ -56,15 +57,15 @@ class SafetySystem:
         Raises:
             RefusalError: The command is not allowed.
         """
-        mode = self.mode(activity)
         if trigger in _LIVE and self.latched is not None:
-            raise RefusalError("wrong_mode", "", f"safety_mode is {mode.name}: send restart_safety first")
-        if trigger in _LIVE and self.emergencies:
-            why = f"safety_mode is {mode.name}: release the emergency stop first"
-            raise RefusalError("wrong_mode", "", why)
-        if trigger in _MOTION and self.safeguard:
-            why = f"safety_mode is {mode.name}: release the safeguard stop first"
-            raise RefusalError("wrong_mode", "", why)
+            way_out = "send restart_safety first"
+        elif trigger in _LIVE and self.emergencies:
+            way_out = "release the emergency stop first"
+        elif trigger in _MOTION and self.safeguard:
+            way_out = "release the safeguard stop first"
+        else:
+            return
+        raise RefusalError("wrong_mode", "", f"safety_mode is {self.mode(activity).name}: {way_out}")
 
     def clear(self) -> None:
         """Release safeguard and emergency stops, and clear the latched fault; reduced speed stays as it is."""
@@ -81,3 +82,38 @@ class SafetySystem:
             why = "the safety system has found no violation or fault: there is no need to restart it"
             raise RefusalError("wrong_mode", "", why)
         self.latched = None
+
+
+PUT: dict[ResetMode, Activity] = {
+    "RUNNING": Activity.REST,
+    "IDLE": Activity.IDLE,
+    "POWER_OFF": Activity.POWER_OFF,
+}
+"""Activity at rest in each robot mode."""
+_RUNTIME = {
+    Activity.MOVING: RuntimeState.PLAYING,
+    Activity.STREAMING: RuntimeState.PLAYING,
+    Activity.GUIDED: RuntimeState.PLAYING,
+    Activity.ENDING: RuntimeState.PLAYING,
+    Activity.PAUSED: RuntimeState.PAUSED,
+    Activity.STOPPING: RuntimeState.STOPPING,
+    Activity.POWERING_OFF: RuntimeState.STOPPING,
+    Activity.BRAKING: RuntimeState.STOPPING,
+    Activity.PROTECTIVE_STOPPING: RuntimeState.STOPPING,
+}
+"""Runtime state of each activity; it is STOPPED for all others."""
+
+
+def runtime_of(activity: Activity, *, slowing: bool) -> RuntimeState:
+    """Return the runtime state, which says whether something moves; a paused motion may still be slowing."""
+    state = _RUNTIME.get(activity, RuntimeState.STOPPED)
+    return RuntimeState.PAUSING if state is RuntimeState.PAUSED and slowing else state
+
+
+def at_rest(activity: Activity, *, emergency: bool) -> Activity:
+    """Return the activity of a robot whose arm was placed at rest, in an emergency stop or not."""
+    if activity.protective:
+        return Activity.PROTECTIVE_STOP
+    if activity is Activity.BRAKING or (emergency and activity.moving):
+        return Activity.POWER_OFF
+    return Activity.REST if activity.moving else activity

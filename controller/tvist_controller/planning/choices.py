@@ -1,8 +1,8 @@
 """Choose shapers and estimators by the names that clients send."""
 
-from tvist_controller.calibrations import available, load
-from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup
+from tvist_controller.sources.calibrations import available, load
 from tvist_controller.sources.mode_source import ModeSource, modal_source
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.commands import SetEstimator

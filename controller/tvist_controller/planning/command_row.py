@@ -37,8 +37,8 @@ class Row(NamedTuple):
 
     message: type[Command]
     handle: Callable[[Any, Call[Any]], Reply | None]
-    """Method of the class that has the row, next to the state that it changes. The content has been checked before. It
-    raises `RefusalError` or `NoControlError` before it changes anything; if it returns nothing, the reply is `Done`.
+    """Carries it out on a `Robot`. The content has been checked before. It raises `RefusalError` or `NoControlError`
+    before it changes anything; if it returns nothing, the reply is `Done`.
     """
     lease: Literal["needed", "if named", "none"] = "needed"
     """When the command's token must be that of the lease: always, if it has one, or never, since it means something

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.planning.choices import choose_filter, choose_source, make_estimator, wanted_modes
 from tvist_controller.planning.snapshot import FilterState, Snapshot
 from tvist_controller.planning.surplus import surplus_of
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, paper_payload
-from tvist_controller.sources.elastic_source import elastic_feed_forward, known_friction
+from tvist_controller.sources.calibrations import elastic_feed_forward, known_friction
 from tvist_controller.sources.mode_source import ModeSource, modal_source
 from tvist_protocol.commands import SetEstimator
 from tvist_protocol.values import Payload

@@ -1,24 +1,34 @@
-"""Motions as quick as asked, or as much slower as the limits of the joints and of their torques require."""
+"""Motions as quick as asked, or as much slower as the limits of the joints and of their torques require.
+
+Near a limit, a motion is shaped ahead.
+"""
 
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from tvist_controller.foresight.line_copy import MAX_AHEAD, LineSimulation
 from tvist_controller.line.differentiator import Floats, central_differences
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.limits import largest_torque
-from tvist_controller.planning.keeping import SHARE, shaped_ahead
-from tvist_controller.planning.slower import Binding, Limited, acceleration_of, lasts, torque_of, velocity_of
+from tvist_controller.line.line_filter import LineFilter
+from tvist_controller.line.shaped_reference import ShapedReference
+from tvist_controller.planning.slower import Binding, Limited, lasts, limit_of
 from tvist_controller.planning.snapshot import Snapshot
 from tvist_controller.setup import Setup, body
-from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion
+from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, quickest_motion
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
+EASY = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
+"""Limits up to which a filter's `excess` is sure, since it was determined there."""
+KEEPING_TRIES = 4
+"""Number of motions that are tried to keep the acceleration that was asked for."""
+SHARE = 1.0 - 1e-4
+"""Share of the limit that is aimed at [-], since the peak changes a little with the motion."""
 TRIES = 10
 """Number of motions that are tried before each further one is slower by a share that doubles."""
 HASTE = 0.001
@@ -50,8 +60,7 @@ class Slower(NamedTuple):
 AS_ASKED = Slower()
 
 
-@dataclass(frozen=True)
-class Need:
+class Need(NamedTuple):
     """How much slower a motion has to be, and for which limit."""
 
     slower: Slower
@@ -59,41 +68,20 @@ class Need:
     """That limit."""
     q: Floats
     """Posture in which it would be exceeded most, shape (n,) [rad]."""
+    exceeds: str | None = None
+    """By how much it exceeds a torque limit at any speed, in words; None if it does not."""
 
 
-@dataclass(frozen=True)
-class Fitted:
+class Fitted(NamedTuple):
     """A motion within the limits."""
 
     motion: PlannedMotion
     slower: Slower = AS_ASKED
     """How much slower it is than asked."""
-    need: Need | None = None
-    """The limit that made it slower; None if it is as quick as asked."""
-    asked: float = 0.0
-    """Duration of the motion as asked, at full rate [s]."""
-    exceeds: str | None = None
-    """By how much it exceeds a torque limit nevertheless, in words; None if it does not."""
-
-    def limited(self, asked: MotionLimits | None = None) -> Limited | None:
-        """Say what makes it slower than asked, or what it exceeds; see `PlannedMove.limited`.
-
-        `asked` are the limits that were asked for; None if something else determines its speed.
-        """
-        if self.exceeds is not None:
-            return "limit_torque", self.exceeds
-        if self.need is None:
-            return None
-        velocity, acceleration = self.slower
-        if asked is None:
-            what = lasts(self.motion.duration, self.asked)
-        elif velocity <= acceleration:
-            what = f"velocity is {asked.velocity * velocity:.4g} of {asked.velocity:.4g} rad/s"
-        else:
-            what = (
-                f"acceleration is {asked.acceleration * acceleration:.4g} of {asked.acceleration:.4g} rad/s²"
-            )
-        return self.need.binding.makes(what)
+    limited: Limited | None = None
+    """What makes it slower than asked, or what it exceeds; see `PlannedMove.limited`."""
+    q: Floats | None = None
+    """Posture that made it slower, shape (n,) [rad]; None if none did."""
 
 
 class Fitter:
@@ -110,21 +98,22 @@ class Fitter:
         make: Callable[[Slower], PlannedMotion],
         now: Snapshot,
         tvist: Callable[[], Filter] | None,
+        limits: MotionLimits | None = None,
     ) -> Fitted:
         """Plan a motion, and anew as much slower as it exceeds a limit.
 
         Near a limit the motion is shaped ahead by the filter that `tvist` creates. If that would take too long, it is
-        None, and the filter's `surplus` is spared.
+        None, and the filter's `surplus` is spared. `limits` are those that were asked for; None if something else
+        determines its speed.
         """
-        self._dynamics.believe(now.bodies)
         asked, need, slower = make(AS_ASKED), None, AS_ASKED
         motion = asked
         for number in itertools.count():
             found = self._need(motion, now, tvist)
-            if isinstance(found, str):
-                return Fitted(asked, exceeds=found)
             if found is None:
                 break
+            if found.exceeds is not None:
+                return Fitted(asked, limited=("limit_torque", found.exceeds))
             by = found.slower
             need = found if need is None else min(need, found, key=lambda each: each.slower.rate)
             if number >= SPLIT:
@@ -134,59 +123,36 @@ class Fitter:
                 by = Slower(rate, rate**2)
             slower = Slower(slower.velocity * by.velocity, slower.acceleration * by.acceleration)
             motion = make(slower)
-        return Fitted(motion, slower, need, asked.duration)
+        if need is None:
+            return Fitted(motion)
+        if limits is None:
+            what = lasts(motion.duration, asked.duration)
+        else:
+            fast = slower.velocity <= slower.acceleration
+            which, unit = ("velocity", "rad/s") if fast else ("acceleration", "rad/s²")
+            most = getattr(limits, which)
+            what = f"{which} is {most * getattr(slower, which):.4g} of {most:.4g} {unit}"
+        return Fitted(motion, slower, need.binding.makes(what), need.q)
 
-    def _need(
-        self, motion: PlannedMotion, now: Snapshot, tvist: Callable[[], Filter] | None
-    ) -> Need | str | None:
-        """How much slower a motion has to be; in words, by how much it exceeds a torque limit at any speed."""
-        fast, heavy = self._may_be_fast(motion, now), self._may_be_heavy(motion, now)
-        if not (fast or heavy):
-            return None
-        ahead = None if tvist is None else shaped_ahead(motion, tvist())
+    def _need(self, motion: PlannedMotion, now: Snapshot, tvist: Callable[[], Filter] | None) -> Need | None:
+        """How much slower a motion has to be; first as its filter may exceed it most, then as it does."""
+        q, qd, qdd = _states(motion)
+        faster, harder = (1.0 + more for more in now.surplus)
+        qd, qdd = faster * qd, harder * qdd
+        found = self._exceeded(q, qd, qdd, qd, now, BLUNTED)
+        ahead = None if found is None or tvist is None else shaped_ahead(motion, tvist())
         if ahead is None:
-            q, qd, qdd = _states(motion)
-            faster, harder = (1.0 + more for more in now.surplus)
-            kinematic, blunted = self._kinematic(q, faster * qd, harder * qdd), max(BLUNTED, harder)
-        else:
-            q, qd, qdd = central_differences(ahead, PERIOD)
-            kinematic, blunted = self._kinematic(q, np.diff(ahead, axis=0) / PERIOD, qdd), 1.0
-        torque = self._dynamic(q, qd, qdd, blunted, now)
-        if isinstance(torque, str):
-            return torque
-        found = [need for need in (kinematic, torque) if need is not None]
+            return found
+        q, qd, qdd = central_differences(ahead, PERIOD)
+        return self._exceeded(q, qd, qdd, np.diff(ahead, axis=0) / PERIOD, now, 1.0)
+
+    def _exceeded(
+        self, q: Floats, qd: Floats, qdd: Floats, speeds: Floats, now: Snapshot, blunted: float
+    ) -> Need | None:
+        """How much slower a motion has to be for any limit; `speeds` are its velocities between the ticks."""
+        needs = self._kinematic(q, speeds, qdd), self._dynamic(q, qd, qdd, blunted, now)
+        found = [need for need in needs if need is not None]
         return min(found, key=lambda need: need.slower.rate, default=None)
-
-    def _may_be_fast(self, motion: PlannedMotion, now: Snapshot) -> bool:
-        """Return whether the shaped motion may exceed a joint's velocity or acceleration."""
-        more_velocity, more_acceleration = now.surplus
-        if isinstance(motion.path, JointLine):
-            share = np.abs(motion.path.direction)
-            fastest, hardest = share * motion.limits.velocity, share * motion.limits.acceleration
-        else:
-            fastest, hardest = (np.abs(values).max(axis=0) for values in _states(motion)[1:])
-        return bool(
-            (fastest * (1.0 + more_velocity) > self._velocity * (1.0 + ROUNDING)).any()
-            or (hardest * (1.0 + more_acceleration) > self._acceleration * (1.0 + ROUNDING)).any()
-        )
-
-    def _may_be_heavy(self, motion: PlannedMotion, now: Snapshot) -> bool:
-        """Return whether the shaped motion may exceed a torque limit."""
-        dynamics, limits, (velocity, acceleration) = self._dynamics, motion.limits, now.surplus
-        bound = largest_torque(
-            dynamics,
-            motion.path,
-            limits.velocity * (1.0 + velocity),
-            limits.acceleration * (1.0 + acceleration),
-        )
-        if (BLUNTED * bound <= self._torque).all():
-            return False
-        effort, states = np.zeros_like(self._torque), _states(motion)
-        for believed in now.bodies:
-            dynamics.believe((believed,))
-            effort = np.maximum(effort, np.abs(dynamics.torques(*states)).max(axis=0))
-        dynamics.believe(now.bodies)
-        return bool((max(BLUNTED, 1.0 + acceleration) * effort > self._torque).any())
 
     def _kinematic(self, q: Floats, qd: Floats, qdd: Floats) -> Need | None:
         """How much slower a motion has to be for the joints' velocities and accelerations."""
@@ -196,25 +162,22 @@ class Fitter:
         slower = Slower(*factors)
         if slower == AS_ASKED:
             return None
-        if slower.velocity <= math.sqrt(slower.acceleration):
-            joint = int(np.argmax(fast))
-            return Need(slower, velocity_of(joint, self._description), _place(qd[:, joint], q))
-        joint = int(np.argmax(hard))
-        return Need(slower, acceleration_of(joint, self._description), _place(qdd[:, joint], q))
+        by_velocity = slower.velocity <= math.sqrt(slower.acceleration)
+        joint = int(np.argmax(fast if by_velocity else hard))
+        values = (qd if by_velocity else qdd)[:, joint]
+        binding = limit_of("velocity" if by_velocity else "acceleration", joint, self._description)
+        return Need(slower, binding, q[min(int(np.argmax(np.abs(values))), len(q) - 1)])
 
-    def _dynamic(
-        self, q: Floats, qd: Floats, qdd: Floats, blunted: float, now: Snapshot
-    ) -> Need | str | None:
+    def _dynamic(self, q: Floats, qd: Floats, qdd: Floats, blunted: float, now: Snapshot) -> Need | None:
         """How much slower a motion has to be for the torques, at which gravity stays as it is.
 
         Where a torque is mainly that of the velocities, these are reduced, elsewhere the acceleration.
         """
         dynamics, limits, factors = self._dynamics, self._torque, [1.0, 1.0]
-        worst, need, at = 1.0, None, q[0]
+        worst, need = 1.0, None
         for believed in now.bodies:
             dynamics.believe((believed,))
-            gravity, turning = dynamics.gravities(q), dynamics.torques(q, qd, np.zeros_like(qdd))
-            turning -= gravity
+            gravity = dynamics.gravities(q)
             moving = blunted * (dynamics.torques(q, qd, qdd) - gravity)
             effort = np.abs(gravity + moving)
             beyond = effort > limits * (1.0 + ROUNDING)
@@ -223,36 +186,25 @@ class Fitter:
             share = np.where(
                 beyond, (limits - np.sign(moving) * gravity) / np.maximum(np.abs(moving), LEAST), 1.0
             )
-            joint = int(np.argmin(share.min(axis=0)))
-            least = float(share.min())
-            if least < LEAST:
-                name, limit, most = (
-                    self._description.robot.joints[joint],
-                    limits[joint],
-                    float(effort[:, joint].max()),
-                )
-                dynamics.believe(now.bodies)
-                return (
-                    f"torque of joint {name} will reach {most:.0f} N m, {most - limit:.1f} beyond its limit of "
-                    f"{limit:g}, since gravity alone takes it: choose another way, or a lighter payload"
-                )
-            steady = 2.0 * np.abs(turning) > np.abs(moving)
-            for number, which in enumerate((steady, ~steady)):
-                lowest = float(np.where(beyond & which, share, 1.0).min())
-                factors[number] = min(
-                    factors[number], SHARE * (lowest ** (0.5, 1.0)[number]) if lowest < 1.0 else 1.0
-                )
+            least, joint = float(share.min()), int(np.argmin(share.min(axis=0)))
             if least < worst:
-                at = q[int(np.argmin(share[:, joint]))]
-                worst, need = least, torque_of(joint, self._description)
-        dynamics.believe(now.bodies)
-        return None if need is None else Need(Slower(*factors), need, at)
-
-
-def _place(values: Floats, q: Floats) -> Floats:
-    """Posture, of those in shape (k, n), in which a value is largest; there may be one more value."""
-    at: Floats = q[min(int(np.argmax(np.abs(values))), len(q) - 1)]
-    return at
+                worst, which = least, limit_of("torque", joint, self._description)
+                need = Need(AS_ASKED, which, q[int(np.argmin(share[:, joint]))])
+            if need is not None and least < LEAST:
+                limit, most = limits[joint], float(effort[:, joint].max())
+                exceeds = (
+                    f"torque of joint {self._description.robot.joints[joint]} will reach {most:.0f} N m, "
+                    f"{most - limit:.1f} beyond its limit of {limit:g}, since gravity alone takes it: "
+                    "choose another way, or a lighter payload"
+                )
+                return need._replace(slower=Slower(0.0, 0.0), exceeds=exceeds)
+            turning = dynamics.torques(q, qd, np.zeros_like(qdd)) - gravity
+            steady = 2.0 * np.abs(turning) > np.abs(moving)
+            for number, part in enumerate((steady, ~steady)):
+                lowest = float(np.where(beyond & part, share, 1.0).min())
+                if lowest < 1.0:
+                    factors[number] = min(factors[number], SHARE * lowest ** (0.5, 1.0)[number])
+        return None if need is None else need._replace(slower=Slower(*factors))
 
 
 def _states(motion: PlannedMotion) -> tuple[Floats, Floats, Floats]:
@@ -263,3 +215,57 @@ def _states(motion: PlannedMotion) -> tuple[Floats, Floats, Floats]:
     moments = motion.law.moments
     known = (moments > motion.law.begins) & (moments < motion.duration)
     return motion.states(np.union1d(motion.evenly(LOOKS), moments[known]))
+
+
+def keeping_motion(
+    path: JointLine,
+    limits: MotionLimits,
+    tvist: Filter,
+    speed: float = 1.0,
+    agility: MotionLimits | None = None,
+) -> PlannedMotion:
+    """Return the quickest motion whose shaped reference keeps the limits.
+
+    A filter whose weights change with the arm's posture adds the change of their spread to the acceleration, at most
+    its `excess` at easy limits. Beyond these the motion is shaped ahead, and planned anew with as much less
+    acceleration as it had too much.
+
+    The limits are those of the shaped reference, for every joint; `speed` is the initial rate of the motion's time
+    relative to the clock's [-]. The filter is not changed.
+
+    Raises:
+        ValueError: There is no such motion.
+    """
+    easy = tvist.excess == 0.0 or not (
+        limits.velocity > EASY.velocity or limits.acceleration > EASY.acceleration or limits.jerk > EASY.jerk
+    )
+    share = 1.0 - tvist.excess
+    for _ in range(KEEPING_TRIES):
+        spared = replace(limits, acceleration=limits.acceleration * share)
+        motion = quickest_motion(path, spared, PERIOD, speed, agility)
+        if easy:
+            break
+        ahead = shaped_ahead(motion, tvist)
+        if ahead is None:
+            break
+        most = float(np.abs(np.diff(ahead, 2, axis=0)).max(initial=0.0)) / PERIOD**2
+        if most <= limits.acceleration:
+            break
+        share *= SHARE * limits.acceleration / most
+    return motion
+
+
+def shaped_ahead(motion: PlannedMotion, tvist: Filter) -> Floats | None:
+    """References of the shaped motion at full rate, shape (k, n) [rad]; None if it lasts too long to simulate.
+
+    Neither the motion, which has not begun, nor the filter is changed.
+    """
+    path, mine = motion.path, tvist.fork()
+    shaped = ShapedReference(path.posture(path.start), PERIOD)
+    shaped.enter(path.posture_of, path.start)
+    line_filter = LineFilter(mine, motion.limits)
+    line_filter.begin(mine, path.start, path.posture_of)
+    mine.aim(path.end)
+    ahead = LineSimulation(motion.paced_at(1.0), line_filter, shaped)
+    ahead.until(MAX_AHEAD)
+    return np.array(ahead.references) if ahead.rests else None

@@ -1,19 +1,19 @@
 """Planning of point-to-point motions, with checks for collisions and torque."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.planning.course import Course
 from tvist_controller.planning.filter_planner import FilterPlanner
-from tvist_controller.planning.fitting import Fitter, Slower
-from tvist_controller.planning.keeping import keeping_motion
+from tvist_controller.planning.fitting import Fitter, Slower, keeping_motion
 from tvist_controller.planning.slower import Limited, longer_joint_motion, slower_joint_motion
 from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import (
     JointLine,
@@ -31,8 +31,7 @@ AGILE = MotionLimits(1.5, 2.0, 100.0)
 """Limits of pauses and changes of the speed for motions that are slower by themselves: those of `move_j` by default."""
 
 
-@dataclass(frozen=True)
-class PlannedMove:
+class PlannedMove(NamedTuple):
     """A motion that may begin."""
 
     parts: tuple[PlannedMotion, ...]
@@ -68,19 +67,14 @@ class MovePlanner:
         self.fitter = Fitter(setup)
         """Keeps motions within the limits of the joints."""
 
-    def move(self, command: MoveJ, now: Snapshot) -> PlannedMove:
+    def move(self, command: MoveJ, now: Snapshot, *, at_once: bool = False) -> PlannedMove:
         """Plan a motion from rest; the command's content has been checked.
+
+        `at_once` leaves no time to shape the motion ahead.
 
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
         """
-        return self._move(command, now, at_once=False)
-
-    def move_within_tick(self, command: MoveJ, now: Snapshot) -> PlannedMove:
-        """Plan a motion as `move` does, but within a tick, which is too short to shape the motion ahead."""
-        return self._move(command, now, at_once=True)
-
-    def _move(self, command: MoveJ, now: Snapshot, *, at_once: bool) -> PlannedMove:
         path = JointLine(now.q, np.array(command.q, dtype=float))
         limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
         if command.duration is None:
@@ -93,7 +87,7 @@ class MovePlanner:
             slower = longer_joint_motion(planned.parts[0], command.duration)
         if slower is None or (planned.limited is not None and planned.limited[0] == "limit_torque"):
             return planned
-        return replace(planned, limited=slower)
+        return planned._replace(limited=slower)
 
     def _lasting(self, path: JointLine, duration: float, now: Snapshot) -> MotionLimits:
         """Limits with which a motion takes a duration [s], or those of the arm if it takes longer with these."""
@@ -115,7 +109,7 @@ class MovePlanner:
         *,
         at_once: bool = False,
     ) -> PlannedMove:
-        """Plan a motion along a path, from where the reference is at rest to rest; see `move_within_tick`.
+        """Plan a motion along a path, from where the reference is at rest to rest; for `at_once` see `move`.
 
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
@@ -134,7 +128,12 @@ class MovePlanner:
             return quickest_motion(path, spared, PERIOD, rate, agility)
 
         try:
-            fitted = self.fitter.fit(make, now, None if at_once else lambda: self._filters.like(now.filter))
+            fitted = self.fitter.fit(
+                make,
+                now,
+                None if at_once else lambda: self._filters.like(now.filter),
+                limits if agility is None else None,
+            )
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
         motion, slower = fitted.motion, fitted.slower
@@ -147,7 +146,7 @@ class MovePlanner:
         return PlannedMove(
             (motion,),
             velocity,
-            fitted.limited(limits if agility is None else None),
+            fitted.limited,
             room=(arms.velocity / velocity, arms.acceleration / (limits.acceleration * slower.acceleration)),
             surplus=now.surplus,
         )

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
 from tvist_controller.paths.pacing import timed
@@ -13,6 +12,7 @@ from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, To
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory.spline import Knots
 from tvist_plant.description import RobotDescription
 from tvist_protocol.motions import (
@@ -47,7 +47,7 @@ class PathLegs:
             match segment:
                 case JointSegment():
                     way = JointWay(q, np.array(segment.q, dtype=float))
-                case ArcSegment():
+                case ArcSegment() | MoveC():
                     via = frame @ placement(segment.via)
                     end = frame @ placement(segment.pose)
                     way = self._arc(start, via.position, end, segment, where)
@@ -58,10 +58,13 @@ class PathLegs:
             knots = self._along(way, q, tracker, where, now)
             q = way.end if isinstance(way, JointWay) else knots.q[-1]
             pacing = timed(_pacing(segment), way.length)
-            yield Leg(way, knots, tracker.pose(q), pacing, segment.blend, where)
+            blend = 0.0 if isinstance(segment, MoveL | MoveC) else segment.blend
+            yield Leg(way, knots, tracker.pose(q), pacing, blend, where)
 
     @staticmethod
-    def _arc(start: Placement, via: Floats, end: Placement, segment: ArcSegment, where: str) -> ToolArc:
+    def _arc(
+        start: Placement, via: Floats, end: Placement, segment: ArcSegment | MoveC, where: str
+    ) -> ToolArc:
         try:
             return ToolArc(start, via, end, tangent=segment.orientation == "tangent")
         except ValueError as error:
@@ -106,39 +109,21 @@ class PathLegs:
         raise RefusalError("limit_position", field, why, float(most[joint]))
 
 
-def _segments(command: MoveL | MoveC | MovePath, before: int) -> Iterator[tuple[Segment, str]]:
-    match command:
-        case MoveL():
-            yield (
-                LineSegment(
-                    pose=command.pose,
-                    velocity=command.velocity,
-                    acceleration=command.acceleration,
-                    duration=command.duration,
-                ),
-                "",
-            )
-        case MoveC():
-            yield (
-                ArcSegment(
-                    via=command.via,
-                    pose=command.pose,
-                    orientation=command.orientation,
-                    velocity=command.velocity,
-                    acceleration=command.acceleration,
-                ),
-                "",
-            )
-        case MovePath():
-            for number, segment in enumerate(command.segments):
-                yield segment, f"segments[{before + number}]"
+def _segments(
+    command: MoveL | MoveC | MovePath, before: int
+) -> Iterator[tuple[MoveL | MoveC | Segment, str]]:
+    if not isinstance(command, MovePath):
+        yield command, ""
+        return
+    for number, segment in enumerate(command.segments):
+        yield segment, f"segments[{before + number}]"
 
 
-def _pacing(segment: Segment) -> Pacing:
+def _pacing(segment: MoveL | MoveC | Segment) -> Pacing:
     match segment:
         case JointSegment():
             return Pacing(PER_RADIAN * segment.velocity, PER_RADIAN * segment.acceleration, segment.duration)
-        case LineSegment():
+        case LineSegment() | MoveL():
             return Pacing(segment.velocity, segment.acceleration, segment.duration)
-        case ProcessSegment() | ArcSegment():
+        case ProcessSegment() | ArcSegment() | MoveC():
             return Pacing(segment.velocity, segment.acceleration, even=True)

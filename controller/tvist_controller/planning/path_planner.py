@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.foresight.collision import CLEARANCE
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import arm_limits, rate_of
@@ -21,6 +20,7 @@ from tvist_controller.planning.path_legs import PathLegs
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.slower import Limited, slower_path
 from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Way, at_least, quickest_motion
 from tvist_controller.trajectory.retiming import RetimedLaw
@@ -210,11 +210,11 @@ class PathPlanner:
 
 def _told(fitted: Fitted, run: Run, start: float = 0.0) -> Limited | None:
     """Say what made a motion slower, and on which part of a path; `start` is where its run begins on its curve [m]."""
-    told, need, path = fitted.limited(), fitted.need, fitted.motion.path
-    if told is None or need is None or not isinstance(path, SplineCurve) or not run[0].where:
+    told, q, path = fitted.limited, fitted.q, fitted.motion.path
+    if told is None or q is None or not isinstance(path, SplineCurve) or not run[0].where:
         return told
     s = np.linspace(start, float(path.end[0]), LOOKS)
-    at = float(s[int(np.argmin(np.abs(path.derivatives(s)[0] - need.q).max(axis=1)))])
+    at = float(s[int(np.argmin(np.abs(path.derivatives(s)[0] - q).max(axis=1)))])
     ends = start + np.cumsum([piece.knots.s[-1] for piece in run])
     piece = run[min(int(np.searchsorted(ends, at)), len(run) - 1)]
     return told[0], f"{told[1]}: on {piece.where}, {at:.3f} m from the start of this part of the path"

@@ -1,16 +1,16 @@
 """Plans for commands that take longer than a tick can wait: how they are made, and how long they hold."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.planning.snapshot import FilterState, Snapshot
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command
+from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.replies import Posture, ToolPose
 from tvist_shaping.base import Filter
 from tvist_urscript import Script
@@ -32,8 +32,7 @@ class Planning(NamedTuple):
     """Makes a plan that may be worse but takes no longer than a tick can wait; None if `make` is all there is."""
 
 
-@dataclass(frozen=True)
-class Plan:
+class Plan(NamedTuple):
     """The outcome of a command, valid while the state that it was planned on holds."""
 
     state: Mapping[str, Any]
@@ -42,17 +41,6 @@ class Plan:
     """What was planned, or why the command is refused; None if no motion may begin."""
     until: float = 0.0
     """See `Snapshot.until`."""
-
-    def holds(self, now: Snapshot) -> bool:
-        """Return whether the plan is valid for the present state."""
-        return self.until >= now.until and all(
-            _same(value, getattr(now, name)) for name, value in self.state.items()
-        )
-
-    @property
-    def goes_on(self) -> bool:
-        """Whether it goes on from the running motion."""
-        return self.state.get("after") is not None
 
 
 def _same(one: Any, other: Any) -> bool:
@@ -70,6 +58,11 @@ Order = Callable[[Command, Snapshot], Callable[[], Plan]]
 class MakesPlans(Protocol):
     """A `Planner`, which lies above all that uses plans."""
 
+    filters: FilterPlanner
+
+    def for_lesson(self, lesson: PayloadLesson, present: FilterState) -> "Plan":
+        """Plan what the robot has learnt: the present filter for what it carries."""
+
     def plan(
         self, command: Command, now: Snapshot, *, within_tick: bool = False, checked: bool = False
     ) -> Plan:
@@ -79,23 +72,23 @@ class MakesPlans(Protocol):
 class Plans:
     """Plans of one robot, for the commands of clients and of programs: made now, or later beside the ticks.
 
-    `snapshot` returns the present state; for a time, that of a motion that goes on from the running one, which stays as
-    it is for this time [s]. `order` has commands planned beside the ticks; without it, the tick that needs a plan makes
-    it.
+    `plan` is `Planner.plan`. `snapshot` returns the present state; for a time, that of a motion that goes on from the
+    running one, which stays as it is for this time [s]. `order` has commands planned beside the ticks; without it, the
+    tick that needs a plan makes it.
     """
 
     def __init__(
         self,
-        planner: MakesPlans,
+        plan: Callable[..., Plan],
         snapshot: Callable[[float | None], Snapshot],
         order: Order | None = None,
     ) -> None:
-        self._planner, self._snapshot = planner, snapshot
-        self._order = order or (lambda command, now: lambda: planner.plan(command, now))
+        self._plan, self._snapshot = plan, snapshot
+        self._order = order or (lambda command, now: lambda: plan(command, now))
 
     def now(self, command: Command, *, within_tick: bool = False) -> Plan:
         """Plan a command on the present state; see `Planner.plan`."""
-        return self._planner.plan(command, self._snapshot(None), within_tick=within_tick)
+        return self._plan(command, self._snapshot(None), within_tick=within_tick)
 
     def later(self, command: Command) -> Callable[[], Plan]:
         """Have a command planned on the present state; returns what waits for the plan."""
@@ -108,7 +101,11 @@ class Plans:
 
     def hold(self, plan: Plan) -> bool:
         """Return whether a plan that was made before is valid for the present state."""
-        return plan.holds(self._snapshot(0.0 if plan.goes_on else None))
+        goes_on = plan.state.get("after") is not None
+        now = self._snapshot(0.0 if goes_on else None)
+        return plan.until >= now.until and all(
+            _same(value, getattr(now, name)) for name, value in plan.state.items()
+        )
 
     def found(self, command: Command, plan: Plan | None = None) -> Any:
         """Return what was planned for a command that is checked: the plan if it still holds, else one that is made now.
@@ -117,7 +114,7 @@ class Plans:
             RefusalError: The command cannot be carried out.
         """
         if plan is None or not self.hold(plan):
-            plan = self._planner.plan(command, self._snapshot(None), checked=True)
+            plan = self._plan(command, self._snapshot(None), checked=True)
         found = plan.found
         if isinstance(found, RefusalError):
             raise found

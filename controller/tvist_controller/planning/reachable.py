@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError, check_joints
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
 from tvist_controller.paths.poses import Placement, placement
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.refusal import RefusalError, check_joints
 from tvist_plant.description import RobotDescription
 from tvist_protocol import kinematics as k
 from tvist_protocol.replies import Posture, ToolPose

@@ -43,24 +43,18 @@ Limited = tuple[Code, str]
 """A limit, and a sentence on what it makes slower."""
 
 
-def velocity_of(joint: int, description: RobotDescription) -> Binding:
-    """Return a joint's limit of velocity."""
-    keeps = f"{description.limits.velocity[joint]:.4g} rad/s"
-    return Binding("limit_velocity", f"joint {description.robot.joints[joint]} stays within {keeps}")
+_LIMITS: dict[str, tuple[Code, str, str]] = {
+    "velocity": ("limit_velocity", "", "rad/s"),
+    "acceleration": ("limit_acceleration", "", "rad/s²"),
+    "torque": ("limit_torque", "the torque of ", "N m"),
+}
 
 
-def acceleration_of(joint: int, description: RobotDescription) -> Binding:
-    """Return a joint's limit of acceleration."""
-    keeps = f"{description.limits.acceleration[joint]:.4g} rad/s²"
-    return Binding("limit_acceleration", f"joint {description.robot.joints[joint]} stays within {keeps}")
-
-
-def torque_of(joint: int, description: RobotDescription) -> Binding:
-    """Return a joint's limit of torque."""
-    keeps = f"{description.limits.torque[joint]:g} N m"
-    return Binding(
-        "limit_torque", f"the torque of joint {description.robot.joints[joint]} stays within {keeps}"
-    )
+def limit_of(quantity: str, joint: int, description: RobotDescription) -> Binding:
+    """Return a joint's limit of velocity, acceleration or torque."""
+    code, what, unit = _LIMITS[quantity]
+    most = getattr(description.limits, quantity)[joint]
+    return Binding(code, f"{what}joint {description.robot.joints[joint]} stays within {most:.4g} {unit}")
 
 
 ARMS = Binding("limit_acceleration", "the joints stay within the arm's limits")
@@ -90,10 +84,9 @@ def slower_path(
         if within_reach < pacing.velocity and within_reach <= min(permitted, BLUNTED * fastest):
             return None
     velocity, acceleration = shares(law, law.moments, curve, limits)
-    if velocity.max() >= USED_UP:
-        return velocity_of(int(np.argmax(velocity)), description).makes(what)
-    if acceleration.max() >= USED_UP:
-        return acceleration_of(int(np.argmax(acceleration)), description).makes(what)
+    for quantity, used in (("velocity", velocity), ("acceleration", acceleration)):
+        if used.max() >= USED_UP:
+            return limit_of(quantity, int(np.argmax(used)), description).makes(what)
     return JERKS.makes(what)
 
 

@@ -1,11 +1,10 @@
 """What the functions of programs may use of the robot."""
 
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from tvist_controller.cell.live_cell import LiveCell
-from tvist_controller.commands.events import Emit
+from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.motion.activity_control import MotionControl
@@ -13,7 +12,6 @@ from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.planning.plan import Plan, Plans
 from tvist_plant.description import RobotDescription
-from tvist_plant.model import Floats
 from tvist_protocol.commands import Command
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Reply
@@ -22,42 +20,6 @@ from tvist_protocol.values import Payload
 
 OWN_TOKEN = "program"  # noqa: S105  the lease was checked when the program was played
 """Token in the commands that a program makes, which are not sent to clients."""
-HISTORY = 1000
-"""Number of past postures that are kept: two seconds."""
-STEADY = 250
-"""Ticks for which the target must be at rest before the arm counts as steady: 500 ms, as on UR's robots."""
-
-
-class Steadiness:
-    """The last two seconds of the arm: its measured postures, and how long its target has been at rest."""
-
-    def __init__(self) -> None:
-        self._postures = deque[Floats](maxlen=HISTORY)
-        self._still = 0
-
-    def note(self, q: Floats, *, at_rest: bool) -> None:
-        """Take the measured posture [rad] of a tick, and whether the target is at rest."""
-        self._postures.append(q)
-        self._still = self._still + 1 if at_rest else 0
-
-    def forget(self) -> None:
-        """Begin anew, since the arm was placed elsewhere."""
-        self._postures.clear()
-        self._still = 0
-
-    @property
-    def steady(self) -> bool:
-        """Whether the target has been at rest for half a second."""
-        return self._still >= STEADY
-
-    @property
-    def known(self) -> int:
-        """Number of postures that are known, the present one included."""
-        return len(self._postures)
-
-    def past(self, steps: int) -> list[float]:
-        """Measured posture a number of ticks ago, fewer than `known` [rad]."""
-        return list(self._postures[-1 - steps].tolist())
 
 
 @dataclass(frozen=True)
@@ -87,4 +49,3 @@ class Access:
     """Whether guided motions of programs that begin at rest are shaped."""
     cell: LiveCell | None = None
     """What stands around the robot; None for nothing."""
-    steadiness: Steadiness = field(default_factory=Steadiness)

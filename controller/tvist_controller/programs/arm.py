@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.journey import Journey, RateLimit, Turns
+from tvist_controller.refusal import RefusalError
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import Segment
 from tvist_protocol.stream import Event

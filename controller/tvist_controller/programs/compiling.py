@@ -4,9 +4,9 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Final, NamedTuple
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.programs.interpreter import WAITS
 from tvist_controller.programs.library import MOVING, known_signatures
+from tvist_controller.refusal import RefusalError
 from tvist_plant.description import RobotDescription
 from tvist_protocol.programs import ProgramLoad, ProgramRun
 from tvist_urscript import Script, ScriptError

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Literal
 
-from tvist_controller.commands.events import Emit
+from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_protocol.stream import PopupKind
 

@@ -4,11 +4,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import Literal
 
-from tvist_controller.commands.events import Emit
-from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.journey import Turns
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.programs import MAX_SCRIPT, Interpreter
 from tvist_urscript import Fault, Machine, Script
 

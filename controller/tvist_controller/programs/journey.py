@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Generator
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import OWN_TOKEN, Access
+from tvist_controller.refusal import RefusalError
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
 from tvist_protocol.motions import JointSegment, LineSegment, MoveL, MovePath, Segment

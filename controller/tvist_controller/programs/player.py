@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from tvist_controller.commands.refusal import RefusalError
-from tvist_controller.programs.access import Access, Steadiness
+from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.compiling import Kept, KeptPrograms, built_in
@@ -14,6 +13,7 @@ from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.programs.library import MOVING, functions
 from tvist_controller.programs.sockets import Sockets
 from tvist_controller.programs.watchdogs import MissedTurns, Watchdogs
+from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.programs import ProgramLabel, ProgramState
@@ -75,6 +75,9 @@ class ProgramPlayer:
         """Programs in order of age."""
         self._starved: set[_Running] = set()
         """Programs for which nothing of the last tick's evaluations was left."""
+        self.idle = True
+        """Whether no program runs, and no debt of evaluations is left, so that `advance` has nothing to do."""
+        self._told: tuple[object, ...] = ()
         self._left = EVALUATIONS
         """Evaluations that the last tick left; below 0 they are a debt, which is paid before any program goes on."""
         self._now: _Running | None = None
@@ -94,11 +97,6 @@ class ProgramPlayer:
         return 0 if self._main is None else self._main.machine.line
 
     @property
-    def progress(self) -> tuple[str | None, ProgramState, int, ProgramLabel | None]:
-        """Fields of the program in `io`: its name, its state, its line and its label."""
-        return self.name, self.state, self.line, self.label
-
-    @property
     def published(self) -> dict[str, object]:
         """All fields of the program in `io`."""
         return {
@@ -109,18 +107,15 @@ class ProgramPlayer:
 
     # ------------------------------------------------------------------ ticks and events
 
-    @property
-    def steadiness(self) -> Steadiness:
-        """The past postures of the arm."""
-        return self._access.steadiness
-
-    @property
-    def idle(self) -> bool:
-        """Whether no program runs, and no debt of evaluations is left, so that `advance` has nothing to do."""
-        return not self._all and self._left >= EVALUATIONS
-
     def advance(self, tick: int) -> None:
-        """Give every thread its turn; called first in every tick."""
+        """Give every thread its turn; called first in every tick unless all is idle."""
+        self._give_turns(tick)
+        self.idle = not self._all and self._left >= EVALUATIONS
+        now = self.name, self.state, self.line, self.label
+        if now != self._told:
+            self._told, self._access.peripherals.changed = now, True
+
+    def _give_turns(self, tick: int) -> None:
         # Evaluations are counted rather than timed, so that a run is the same live, in lockstep and in a replay
         # (decision 26). What a tick takes beyond them, the next ticks pay.
         self.sockets.answer()
@@ -243,6 +238,7 @@ class ProgramPlayer:
         self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
         if running is self._main:
             self._main, self.state, self.line, self.label = None, "STOPPED", 0, None
+            self._access.peripherals.changed = True
             self._runstate.tell(runs=False, failed=self._failed)
             self._watchdogs.clear()
             self.statements.close()
@@ -294,6 +290,7 @@ class ProgramPlayer:
         machine = Machine(script, self._functions, finish=self.arm.finish)
         running = _Running(name, script, machine, origin)
         self._all.append(running)
+        self.idle = False
         self._emit("program_started", program=name, secondary=script.secondary or None)
         return running
 

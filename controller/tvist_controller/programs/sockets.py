@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from tvist_controller.cell.gripper import Requests
 from tvist_controller.cell.live_cell import LiveCell
-from tvist_controller.commands.events import Emit
+from tvist_controller.events import Emit
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.socket_traffic import (
     Close,

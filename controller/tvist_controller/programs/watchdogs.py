@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from tvist_controller.commands.events import Emit
+from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.programs.arm import ProgramArm
 from tvist_plant.plant import PERIOD

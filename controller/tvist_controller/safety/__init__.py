@@ -1,1 +1,1 @@
-"""What stops the arm: the safety system's actions, dangers, faults, and the payload that torques contradict."""
+"""What stops the arm: the safety system, dangers, faults, and the payload that torques contradict or teach."""

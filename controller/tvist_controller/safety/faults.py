@@ -3,14 +3,13 @@
 import heapq
 import math
 from collections.abc import Callable
+from functools import partial
 from itertools import count
-from typing import ClassVar
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.planning.command_row import Row
+from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD, Plant
@@ -18,7 +17,8 @@ from tvist_protocol.faults import FAULTS
 from tvist_protocol.simulation import SimulationInject
 
 
-def _check(command: SimulationInject, description: RobotDescription) -> None:
+def check_fault(command: SimulationInject, description: RobotDescription) -> None:
+    """Refuse a fault that no such robot can have."""
     joints = description.joints
     fault = FAULTS.get(command.fault)
     if fault is None:
@@ -42,17 +42,15 @@ class Faults:
     def __init__(self, motion: MotionControl, safety: SafetyControl) -> None:
         self._motion = motion
         self._inputs: dict[str, tuple[Callable[[], None], Callable[[], None]]] = {
-            "reduced": (lambda: safety.reduce(reduced=True), lambda: safety.reduce(reduced=False)),
+            "reduced": (partial(safety.reduce, reduced=True), partial(safety.reduce, reduced=False)),
             "safeguard_stop": (
-                lambda: safety.safeguard(stopped=True),
-                lambda: safety.safeguard(stopped=False),
+                partial(safety.safeguard, stopped=True), partial(safety.safeguard, stopped=False),
             ),
-            "emergency_stop": (lambda: safety.emergency("robot"), lambda: safety.end_emergency("robot")),
+            "emergency_stop": (partial(safety.emergency, "robot"), partial(safety.end_emergency, "robot")),
             "system_emergency_stop": (
-                lambda: safety.emergency("system"),
-                lambda: safety.end_emergency("system"),
+                partial(safety.emergency, "system"), partial(safety.end_emergency, "system"),
             ),
-        }
+        }  # fmt: skip
         """Functions that start and end each input of the safety system."""
         self._momentary: dict[str, Callable[[], None]] = {
             "protective_stop": lambda: motion.protect("a protective stop was injected"),
@@ -99,15 +97,14 @@ class Faults:
         """Number of the tick in which the next fault ends; infinite if none does."""
         return self._ends[0][0] if self._ends else math.inf
 
-    def end(self, tick: int) -> None:
-        """End the faults whose time is over, before a tick."""
+    def end(self, tick: float = math.inf) -> None:
+        """End the faults whose time is over before a tick."""
         while self._ends and self._ends[0][0] <= tick:
             heapq.heappop(self._ends)[-1]()
 
     def clear(self) -> None:
         """End all present faults, and release the arm."""
-        while self._ends:
-            heapq.heappop(self._ends)[-1]()
+        self.end()
         self._push[:] = 0.0
         if self._pushable is not None:
             self._pushable.push(self._push)
@@ -136,7 +133,3 @@ class Faults:
         self._push[joint] += torque
         if self._pushable is not None:
             self._pushable.push(self._push)
-
-    rows: ClassVar[tuple[Row, ...]] = (
-        Row(SimulationInject, lambda self, call: self.inject(call.command, call.tick), check=_check),
-    )

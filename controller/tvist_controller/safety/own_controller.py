@@ -3,17 +3,16 @@
 What that controller says becomes our state; if the robot is moved through it, what it forbids is obeyed.
 """
 
-from collections.abc import Callable
 from enum import IntEnum
 
 import msgspec
 
-from tvist_controller.commands.events import Emit
-from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_plant.plant import PlantError, RealArm, Sight
@@ -35,10 +34,8 @@ SAME_MASS = 0.05
 class RemoteStatus:
     """Mirrors what the robot's own controller says, cycle by cycle."""
 
-    def __init__(
-        self, peripherals: Peripherals, set_tcp: Callable[[tuple[float, ...]], None], emit: Emit
-    ) -> None:
-        self._peripherals, self._set_tcp, self._emit = peripherals, set_tcp, emit
+    def __init__(self, plant: RealArm, peripherals: Peripherals, emit: Emit) -> None:
+        self._plant, self._peripherals, self._emit = plant, peripherals, emit
         self._sight: Sight | None = None
         self._io: tuple[object, ...] = ()
 
@@ -52,7 +49,7 @@ class RemoteStatus:
         for why in sight.told:
             self._emit("warning", why=why)
         if sight.tool is not None and (before is None or sight.tool != before.tool):
-            self._set_tcp(sight.tool)
+            self._peripherals.set_tcp(sight.tool)
         io = sight.payload, sight.tool, sight.slider, sight.inputs, sight.outputs
         if io != self._io:
             self._io, self._peripherals.changed = io, True
@@ -71,7 +68,6 @@ class RemoteStatus:
             return io
         given = {
             "payload": self.declared(io.payload),
-            "tcp_offset": io.tcp_offset if sight.tool is None else list(sight.tool),
             "target_speed_fraction": io.target_speed_fraction if sight.slider is None else sight.slider,
             "actual_digital_input_bits": sight.inputs,
             "actual_digital_output_bits": sight.outputs,
@@ -84,16 +80,10 @@ class Watching(RemoteStatus):
     """Follows one such robot."""
 
     def __init__(
-        self,
-        plant: RealArm,
-        cycle: ControlCycle,
-        modes: RobotModes,
-        peripherals: Peripherals,
-        set_tcp: Callable[[tuple[float, ...]], None],
-        emit: Emit,
+        self, plant: RealArm, peripherals: Peripherals, emit: Emit, cycle: ControlCycle, modes: RobotModes
     ) -> None:
-        super().__init__(peripherals, set_tcp, emit)
-        self._plant, self._cycle, self._modes = plant, cycle, modes
+        super().__init__(plant, peripherals, emit)
+        self._cycle, self._modes = cycle, modes
         modes.now = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
 
     def look(self) -> int | None:
@@ -138,14 +128,13 @@ class Supervision(RemoteStatus):
     def __init__(
         self,
         plant: RealArm,
+        peripherals: Peripherals,
+        emit: Emit,
         motion: MotionControl,
         safety: SafetyControl,
-        peripherals: Peripherals,
-        set_tcp: Callable[[tuple[float, ...]], None],
-        emit: Emit,
     ) -> None:
-        super().__init__(peripherals, set_tcp, emit)
-        self._plant, self._motion, self._safety = plant, motion, safety
+        super().__init__(plant, peripherals, emit)
+        self._motion, self._safety = motion, safety
 
     def look(self) -> None:
         """Take what it has said since the last tick; to be called before each."""
@@ -176,7 +165,7 @@ class Supervision(RemoteStatus):
 
     def io(self, io: Io, *, force: bool) -> Io:
         """Return `io` with what the robot says of itself, apart from what clients set here."""
-        kept = {name: getattr(io, name) for name in ("payload", "tcp_offset", "target_speed_fraction")}
+        kept = {name: getattr(io, name) for name in ("payload", "target_speed_fraction")}
         return msgspec.structs.replace(super().io(io, force=force), **kept)
 
     def _scale(self, sight: Sight) -> None:

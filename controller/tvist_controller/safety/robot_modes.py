@@ -13,33 +13,29 @@ _KEEP_POWER = frozenset({SafetyMode.PROTECTIVE_STOP, SafetyMode.SAFEGUARD_STOP})
 
 
 class RobotModes:
-    """The modes of a robot, looked up again only when they may have changed, and the stop that keeps it from moving."""
+    """The modes of a robot, looked up when they may have changed, and the stop that keeps it from moving."""
 
     def __init__(self, motion: MotionControl) -> None:
         self._motion = motion
         self._stops: dict[SafetyMode, Event] = {}
         """Event of each stop that may still hold, by the safety mode that it caused, the newest last."""
-        self.changed = True
-        """Whether a command, an event or a program may have changed them since the last update."""
         self.now = 0, 0, 0
         """Robot mode, safety mode and runtime state."""
         self.update()
 
     def update(self) -> None:
-        """Look them up, if they may have changed; to be called in every tick."""
+        """Look them up; to be called in every tick in which they may have changed."""
         motion = self._motion
-        if not (self.changed or motion.changed):
-            return
         robot, safety = motion.robot_mode, motion.safety_mode
         if safety in _MAY_MOVE and robot is RobotMode.RUNNING:
             self._stops.clear()
         self.now = int(robot), int(safety), int(motion.runtime)
         # A paused motion comes to a standstill without any event.
-        self.changed, motion.changed = motion.activity is Activity.PAUSED, False
+        motion.changed = motion.activity is Activity.PAUSED
 
     def hear(self, event: Event) -> None:
         """Take an event, which may be a stop or end one."""
-        self.changed = True
+        self._motion.changed = True
         if event.kind not in {"protective_stop", "safety_stop"}:
             return
         cause = _cause(event, self._motion.safety_mode)

@@ -4,15 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tvist_controller.commands.events import Emit
-from tvist_controller.commands.refusal import RefusalError
+from tvist_controller.events import Emit
 from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.line.limits import REDUCED_SHARE
 from tvist_controller.line.sample import Sample
-from tvist_controller.motion.activities import PUT, at_rest
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.monitor import Monitor
-from tvist_controller.motion.safety_system import Emergency, Latched
+from tvist_controller.motion.safety_system import PUT, Emergency, Latched, at_rest
+from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.brakes import brake
 from tvist_controller.trajectory import Compliant
 from tvist_plant.plant import PERIOD, Halt, PlantError, SimulatedArm
@@ -174,6 +173,8 @@ class SafetyControl:
             self._restart_monitors()
         self._held = held
         for monitor in self.monitors:
+            if not monitor.awake and sample.measured.wrench is None:
+                continue
             if monitor.needs != "nothing" and (
                 not held
                 or (monitor.needs == "drives alone" and isinstance(motion.cycle.trajectory, Compliant))

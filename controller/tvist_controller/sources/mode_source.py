@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from tvist_controller.calibrations import available, estimator_of, load
-from tvist_controller.calibrations.modal import modal_estimator
-from tvist_plant.description import RobotDescription
-from tvist_plant.fingerprint import fingerprint
+from tvist_controller.sources.calibrations import available, estimator_of, load, modal_estimator
+from tvist_plant.description import RobotDescription, fingerprint
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.values import Payload
 from tvist_shaping.errors import EstimatorError
@@ -52,11 +50,7 @@ class ModeSource:
         return len(self.f_d) if self.name == "fixed" else 1
 
     def estimator(self, modes: int, payload: Payload) -> Estimator:
-        """Return an estimator of the lowest modes with a payload.
-
-        Raises:
-            EstimatorError: There are fewer modes, or the calibration belongs to another arm.
-        """
+        """Return an estimator of the lowest modes with a payload."""
         if modes > self.most:
             raise EstimatorError("modes", modes, f"at most {self.most}, which the estimator {self.name} has")
         if self.calibration is None:

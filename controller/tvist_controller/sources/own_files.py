@@ -8,10 +8,11 @@ import hashlib
 import re
 import sys
 import traceback
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
-from typing import Protocol
+from typing import Any, NamedTuple
 
 from tvist_plant.user_file import named, read_bytes
 
@@ -19,28 +20,17 @@ _FILE = re.compile(r"(?P<file>.*\.py)(?::(?P<attribute>.*))?", re.DOTALL)
 
 
 class OwnFileError(ValueError):
-    """A file does not contain what its user says; the message gives the file, the name and the reason."""
+    """There is no such shaper or plant, or it cannot be made; the message gives its place and the reason."""
 
 
-class MayBeOne(Protocol):
-    """Tells whether a value of a file is of the kind that is looked for, to name those that are."""
-
-    def __call__(self, value: object, *, own: bool) -> bool:
-        """Take a value, and whether it was defined in the file rather than imported."""
-
-
-@dataclass(frozen=True)
-class OwnFile:
+class OwnFile(NamedTuple):
     """What a file contains under a name."""
 
     file: str
-    """Path of the file, as it was given."""
     attribute: str
-    """Name in the file."""
     sha256: str
     """SHA-256 of the bytes that were run, in hexadecimal; it does not cover what the file imports."""
     found: object
-    """The value of that name."""
 
 
 def is_file(place: str) -> bool:
@@ -53,39 +43,47 @@ def ends(failure: BaseException) -> bool:
     return isinstance(failure, SystemExit) and type(failure) is not SystemExit
 
 
-def run_file(place: str, kind: str, error: type[OwnFileError], may_be_one: MayBeOne) -> OwnFile:
-    """Run FILE.py of FILE.py:NAME, and return what it contains under the name, if it may be one of the kind.
+def run_file(place: str, kind: str, may_be_one: Callable[[object], bool]) -> OwnFile:
+    """Run FILE.py of FILE.py:NAME, and return what it contains under the name.
 
-    Raises:
-        OwnFileError: The file or the name does not exist, or running the file raises an exception.
-        UserFileError: The file is not text, or is larger than 4 MiB.
+    If there is no such name, the message gives those whose value may be one.
     """
     named = _FILE.fullmatch(place)
     if named is None:
-        raise error(
+        raise OwnFileError(
             f"{kind} is {place!r}: must be FILE.py:NAME, a Python file and the name of a {kind} in that file"
         )
     file, attribute = named["file"], named["attribute"]
     if not attribute:
-        raise error(f"{kind} {place}: the name of the {kind} is missing: give {file}:NAME")
+        raise OwnFileError(f"{kind} {place}: the name of the {kind} is missing: give {file}:NAME")
     try:
         content = read_bytes(file, kind)
     except OSError as failure:
-        raise error(f"{kind} {place}: {file} cannot be read: {failure.strerror}") from failure
+        raise OwnFileError(f"{kind} {place}: {file} cannot be read: {failure.strerror}") from failure
     sha256 = hashlib.sha256(content).hexdigest()
-    module = _run(content, place, kind, error, sha256)
+    module = _run(content, place, kind, sha256)
     if attribute not in vars(module):
-        there = ", ".join(
-            name
-            for name, value in vars(module).items()
-            if may_be_one(value, own=getattr(value, "__module__", None) == module.__name__)
-        )
+        there = ", ".join(name for name, value in vars(module).items() if may_be_one(value))
         known = f"it contains {there}" if there else f"it contains no {kind}"
-        raise error(f"{kind} {place}: {file} does not contain {attribute}; {known}")
+        raise OwnFileError(f"{kind} {place}: {file} does not contain {attribute}; {known}")
     return OwnFile(file, attribute, sha256, vars(module)[attribute])
 
 
-def _run(content: bytes, place: str, kind: str, error: type[OwnFileError], sha256: str) -> ModuleType:
+def is_of_file(value: object) -> bool:
+    """Return whether a value can be called, and was defined in a file that was run rather than imported there."""
+    return callable(value) and str(getattr(value, "__module__", None)).startswith("tvist_own_")
+
+
+@lru_cache(maxsize=8)
+def load_again(load: Callable[[str], Any], kind: str, place: str, sha256: str) -> Any:
+    """Load a shaper or a plant again in a worker process."""
+    found = load(place)
+    if found.sha256 != sha256:
+        raise OwnFileError(f"{kind} {place}: the file has changed since it was first loaded")
+    return found
+
+
+def _run(content: bytes, place: str, kind: str, sha256: str) -> ModuleType:
     file = place.rpartition(":")[0]
     module = ModuleType(f"tvist_own_{kind}_{sha256[:16]}")
     module.__file__ = str(Path(file).resolve())
@@ -95,13 +93,11 @@ def _run(content: bytes, place: str, kind: str, error: type[OwnFileError], sha25
     except (Exception, SystemExit) as failure:
         if ends(failure):
             raise
-        frames = [
-            frame
-            for frame in traceback.extract_tb(failure.__traceback__)
-            if frame.filename == module.__file__
-        ]
-        line = failure.lineno if isinstance(failure, SyntaxError) else frames[-1].lineno if frames else None
-        where = "" if line is None else f" in line {line}"
-        words = named(failure, failure.msg if isinstance(failure, SyntaxError) else None)
-        raise error(f"{kind} {place}: running {file} raises {words}{where}") from failure
+        frames = traceback.extract_tb(failure.__traceback__)
+        lines, said = [frame.lineno for frame in frames if frame.filename == module.__file__], None
+        if isinstance(failure, SyntaxError):
+            lines, said = [failure.lineno], failure.msg
+        where = f" in line {lines[-1]}" if lines and lines[-1] is not None else ""
+        words = named(failure, said)
+        raise OwnFileError(f"{kind} {place}: running {file} raises {words}{where}") from failure
     return module

@@ -2,19 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from typing import Any
 
 from msgspec import Struct
 
-from tvist_controller.sources.own_files import OwnFileError, ends, is_file, run_file
+from tvist_controller.sources.own_files import OwnFileError, ends, is_file, is_of_file, load_again, run_file
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.foreign import called, is_plant
 from tvist_plant.plant import Plant, PlantError
 from tvist_plant.user_file import named
 from tvist_plant.variants import VARIANTS, Variant
-from tvist_plant.world.scene_file import SceneError, SceneFile, find_scene
+from tvist_plant.world.scene_file import SceneError, find_scene
 
 GROUP = "tvist.plants"
 """Group of the entry points by which installed packages offer plants."""
@@ -22,10 +21,6 @@ WORLD = "world:"
 """What precedes the name of a scene in the place of a plant that is the arm in it."""
 Maker = Callable[[RobotDescription, Payload], Plant]
 """Makes a plant of a robot's description and the payload that it carries."""
-
-
-class OwnPlantError(OwnFileError):
-    """There is no such plant, or it cannot be made; the message says why."""
 
 
 class RecordedPlant(Struct, frozen=True):
@@ -57,33 +52,30 @@ class OwnPlant:
         """Make the plant for one robot with the payload that it carries, as far as the server knows.
 
         The seed is that of what a plant of `VARIANTS` draws; others are not told.
-
-        Raises:
-            OwnPlantError: Making it fails, or what is made is not a plant.
         """
         if isinstance(self.maker, Variant):
             try:
                 return self.maker.make(description, carried, seed)
             except ValueError as error:
-                raise OwnPlantError(f"plant {self.place}: {error}") from error
+                raise OwnFileError(f"plant {self.place}: {error}") from error
         try:
             made = self.maker(description, carried)
             if is_plant(made):
                 return called(made, description.joints)
         except (PlantError, SceneError) as error:  # it says in a sentence why it cannot be made
             said = f"{error}" if self.place.startswith(WORLD) else f"plant {self.place}: {error}"
-            raise OwnPlantError(said) from error
+            raise OwnFileError(said) from error
         except (Exception, SystemExit) as error:
             if ends(error):
                 raise
-            raise OwnPlantError(f"plant {self.place}: making it raises {named(error)}") from error
-        raise OwnPlantError(
+            raise OwnFileError(f"plant {self.place}: making it raises {named(error)}") from error
+        raise OwnFileError(
             f"plant {self.place}: it makes a {type(made).__name__}, which is no plant: that has payload and step"
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the plant as its name, since a maker cannot be pickled."""
-        return _load_again, (self.place, self.sha256)
+        return load_again, (load_plant, "plant", self.place, self.sha256)
 
 
 def load_plant(place: str) -> OwnPlant:
@@ -94,25 +86,24 @@ def load_plant(place: str) -> OwnPlant:
             makes a `Plant`; or a name of `VARIANTS`, or of an entry point of the group `tvist.plants`.
 
     Raises:
-        OwnPlantError: There is none.
+        OwnFileError: There is none.
         UserFileError: The file is not text, or is larger than 4 MiB.
     """
     if place in VARIANTS:
         return OwnPlant(place, "", VARIANTS[place])
     if place.lower().startswith("ur://"):
-        raise OwnPlantError(
+        raise OwnFileError(
             f"plant {place}: it is a real arm, which only tvist serve takes: it does not do the same again, so that "
             "nothing can be replayed or compared with it"
         )
     if place.startswith(WORLD):
         return load_world(place.removeprefix(WORLD))
     if is_file(place):
-        own = run_file(place, "plant", OwnPlantError, _may_be_one)
-        found, sha256 = own.found, own.sha256
+        _, _, sha256, found = run_file(place, "plant", is_of_file)
     else:
-        found, sha256 = _installed(place), ""
+        sha256, found = "", _installed(place)
     if not callable(found):
-        raise OwnPlantError(
+        raise OwnFileError(
             f"plant {place}: it is of type {type(found).__name__}; it must be a class or a function that takes a "
             "RobotDescription and a Payload, and makes a plant"
         )
@@ -120,57 +111,30 @@ def load_plant(place: str) -> OwnPlant:
 
 
 def load_world(scene: str) -> OwnPlant:
-    """Find the arm in a scene, by its name in the package or the path of a file in MuJoCo's format.
-
-    Raises:
-        SceneError: There is none.
-    """
+    """Find the arm in a scene, by its name in the package or the path of a file in MuJoCo's format."""
     file = find_scene(scene)
-    return OwnPlant(WORLD + scene, file.sha256, partial(_in_scene, file))
 
+    def make(description: RobotDescription, carried: Payload) -> Plant:
+        try:
+            from tvist_plant.world.mujoco_arm import MujocoArm
+        except ImportError as error:
+            raise SceneError(f"world needs MuJoCo: pip install 'tvist[world]' ({error})") from error
+        return MujocoArm(description, carried, file)
 
-def _in_scene(scene: SceneFile, description: RobotDescription, carried: Payload) -> Plant:
-    """Make the arm in a scene."""
-    try:
-        from tvist_plant.world.mujoco_arm import MujocoArm
-    except ImportError as error:
-        raise OwnPlantError(f"world needs MuJoCo: pip install 'tvist[world]' ({error})") from error
-    return MujocoArm(description, carried, scene)
+    return OwnPlant(WORLD + scene, file.sha256, make)
 
 
 def named_plants() -> list[str]:
     """Names of the plants of this package, and of those that installed ones offer."""
-    return [*VARIANTS, *sorted({one.name for one in _offered()})]
+    return [*VARIANTS, *sorted(entry_points(group=GROUP).names)]
 
 
 def _installed(name: str) -> object:
-    for one in _offered():
-        if one.name == name:
-            try:
-                return one.load()
-            except (Exception, SystemExit) as error:
-                if ends(error):
-                    raise
-                raise OwnPlantError(f"plant {name}: loading {one.value} fails: {error}") from error
-    raise OwnPlantError(f"plant is {name!r}: must be FILE.py:NAME, or one of {', '.join(named_plants())}")
-
-
-def _offered() -> tuple[EntryPoint, ...]:
-    return tuple(entry_points(group=GROUP))
-
-
-def _may_be_one(value: object, *, own: bool) -> bool:
-    return own and callable(value)
-
-
-@lru_cache(maxsize=8)
-def _load_again(place: str, sha256: str) -> OwnPlant:
-    """Find a plant again in a worker process.
-
-    Raises:
-        OwnPlantError: The file has changed since it was first run, or there is no such plant.
-    """
-    found = load_plant(place)
-    if found.sha256 != sha256:
-        raise OwnPlantError(f"plant {place}: the file has changed since it was first loaded")
-    return found
+    for one in entry_points(group=GROUP, name=name):
+        try:
+            return one.load()
+        except (Exception, SystemExit) as error:
+            if ends(error):
+                raise
+            raise OwnFileError(f"plant {name}: loading {one.value} fails: {error}") from error
+    raise OwnFileError(f"plant is {name!r}: must be FILE.py:NAME, or one of {', '.join(named_plants())}")

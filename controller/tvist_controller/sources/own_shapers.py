@@ -5,13 +5,12 @@ of loaded shapers, and a recording never causes a file to be run.
 """
 
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from msgspec import Struct
 
-from tvist_controller.sources.own_files import OwnFileError, run_file
+from tvist_controller.sources.own_files import OwnFileError, is_of_file, load_again, run_file
 from tvist_shaping.errors import ShaperFailureError, ShapingError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.fir_shaper import FirShaper
@@ -21,10 +20,6 @@ from tvist_shaping.shaper import Shaper
 
 _POSTURES, _MARGIN = 64, 1.1
 """Number of postures in which an arm's modes are looked at, and the factor beyond them that a shaper has to support."""
-
-
-class OwnShaperError(OwnFileError):
-    """A file contains no such shaper; the message gives the file, the name and the reason."""
 
 
 class RecordedShaper(Struct, frozen=True):
@@ -70,7 +65,7 @@ class OwnShaper:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the shaper as the name of its file, since a function cannot be pickled."""
-        return _load_again, (self.place, self.sha256)
+        return load_again, (load_own, "shaper", self.place, self.sha256)
 
 
 def load_own(place: str) -> OwnShaper:
@@ -80,28 +75,23 @@ def load_own(place: str) -> OwnShaper:
         place: FILE.py:NAME. NAME is a function (f_d [Hz], ζ [-]) -> `Impulses`, a `Shaper` or a `FirShaper`.
 
     Raises:
-        OwnShaperError: The file or the name does not exist, running the file raises an exception, the name is not a
+        OwnFileError: The file or the name does not exist, running the file raises an exception, the name is not a
             shaper, or the shaper fails for a mode.
         UserFileError: The file is not text, or is larger than 4 MiB.
     """
-    own = run_file(place, "shaper", OwnShaperError, _may_be_one)
-    found, attribute = own.found, own.attribute
+    file, attribute, sha256, found = run_file(place, "shaper", _may_be_one)
     try:
         shaper = _shaper(found, attribute, place)
         Registry([shaper])
     except ShaperFailureError as error:
-        raise OwnShaperError(f"shaper {place} {error.why}") from error
+        raise OwnFileError(f"shaper {place} {error.why}") from error
     except ShapingError as error:
-        raise OwnShaperError(f"shaper {place}: {error}") from error
-    return OwnShaper(own.file, attribute, own.sha256, shaper)
+        raise OwnFileError(f"shaper {place}: {error}") from error
+    return OwnShaper(file, attribute, sha256, shaper)
 
 
 def check_for(own: OwnShaper, estimator: Estimator, joints: int) -> None:
-    """Try a shaper with the modes that an arm has anywhere, and a tenth beyond.
-
-    Raises:
-        OwnShaperError: It fails for one of them.
-    """
+    """Try a shaper with the modes that an arm has anywhere, and a tenth beyond."""
     looking = estimator.fork()
     anywhere = np.random.default_rng(0).uniform(-np.pi, np.pi, (_POSTURES, joints))
     f_d, zeta = np.array([looking.settle(q) for q in anywhere])[:, :, 0].T
@@ -110,7 +100,7 @@ def check_for(own: OwnShaper, estimator: Estimator, joints: int) -> None:
     try:
         check_range(own.shaper, (low, high), damped, "this arm")
     except ShaperFailureError as error:
-        raise OwnShaperError(f"shaper {own.place} {error.why}") from error
+        raise OwnFileError(f"shaper {own.place} {error.why}") from error
 
 
 def _shaper(found: object, attribute: str, place: str) -> AnyShaper:
@@ -119,25 +109,12 @@ def _shaper(found: object, attribute: str, place: str) -> AnyShaper:
         return found
     if not callable(found) or isinstance(found, type):
         kind = "a class" if isinstance(found, type) else f"of type {type(found).__name__}"
-        raise OwnShaperError(
+        raise OwnFileError(
             f"shaper {place}: {attribute} is {kind}; it must be a function (f_d, zeta) -> Impulses, a Shaper or a "
             "FirShaper of tvist_shaping"
         )
     return shaper_of(found, name=attribute)
 
 
-def _may_be_one(value: object, *, own: bool) -> bool:
-    return (own and callable(value) and not isinstance(value, type)) or isinstance(value, Shaper | FirShaper)
-
-
-@lru_cache(maxsize=8)
-def _load_again(place: str, sha256: str) -> OwnShaper:
-    """Load a shaper again in a worker process.
-
-    Raises:
-        OwnShaperError: The file has changed since it was first loaded, or cannot be loaded.
-    """
-    found = load_own(place)
-    if found.sha256 != sha256:
-        raise OwnShaperError(f"shaper {place}: the file has changed since it was first loaded")
-    return found
+def _may_be_one(value: object) -> bool:
+    return (is_of_file(value) and not isinstance(value, type)) or isinstance(value, Shaper | FirShaper)

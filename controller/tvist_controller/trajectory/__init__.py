@@ -1,16 +1,12 @@
 """Sources of references: planned motions along paths, streams of set-points, stops."""
 
 from tvist_controller.trajectory.base import Forecast, Known, Rest, Trajectory
-from tvist_controller.trajectory.compliant import Compliant
-from tvist_controller.trajectory.curve import Bends, Curve
-from tvist_controller.trajectory.double_s import DoubleS
-from tvist_controller.trajectory.force_law import ForceTask
-from tvist_controller.trajectory.guided import Guided, StuckError
+from tvist_controller.trajectory.compliant import Compliant, ForceTask
+from tvist_controller.trajectory.guided import Guided, Servo, StuckError
 from tvist_controller.trajectory.limits import MotionLimits
-from tvist_controller.trajectory.motion import PlannedMotion, at_least, quickest_motion
-from tvist_controller.trajectory.path import JointLine, Path, Way
+from tvist_controller.trajectory.motion import DoubleS, PlannedMotion, at_least, quickest_motion
+from tvist_controller.trajectory.path import Bends, Curve, JointLine, Path, Way
 from tvist_controller.trajectory.path_stop import PathStop
-from tvist_controller.trajectory.servo import Servo
 from tvist_controller.trajectory.slowed_stop import SlowedStop
 from tvist_controller.trajectory.speed import Speed
 from tvist_controller.trajectory.stop import JointStop

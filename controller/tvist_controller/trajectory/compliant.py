@@ -1,13 +1,13 @@
 """A reference that gives way to forces at the tool, while another one moves it in the other directions."""
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.rotation import turn, turned
-from tvist_controller.trajectory.base import Rest
-from tvist_controller.trajectory.force_law import ForceTask, compliant_velocity
 from tvist_controller.trajectory.guided import Following, Guided, StuckError
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
@@ -21,10 +21,70 @@ FASTEST = 0.5
 """Share of the joints' velocity that giving way may use up [-]."""
 CRAWL = 0.05
 """Share of it below which giving way counts as hindered by a singular posture [-]."""
-
+LEVER = 0.22
+"""Length by which a turn of 1 rad counts as a way: virtual inertias and dampings are its square times those [m]."""
+MASS = 70.0
+"""Virtual mass M [kg]. M/D is the time constant that keeps what the arm's elasticity adds out of the loop."""
+FREE_DAMPING = 2000.0
+"""Damping in free space at a damping parameter of 1 [N s/m]."""
+CONTACT_DAMPING = 1500.0
+"""Least damping in contact, which the stiffest surface needs [N s/m]."""
+CONTACT = 8.0
+"""Force from which on an axis counts as being in contact, and torque times 1/`LEVER` [N]."""
+RELEASE = 3.0, 3.0 / LEVER
+"""Deceleration of an axis that is no longer compliant [m/s², rad/s²]."""
 
 Frame = Callable[[tuple[Floats, Floats], Floats], Floats]
 """Axes of the task as columns in the base frame, shape (3, 3), from the tool's pose and its velocity, shape (3,)."""
+
+
+@dataclass(frozen=True)
+class ForceTask:
+    """What force control is to reach, by axes of its frame: three directions, then the turns about them."""
+
+    compliant: Floats
+    """1 for an axis along or about which the arm gives way, else 0, shape (6,)."""
+    wrench: Floats
+    """Force and torque that the arm exerts on its environment, shape (6,) [N, N m]."""
+    limits: Floats
+    """Largest speed of a compliant axis [m/s, rad/s], largest deviation of any other [m, rad], shape (6,)."""
+    damping: float = 0.005
+    """How quickly the arm slows down where nothing touches it, 0 (keeps its speed) to 1 [-]."""
+    gain: float = 1.0
+    """Factor of the difference between wanted and felt wrench, 0 to 2 [-]."""
+    mass: float = MASS
+    """Virtual mass [kg]."""
+    contact_damping: float = CONTACT_DAMPING
+    """Least damping of an axis in contact [N s/m]."""
+
+
+def free_damping(parameter: float) -> float:
+    """Damping of an axis that feels nothing, from the damping parameter, 0 to 1 [N s/m].
+
+    The fourth root spreads the useful part of the range: 0.005 gives a quarter of the whole, 0 none.
+    """
+    return FREE_DAMPING * math.sqrt(math.sqrt(parameter))
+
+
+def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats, period: float) -> Floats:
+    """Velocity of the axes of the frame a tick later, shape (6,) [m/s, rad/s].
+
+    Each compliant axis is a virtual mass with damping, M v̇ = g (w + f) - D v, with the wanted wrench w, the
+    one f that is felt from the environment, shape (6,) [N, N m], and the gain g; it is integrated implicitly,
+    so no damping is too large for a tick. Where a force is felt, D is at least that of contact. An axis that
+    is not compliant loses the speed it had when it was.
+    """
+    scale = np.repeat([1.0, LEVER * LEVER], 3)
+    touched = np.minimum(np.abs(felt) / np.repeat([CONTACT, CONTACT * LEVER], 3), 1.0)
+    free = free_damping(task.damping)
+    damping = free + max(task.contact_damping - free, 0.0) * touched
+    push = task.gain * (task.wrench + felt) / (scale * task.mass)
+    moved = (velocity + period * push) / (1.0 + period * damping / task.mass)
+    moved = np.clip(moved, -task.limits, task.limits)
+    most = period * np.repeat(RELEASE, 3)
+    released = velocity - np.clip(velocity, -most, most)
+    result: Floats = np.where(task.compliant > 0.0, moved, released)
+    return result
 
 
 class Compliant(Following):
@@ -45,7 +105,7 @@ class Compliant(Following):
         period: float,
         *,
         tool: Callable[[], Arm],  # of the tool centre point, which another one may replace at any time
-        inner: Guided | Rest,  # moves the tool otherwise, and continues from the same state
+        inner: Guided,  # moves the tool otherwise, and continues from the same state
         felt: Callable[[], Floats],  # on the tool centre point in the last tick, base frame [N, N m]
     ) -> None:
         super().__init__(state, abrupt(limits, period), reach, torque, period)
@@ -68,7 +128,7 @@ class Compliant(Following):
         """Kinematics of the tool centre point."""
         self._pose = kinematics.pose(q)
         self._twist = kinematics.inverse(q)[0] @ qd
-        nominal, moving = self.nominal, self.inner.state[1] if isinstance(self.inner, Guided) else 0.0 * qd
+        nominal, moving, _ = self.inner.state
         self._nominal, self._moved = kinematics.pose(nominal), kinematics.inverse(nominal)[0] @ moving
         """Velocity of the inner reference's tool [m/s, rad/s]."""
         self._given = self._twist - self._moved
@@ -96,13 +156,12 @@ class Compliant(Following):
     @property
     def nominal(self) -> Floats:
         """Position of the joints by the inner reference, shape (n,) [rad]."""
-        return self.inner.state[0] if isinstance(self.inner, Guided) else self.inner.next()
+        return self.inner.state[0]
 
-    def take(self, inner: Guided | Rest) -> None:
+    def take(self, inner: Guided) -> None:
         """Move the tool by another reference, which continues from where the present one is."""
         self.inner = inner
-        if isinstance(inner, Guided):
-            inner.pace(*self._speed)
+        inner.pace(*self._speed)
 
     def adopt(self, limits: MotionLimits) -> None:
         """See `Guided.adopt`."""
@@ -111,8 +170,7 @@ class Compliant(Following):
     def pace(self, speed: float, slowest: float | None) -> None:
         """Set the speed of the inner reference, and the velocity limit of all."""
         self._speed = speed, slowest
-        if isinstance(self.inner, Guided):
-            self.inner.pace(speed, slowest)
+        self.inner.pace(speed, slowest)
         super().pace(speed, slowest)
 
     def next(self) -> Floats:

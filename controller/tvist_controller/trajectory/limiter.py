@@ -4,26 +4,76 @@ import math
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 import ruckig
 
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.trajectory.limits import Floats, MotionLimits
-from tvist_controller.trajectory.within_limits import (
-    BEND,
-    DIFFERENCES,
-    FAR,
-    FIT,
-    QD,
-    QDD,
-    STEP,
-    Bools,
-    judge,
-)
+
+Bools = npt.NDArray[np.bool_]
 
 STOPS = 0.8
 """Share of the acceleration that the torque permits with which a joint must be able to stop inside its range, since
 the permitted one changes on the way [-]."""
 HEAVY = 8.0
 """Acceleration below which the torque hardly ever keeps a joint of an arm [rad/s^2]."""
+TOLERANCE = 1e-6
+"""Share by which rounding may exceed a limit [-]."""
+ROUNDING = 2e-15
+"""Error of differences by the rounding of positions [rad]."""
+STEP, BEND, QD, QDD, DIFFERENCES = range(5)
+"""Rows of differences: first and second one [rad], and as velocity and acceleration; their number."""
+FIT, FAR = 1, 2
+"""Bits of what `judge` returns: all joints fit; all are far from the ends of their range."""
+
+
+@compiled_for_ticks
+def judge(
+    q: Floats,  # shape (n,) [rad]
+    last: Floats,  # a tick earlier
+    before: Floats,  # differences a tick earlier, shape (4, n), see `DIFFERENCES`
+    velocity: float,  # limits of the first, second and third difference [rad]
+    acceleration: float,
+    jerk: float,
+    h: float,  # tick [s]
+    inner: float,  # largest position that is far from the ends of the range [rad]
+    now: Floats,  # result: differences, shape (4, n)
+    fits: Bools,  # result: which joints fit, shape (n,)
+) -> int:
+    """Find which joints' differences are and can stay within limits; return the sum of `FIT` and `FAR`."""
+    fastest = (1.0 + TOLERANCE) * velocity + ROUNDING
+    hardest = (1.0 + TOLERANCE) * acceleration + 2.0 * ROUNDING
+    harshest = (1.0 + TOLERANCE) * jerk + 4.0 * ROUNDING
+    far, free = True, True
+    for j in range(q.shape[0]):
+        step = q[j] - last[j]
+        bend = step - before[STEP, j]
+        now[STEP, j], now[BEND, j], now[QD, j], now[QDD, j] = step, bend, step / h, bend / (h * h)
+        size, turn = abs(step), abs(bend)
+        fits[j] = size <= fastest and turn <= hardest and abs(bend - before[BEND, j]) <= harshest
+        if size + turn * turn * (0.5 / jerk) > fastest:
+            free = False
+        if not abs(q[j]) <= inner:
+            far = False
+    found = FAR if far else 0
+    fit = True
+    for j in range(q.shape[0]):
+        step, bend = now[STEP, j], now[BEND, j]
+        if not free:
+            # Velocity at the time when the acceleration, reduced by a tick's worth of jerk per tick, has reached
+            # zero.
+            turn, sign = abs(bend), np.sign(bend)
+            ticks = np.floor(turn / jerk)
+            towards = step * sign + ticks * (turn - 0.5 * jerk * (ticks + 1.0))
+            # If the acceleration is rising, check its present value as well, since limiting would start from that.
+            rise = (bend - before[BEND, j]) * sign
+            present = turn + rise
+            reached = step * sign + turn / 6.0 + present / 3.0 + present * present * (0.5 / jerk)
+            falls = rise <= TOLERANCE * jerk + 4.0 * ROUNDING
+            stays = falls or reached <= fastest + 2.0 * turn
+            fits[j] = fits[j] and towards <= fastest + TOLERANCE * turn and stays
+        fit = fit and fits[j]
+    return found + FIT if fit else found
 
 
 class TorqueRoom(Protocol):
@@ -49,10 +99,6 @@ class Limiter:
     velocity and acceleration, so that it also catches up with a moving signal.
     """
 
-    TOLERANCE = 1e-6
-    """Share by which rounding may exceed a limit [-]."""
-    ROUNDING = 2e-15
-    """Error of differences by the rounding of positions [rad]."""
     ADVANTAGE = 0.001
     """Share of the velocity limit by which a joint that lags behind may always be faster than its signal [-]."""
     NEAR = 1e-4
@@ -94,19 +140,9 @@ class Limiter:
         ramp, swing = limits.acceleration / limits.jerk, limits.velocity / slow
         lasting = max(swing + ramp, 2.0 * math.sqrt(limits.velocity / limits.jerk))
         inner = float(self._reach.min()) - 2.0 * limits.velocity * (ramp + lasting)
-        room = 1.0 + self.TOLERANCE
-        self._most = np.array(
-            (
-                room * limits.velocity * period + self.ROUNDING,
-                room * limits.acceleration * period**2 + 2.0 * self.ROUNDING,
-                room * limits.jerk * period**3 + 4.0 * self.ROUNDING,
-                limits.jerk * period**3,
-                self.TOLERANCE,
-                self.ROUNDING,
-                inner,
-                period,
-            )
-        )
+        self._most = (
+            limits.velocity * period, limits.acceleration * period**2, limits.jerk * period**3, period, inner,
+        )  # fmt: skip
         self._catcher, self._brake = ruckig.Ruckig(n, period), ruckig.Ruckig(n, period)
         self._catch_request, self._brake_request = ruckig.InputParameter(n), ruckig.InputParameter(n)
         self._brake_request.control_interface = ruckig.ControlInterface.Velocity
@@ -128,7 +164,7 @@ class Limiter:
     def follow(self, q: Floats, qd: Floats) -> Floats:
         """Advance by one tick towards a moving position; return the reference, shape (n,) [rad]."""
         now, fits = np.empty((DIFFERENCES, len(q))), np.empty(len(q), dtype=np.bool_)
-        found = judge(q, self.q, self._now, self._most, now, fits)
+        found = judge(q, self.q, self._now, *self._most, now, fits)
         if self._behind is not None:
             fits &= ~self._behind | self._meets(qd, now)
         if not found & FAR:

@@ -4,9 +4,9 @@ import copy
 from typing import Protocol, Self
 
 import numpy as np
+import ruckig
 
 from tvist_controller.trajectory.base import Forecast, Trajectory
-from tvist_controller.trajectory.double_s import DoubleS
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.pace import Pace
 from tvist_controller.trajectory.path import Path
@@ -42,6 +42,51 @@ class TimeLaw(Protocol):
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], with m numbers each."""
+
+
+class DoubleS:
+    """Time-optimal motion from rest to rest within limits, shape (m,) [rad], all entries in phase.
+
+    The entry with the longest way determines the duration (Biagiotti and Melchiorri 2008, ch. 3.4). With the paper's
+    limits of 1.5 rad/s, 2.0 rad/s² and 100 rad/s³, the acceleration ramps last 20 ms.
+
+    Raises:
+        ValueError: There is no such motion within these limits, or it would last for hours.
+    """
+
+    def __init__(self, start: Floats, end: Floats, limits: MotionLimits) -> None:
+        m = len(start)
+        request = ruckig.InputParameter(m)
+        request.current_position, request.target_position = start.tolist(), end.tolist()
+        request.max_velocity = [limits.velocity] * m
+        request.max_acceleration = [limits.acceleration] * m
+        request.max_jerk = [limits.jerk] * m
+        request.synchronization = ruckig.Synchronization.Phase
+        self._trajectory = ruckig.Trajectory(m)
+        try:
+            ruckig.Ruckig(m).calculate(request, self._trajectory)
+        except (ruckig.RuckigError, ValueError) as error:  # ruckig's way to fail above 7600 s
+            raise ValueError(
+                f"no motion goes from {start.tolist()} to {end.tolist()} in less than two hours within "
+                f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
+            ) from error
+        self.limits = limits
+        """Limits that it keeps."""
+        self.begins = 0.0
+        """Time from which on it is known [s]."""
+        self.duration = float(self._trajectory.duration)
+        """Duration from rest to rest [s]."""
+        # The motion from rest to rest is symmetric in time: it brakes for as long as it accelerates.
+        leading = self._trajectory.profiles[0][int(np.argmax(np.abs(end - start)))]
+        self.brakes_at = self.duration - sum(leading.t[:3])
+        """Time at which it begins to slow down [s]."""
+        self.moments: Floats = np.cumsum(leading.t)
+        """Times at which the jerk changes, so that velocity or acceleration may be largest [s]."""
+
+    def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
+        """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], with m numbers each."""
+        position, velocity, acceleration = self._trajectory.at_time(time)[:3]
+        return position, velocity, acceleration
 
 
 class PlannedMotion(Trajectory):
@@ -113,8 +158,9 @@ class PlannedMotion(Trajectory):
             self._ticks += 1
         else:
             time = self.time
-            ends = (time, time + LOOK_AHEAD * self._period)
-            curve = [self._paced(end) for end in ends]
+            most, ends = self.agility.acceleration, (time, time + LOOK_AHEAD * self._period)
+            states = (np.array(self.law.at(end)) for end in ends)
+            curve = [self.path.paced(x, xd, xdd, most) for x, xd, xdd in states]
             step = self._pace.advance(self.speed, curve)
             self._since, self._ticks = time + step, 0
         time = self.time
@@ -128,10 +174,6 @@ class PlannedMotion(Trajectory):
         self.law, self.agility = longer.law, longer.agility
         self.limits, self.duration = longer.limits, longer.duration
         self._pace.limits = self.agility
-
-    def _paced(self, time: float) -> Floats:
-        x, xd, xdd = (np.array(values) for values in self.law.at(time))
-        return self.path.paced(x, xd, xdd, self.agility.acceleration)
 
     @property
     def rate(self) -> float:

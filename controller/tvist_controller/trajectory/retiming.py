@@ -74,7 +74,8 @@ def passes(
     count, rows = p.shape
     begun = len(known)
     b = np.zeros(count + 1)
-    b[:begun] = known
+    for number in range(begun):
+        b[number] = known[number]
     for number in range(begun, count):
         b[number] = min(highest[number - 1], highest[number])
     for number in range(count - 1, begun - 1, -1):
@@ -187,17 +188,14 @@ class RetimedLaw:
         braking = int(np.flatnonzero(accelerations < 0.0)[0])
         self.brakes_at = float(times[braking]) / rate
         """Time at which it begins to slow down [s]."""
-        jerk = self.jerk_from(-np.inf if b[0] == 0.0 else start + ramp)
+        changes = np.concatenate((times + SHORTLY, times + ramp - SHORTLY))
+        changes = changes if b[0] == 0.0 else changes[changes >= start + ramp]
+        jerk = (
+            float(np.abs(self._before(changes)[3] - self._before(changes - ramp)[3]).max(initial=0.0)) / ramp
+        )
         most = float(np.abs(accelerations).max())
         self.limits = MotionLimits(float(speeds.max()) * rate, most * rate**2, jerk * rate**3)
         """Limits that it keeps."""
-
-    def jerk_from(self, time: float) -> float:
-        """Largest jerk from a time on, at a rate of 1 [1/s^3]."""
-        changes = np.concatenate((self.times + SHORTLY, self.times + self.ramp - SHORTLY))
-        changes = changes[changes >= time]
-        late, early = self._before(changes)[3], self._before(changes - self.ramp)[3]
-        return float(np.abs(late - early).max(initial=0.0)) / self.ramp
 
     @property
     def moments(self) -> Floats:

@@ -24,7 +24,9 @@ ROUNDING = 1e-9
 USED = 0.95
 """Share of the joints' acceleration that the tool is planned with; the rest is for the curvature within a tick [-]."""
 LOST_SHARE = 1e-3
-"""Share of a twist in lost directions above which joints that stand cannot begin it [-]."""
+"""Share of a twist in lost directions above which joints that stand cannot begin it, more than what rounding and a
+nearly singular posture cost [-].
+"""
 
 
 class Speed(Guided):
@@ -147,9 +149,8 @@ class Speed(Guided):
             self._step = h * self._qd
         else:
             jacobian, self._inverse = self.arm.inverse(self._q + 0.5 * self._step)
-            if not self._u.any() and _exceeds(
-                self._goal - jacobian @ (self._inverse @ self._goal), self._goal
-            ):
+            lost, most = self._goal - jacobian @ (self._inverse @ self._goal), np.abs(self._goal).max()
+            if not self._u.any() and np.abs(lost).max() > LOST_SHARE * most:
                 raise StuckError(
                     "the joints cannot move the tool in its direction from this singular posture"
                 )
@@ -157,7 +158,8 @@ class Speed(Guided):
         ranges, duration = self._ranges(), self.duration
         most = np.repeat(self._accelerations, len(self._u) // len(self._most))
         for share in self._shares():
-            part = part_of(duration, share * self.rate * h)
+            time = share * self.rate * h
+            part = 1.0 if duration <= time * (1.0 + ROUNDING) else time / duration
             u = self._goal if part == 1.0 else self._u + part * (self._goal - self._u)
             given = np.array((self.rate, self._wanted_rate, self._slowest, limits.acceleration, self._lag, h))
             place, q = np.empty((4, 3)), np.empty_like(self._q)
@@ -191,7 +193,11 @@ class Speed(Guided):
         """
         h, limits, speed = self._period, self._arm_limits, np.abs(self._qd)
         most = (1.0 + ROUNDING if self.arm is None else USED) * limits.acceleration
-        rise = np.minimum(rise_within(speed, limits, h), most)
+        # A stop ends the present acceleration with the limit's jerk, and the joint gets faster until it has. Two ticks
+        # are reserved, since the acceleration of the newest reference is known as the mean of two ticks.
+        left, two = np.maximum(limits.velocity - speed, 0.0), 2.0 * h
+        rise = limits.jerk * (np.sqrt(two * two + 2.0 * left / limits.jerk) - two)
+        rise = np.minimum(np.minimum(rise, limits.acceleration), most)
         up, down = np.where(self._qd > 0.0, rise, most), np.where(self._qd < 0.0, rise, most)
         return np.stack((-down * self._lag, up * self._lag, h * np.maximum(limits.velocity, speed)))
 
@@ -216,26 +222,3 @@ class Speed(Guided):
 def abrupt(limits: MotionLimits, period: float) -> MotionLimits:
     """Return limits with which the joints may change the sign of their acceleration within a tick."""
     return MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
-
-
-def part_of(duration: float, time: float) -> float:
-    """Return the part of a change of some duration that is made in a time [s]; exactly 1 if the time suffices."""
-    return 1.0 if duration <= time * (1.0 + ROUNDING) else time / duration
-
-
-def rise_within(speed: Floats, limits: MotionLimits, period: float) -> Floats:
-    """Return the acceleration at which joints of a speed, shape (n,), may get faster, so that a stop keeps the limit.
-
-    A stop ends the present acceleration with the limit's jerk, and the joint gets faster until it has. Two ticks are
-    reserved, since the acceleration of the newest reference is known as the mean of two ticks.
-    """
-    left, two = np.maximum(limits.velocity - speed, 0.0), 2.0 * period
-    rise: Floats = np.minimum(
-        limits.jerk * (np.sqrt(two * two + 2.0 * left / limits.jerk) - two), limits.acceleration
-    )
-    return rise
-
-
-def _exceeds(lost: Floats, twist: Floats) -> bool:
-    """Return whether what is lost of a twist is more than rounding and what a nearly singular posture costs."""
-    return float(np.abs(lost).max()) > LOST_SHARE * float(np.abs(twist).max())

@@ -7,6 +7,7 @@ import numpy as np
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.kinematics.pose import locate, newton, pseudo_inverse
 from tvist_controller.kinematics.rotation import turn_into
+from tvist_kernels.compiling import inlined
 from tvist_plant.model import Floats
 
 FOUND, IMPOSSIBLE, SINGULAR = 0, 1, 2
@@ -43,7 +44,7 @@ def fitting_rates(x: Floats, y: Floats, low: Floats, high: Floats) -> tuple[floa
     return lowest, highest
 
 
-@compiled_for_ticks
+@inlined
 def rate_by_bend(
     chain: Floats, q: Floats, slope: Floats, u: Floats, ahead: float, acceleration: float
 ) -> float:
@@ -52,8 +53,10 @@ def rate_by_bend(
     Near a singular posture the joints' way bends: its second derivative times the speed squared accelerates them.
     """
     n = len(q)
-    jacobian, inverse = np.empty((6, n)), np.empty((n, 6))
-    locate(chain, q + ahead * slope, np.empty((3, 3)), np.empty(3), jacobian)
+    jacobian, inverse, later_q = np.empty((6, n)), np.empty((n, 6)), np.empty(n)
+    for i in range(n):
+        later_q[i] = q[i] + ahead * slope[i]
+    locate(chain, later_q, np.empty((3, 3)), np.empty(3), jacobian)
     pseudo_inverse(jacobian, inverse)
     bend = 1e-9
     for i in range(n):
@@ -66,7 +69,7 @@ def rate_by_bend(
 
 
 @compiled_for_ticks
-def speed_step(  # noqa: C901  a kernel: its branches are loops
+def speed_step(  # noqa: C901, PLR0912  a kernel: its branches are loops
     chain: Floats,  # to the tool centre point; no links if the velocities are those of the joints
     inverse: Floats,  # pseudo-inverse of the Jacobian in mid-tick, shape (n, 6); else the unit matrix
     joints: Floats,  # present positions [rad] and the step to them [rad], shape (2, n)
@@ -86,34 +89,43 @@ def speed_step(  # noqa: C901  a kernel: its branches are loops
     rate, speed, slowest, acceleration, lag, h = given[0], given[1], given[2], given[3], given[4], given[5]
     n, straight = len(q), chain.shape[0] > 0
     present, u = velocities[0], velocities[1]
-    before, slope = np.zeros(n), np.zeros(n)
+    before, slope, after = np.zeros(n), np.zeros(n), np.empty(n)
+    gained, kept, lost, fastest, sharpest = np.empty(n), np.empty(len(u)), np.empty(len(u)), 0.0, 0.0
     for i in range(n):
         for m in range(len(u)):
             before[i] += inverse[i, m] * (0.5 * h * rate * present[m])
             slope[i] += inverse[i, m] * u[m]
-    after = 0.5 * h * slope
-    lowest, highest = fitting_rates(before - joints[1], after, ranges[0], ranges[1])
-    if not straight and np.max(change) == 0.0:
+        after[i], gained[i] = 0.5 * h * slope[i], before[i] - joints[1, i]
+        fastest = max(fastest, abs(slope[i]))
+    for m in range(len(u)):
+        kept[m], lost[m], sharpest = -rate * present[m], -change[m], max(sharpest, change[m])
+    lowest, highest = fitting_rates(gained, after, ranges[0], ranges[1])
+    if not straight and sharpest == 0.0:
         lowest = highest = rate  # joints may always keep their velocities
     if lowest > min(highest, max(rate, speed)) or highest < 0.0:
         return IMPOSSIBLE, rate
-    least, most = fitting_rates(-rate * present, u, -change, change)
-    fastest = np.max(np.abs(slope))
+    least, most = fitting_rates(kept, u, lost, change)
     wanted = speed
     if wanted != rate:  # the present rate is possible, but for rounding
         wanted = min(max(wanted, least), most)
     if straight and fastest > 0.0:
         ahead = min(LOOK * h * max(wanted, SLOWEST), FARTHEST_LOOK / fastest)
         permitted = rate_by_bend(chain, joints[0], slope, u, ahead, acceleration)
-        permitted = min(permitted, slowest / np.max(np.abs(slope)))
+        for i in range(n):
+            fastest = max(fastest, slope[i])
+        permitted = min(permitted, slowest / fastest)
         if permitted < SLOWEST:
             return SINGULAR, rate
         wanted = min(wanted, permitted)
     new = max(min(wanted, highest), lowest, 0.0)
-    q[:] = joints[0] + before + new * after
+    for i in range(n):
+        q[i] = joints[0, i] + before[i] + new * after[i]
     if straight:
-        mean = 0.5 * h * (rate * present + new * u)
-        goal[3] = place[3] + mean[:3]
+        mean = np.empty(6)
+        for m in range(6):
+            mean[m] = 0.5 * h * (rate * present[m] + new * u[m])
+        for k in range(3):
+            goal[3, k] = place[3, k] + mean[k]
         turn_into(mean[3:], place[:3], goal[:3])
         if not newton(chain, goal[:3], goal[3], inverse, CORRECTIONS, q, np.empty(6)) <= OFF:
             return IMPOSSIBLE, rate

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_controller._compiled import compiled
-from tvist_controller.trajectory.curve import Bends, Curve
 from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.path import Bends, Curve
 
 SAMPLES = np.linspace(0.0, 1.0, 9)
 """Places in each interval at which derivatives are sampled for their bounds."""

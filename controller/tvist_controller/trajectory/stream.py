@@ -2,13 +2,13 @@
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tvist_controller.trajectory.b_spline import cubic, linear
-from tvist_controller.trajectory.base import Trajectory
-from tvist_controller.trajectory.limiter import Limiter, TorqueRoom
+from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.trajectory.guided import Following
+from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.play_out import PlayOut
 from tvist_controller.trajectory.stop import JointStop
@@ -17,7 +17,7 @@ BRIDGED = 2
 """Largest number of consecutive missing set-points that are extrapolated."""
 
 
-class SetpointStream(Trajectory):
+class SetpointStream(Following):
     """A reference generated from a client's set-points.
 
     At the controller's own rate, set-points pass through unchanged. Slower ones are the control points of a cubic
@@ -29,9 +29,6 @@ class SetpointStream(Trajectory):
     set-point. The result passes through the `Limiter`.
     """
 
-    limits: MotionLimits
-    foreseeable = False
-
     def __init__(
         self,
         q: Floats,  # at which the arm is at rest, shape (n,) [rad]
@@ -42,16 +39,12 @@ class SetpointStream(Trajectory):
         reach: Floats | None = None,  # largest |q| of each joint, shape (n,) [rad]; None for no limit
         torque: TorqueRoom | None = None,  # None for no limit
     ) -> None:
-        self._rest = np.array(q, dtype=float)
+        self._rest, still = np.array(q, dtype=float), np.zeros(len(q))
+        reach = np.full(len(q), np.inf) if reach is None else reach
+        super().__init__((self._rest, still, still), limits, reach, torque, period)
         self._ticks = max(round(stream_period / period, 9), 1.0)
         direct = self._ticks == 1.0
         self._curve, self._look_ahead = (linear, 1) if direct else (cubic, 2)
-        self._period = period
-        self.limits = limits
-        """Limits of the reference."""
-        self._reach = math.inf if reach is None else np.array(reach, dtype=float)
-        self._torque = torque
-        self._limiter = Limiter(self._rest, limits, period, reach=reach, torque=torque)
         self._play_out: PlayOut | None = None
         self._waiting: dict[int, Floats] = {}
         self._heard: list[int] = []
@@ -99,13 +92,8 @@ class SetpointStream(Trajectory):
 
     def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:
         """Keep lower limits from now on, if the filter needs that; see `Trajectory.adapt`."""
-        limits = spared(self.limits)
-        if limits != self.limits:
-            state, self.limits = self.state, limits
-            reach = np.broadcast_to(self._reach, state[0].shape)
-            self._limiter = Limiter(
-                state[0], limits, self._period, reach=reach, torque=self._torque, state=state
-            )
+        if (limits := spared(self.limits)) != self.limits:
+            self.adopt(limits)
 
     @property
     def end(self) -> JointStop:
@@ -119,11 +107,6 @@ class SetpointStream(Trajectory):
         return False
 
     @property
-    def state(self) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the reference, each of shape (n,)."""
-        return self._limiter.state
-
-    @property
     def delay(self) -> float:
         """Time from the arrival of the earliest set-points until the curve reaches them [s]."""
         return 0.0 if self._play_out is None else self._play_out.delay * self._period
@@ -133,7 +116,10 @@ class SetpointStream(Trajectory):
         play_out, newest = self._play_out, max(self._waiting)
         self.sequence = newest
         if play_out is None:
-            play_out = self._begin(min(self._waiting))
+            first = min(self._waiting)
+            self._real.extend(((first - 2, self._rest), (first - 1, self._rest)))
+            self._head = first - 1
+            play_out = self._play_from(first)
         if newest in self._heard and play_out.breaks(newest):
             # After a gap, or if the sender is ahead of its own clock, continue with the newest.
             play_out = self._restart(newest)
@@ -145,11 +131,6 @@ class SetpointStream(Trajectory):
                 # It was replaced meanwhile, but later replacements should take it into account.
                 self._keep(sequence, self._waiting.pop(sequence))
                 self.late += 1
-
-    def _begin(self, first: int) -> PlayOut:
-        self._real.extend(((first - 2, self._rest), (first - 1, self._rest)))
-        self._head = first - 1
-        return self._play_from(first)
 
     def _restart(self, newest: int) -> PlayOut:
         """Continue with the newest set-point; the others that wait become the curve's last points."""
@@ -216,8 +197,68 @@ class SetpointStream(Trajectory):
     def _wait(self) -> tuple[Floats, Floats]:
         """Come to rest, and wait until the stream continues."""
         if self._pause is None:
-            limits = self.limits
-            self._pause = JointStop(
-                *self.state, acceleration=limits.acceleration, jerk=limits.jerk, period=self._period
-            )
+            self._pause = self.end
         return self._pause.next(), self._pause.velocity
+
+
+def linear(
+    points: Sequence[Floats],  # the last four, each of shape (n,)
+    u: float,  # place between the last two, 0 < u ≤ 1; at 1 the value is exactly the last point [-]
+    rate: float,  # of u [1/s]
+) -> tuple[Floats, Floats, float]:
+    """Interpolate linearly between the last two points; the slope is that of the parabola through the last three.
+
+    Returns the value, its derivative with respect to time, and the largest absolute value of that.
+    """
+    found = np.empty((2, len(points[0])))
+    fastest = on_parabola(points[1], points[2], points[3], u, rate, found)
+    return found[0], found[1], fastest
+
+
+def cubic(points: Sequence[Floats], u: float, rate: float) -> tuple[Floats, Floats, float]:
+    """Evaluate the uniform cubic B-spline between the middle two of four points; see `linear`.
+
+    Its second derivative varies linearly from one second difference of the points to the next, and its third
+    derivative is their third difference, so it keeps the points' limits of velocity, acceleration and jerk. The curve
+    passes the points at a distance of q''/6, on the inside of the bend (de Boor 1978, ch. IX to XI).
+    """
+    v = 1.0 - u
+    found = np.empty((2, len(points[0])))
+    inner = (1.0 + u * (3.0 + u * (3.0 - 2.0 * u))) / 6.0
+    values, slopes = (v**3 / 6.0, inner, u**3 / 6.0), (0.5 * v * v, 0.5 + u * v, 0.5 * u * u)
+    fastest = on_cubic(points[0], points[1], points[2], points[3], values, slopes, rate, found)
+    return found[0], found[1], fastest
+
+
+@compiled_for_ticks
+def on_parabola(before: Floats, middle: Floats, last: Floats, u: float, rate: float, found: Floats) -> float:
+    """Compute what `linear` returns: value and derivative, shape (2, n), and the largest derivative."""
+    fastest = 0.0
+    for j in range(last.shape[0]):
+        fall, rise = middle[j] - before[j], last[j] - middle[j]
+        found[0, j] = last[j] if u == 1.0 else middle[j] + u * rise
+        found[1, j] = rate * (rise + (u - 0.5) * (rise - fall))
+        fastest = max(fastest, abs(found[1, j]))
+    return fastest
+
+
+@compiled_for_ticks
+def on_cubic(
+    first: Floats,
+    second: Floats,
+    third: Floats,
+    fourth: Floats,
+    values: tuple[float, float, float],
+    slopes: tuple[float, float, float],
+    rate: float,
+    found: Floats,
+) -> float:
+    """Compute what `cubic` returns, as `on_parabola`, from the weights of the points' differences."""
+    fastest = 0.0
+    for j in range(first.shape[0]):
+        # Use differences, so that equal points give exactly their own value.
+        a, b, c = second[j] - first[j], third[j] - second[j], fourth[j] - third[j]
+        found[0, j] = second[j] - values[0] * a + values[1] * b + values[2] * c
+        found[1, j] = rate * (slopes[0] * a + slopes[1] * b + slopes[2] * c)
+        fastest = max(fastest, abs(found[1, j]))
+    return fastest

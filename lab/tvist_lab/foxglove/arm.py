@@ -76,7 +76,7 @@ def arm_of(content: RecordingFile) -> Arm:
         )
     try:
         robot = checked((content.start or {})["description"], RobotDescription)
-        check(robot, content.path)
+        check(robot)
     except (ProtocolError, UserFileError) as error:
         raise RecordingError(f"{content.path} holds a robot that cannot be drawn: {error}") from error
     if content.recording.joints != robot.joints:

@@ -6,6 +6,7 @@ The equations are in `tvist_shaping.estimators.modal`; for eigenvalues that ente
 import numpy as np
 import numpy.typing as npt
 
+from tvist_kernels.compiling import inlined
 from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
 
@@ -41,16 +42,20 @@ def follow(mass: Floats, rows: Floats, poles: Complex, shapes: Complex, scratch:
     """
     L = mass.shape[0]
     before = scratch[L:]
-    before[:, 0] = poles
-    before[:, 1:] = shapes
+    for k in range(poles.shape[0]):
+        before[k, 0] = poles[k]
+        for i in range(L):
+            before[k, 1 + i] = shapes[k, i]
     if _converge(mass, rows, poles, shapes, scratch[:L]):
         return True
-    poles[:] = before[:, 0]
-    shapes[:] = before[:, 1:]
+    for k in range(poles.shape[0]):
+        poles[k] = before[k, 0]
+        for i in range(L):
+            shapes[k, i] = before[k, 1 + i]
     return False
 
 
-@compiled
+@inlined
 def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coordinates
     mass: Floats, rows: Floats, poles: Complex, shapes: Complex, matrix: Complex
 ) -> bool:

@@ -5,6 +5,8 @@ its own beside the chain, and a gear is the spring of a fixed tendon between its
 flange hangs on one body, so that the wrench between the two is what a sensor there feels.
 """
 
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 import pinocchio as pin
@@ -17,24 +19,24 @@ LOAD = "load"
 """Name of the body that all beyond the flange is part of: the payload, and the fingers of a gripper."""
 
 
-def joint_name(number: int) -> str:
-    """Name of a joint's hinge."""
-    return f"joint {number}"
+class Hinges(NamedTuple):
+    """Numbers of the arm's hinges among a model's coordinates."""
 
+    joints: NDArray[np.int64]
+    motors: NDArray[np.int64]
+    flexes: NDArray[np.int64]
+    """Virtual joints about y and z of each link that bends."""
 
-def motor_name(number: int) -> str:
-    """Name of a rotor's hinge."""
-    return f"motor {number}"
-
-
-def flex_name(number: int, axis: str) -> str:
-    """Name of the virtual joint by which a link bends about an axis, y or z."""
-    return f"flex {number} {axis}"
-
-
-def flex_names(description: RobotDescription) -> list[str]:
-    """Names of all virtual joints, in the order of MuJoCo's coordinates."""
-    return [flex_name(number, axis) for number in description.link_flexibility.links for axis in "yz"]
+    @classmethod
+    def of(cls, description: RobotDescription, model: "mujoco.MjModel") -> "Hinges":
+        """Find them by their names."""
+        numbers = range(description.joints)
+        names = (
+            [f"joint {number}" for number in numbers],
+            [f"motor {number}" for number in numbers],
+            [f"flex {number} {axis}" for number in description.link_flexibility.links for axis in "yz"],
+        )
+        return cls(*(np.array([model.joint(one).dofadr[0] for one in row], np.int64) for row in names))
 
 
 def link_name(description: RobotDescription, number: int) -> str:
@@ -55,29 +57,31 @@ def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -
     spec.option.disableflags = int(
         mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_AUTORESET
     )
-    frame = spec.worldbody
+    frame = spec.worldbody  # its joints are hinges, which is MuJoCo's default
     for number in range(description.joints):
         place = link_frame(description, number)
         turn = np.roll(pin.Quaternion(place.rotation).coeffs(), 1).tolist()  # MuJoCo has the scalar first
         body = frame.add_body()
-        body.add_joint(name=joint_name(number), type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+        body.add_joint(name=f"joint {number}", axis=[0, 0, 1])
         if number in stiffness_of:
             a, d = kinematics.a[number], kinematics.d[number]
-            near, far = _lump_places(description, number)
+            x, y, z = links.com[number]
+            away = float(np.sqrt(links.inertia[number][3] / links.mass[number]))
+            # The two halves of the link in its frame, the one nearer to its joint first.
+            near, far = sorted((x - away, x + away), key=lambda place: abs(place + a))
             lump, Ixx = links.mass[number] / 2, links.inertia[number][0]
             small = (Ixx / 2, 0.0, 0.0, Ixx / 2, 0.0, Ixx / 2)
-            add_mass(body.add_body(pos=[a, 0, d], quat=turn), lump, near, small)
+            add_mass(body.add_body(pos=[a, 0, d], quat=turn), lump, (near, y, z), small)
             body = body.add_body(pos=[a / 2, 0, d])
             for axis, direction in (("y", [0, 1, 0]), ("z", [0, 0, 1])):
                 body.add_joint(
-                    name=flex_name(number, axis),
-                    type=mujoco.mjtJoint.mjJNT_HINGE,
+                    name=f"flex {number} {axis}",
                     axis=direction,
                     stiffness=stiffness_of[number],
                     damping=stiffness_of[number] * flexibility.damping_time,
                 )
             frame = body.add_body(name=link_name(description, number), pos=[a / 2, 0, 0], quat=turn)
-            add_mass(frame, lump, far, small)
+            add_mass(frame, lump, (far, y, z), small)
         else:
             frame = body.add_body(
                 name=link_name(description, number), pos=place.translation.tolist(), quat=turn
@@ -87,8 +91,7 @@ def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -
         rotor = spec.worldbody.add_body()
         add_mass(rotor, 1.0, (0.0, 0.0, 0.0), (B, 0.0, 0.0, B, 0.0, B))
         rotor.add_joint(
-            name=motor_name(number),
-            type=mujoco.mjtJoint.mjJNT_HINGE,
+            name=f"motor {number}",
             axis=[0, 0, 1],
             damping=drives.velocity_gain[number] + drives.coulomb_friction[number] / drives.friction_width,
         )
@@ -97,8 +100,8 @@ def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -
             damping=drives.gear_damping[number],
             springlength=[0.0, 0.0],
         )
-        gear.wrap_joint(joint_name(number), 1.0)
-        gear.wrap_joint(motor_name(number), -1.0)
+        gear.wrap_joint(f"joint {number}", 1.0)
+        gear.wrap_joint(f"motor {number}", -1.0)
     load = frame.add_body(name=LOAD, mass=payload.mass, ipos=list(payload.com), explicitinertial=True)
     load.inertia, load.iquat = principal(payload.inertia)
     return spec
@@ -116,11 +119,6 @@ def principal(inertia: Tensor) -> tuple[list[float], list[float]]:
     return np.maximum(moments, 1e-9).tolist(), np.roll(pin.Quaternion(axes).coeffs(), 1).tolist()
 
 
-def places(model: "mujoco.MjModel", names: list[str]) -> NDArray[np.int64]:
-    """Numbers of hinges among a model's coordinates."""
-    return np.array([model.joint(name).dofadr[0] for name in names], dtype=np.int64)
-
-
 def carry(model: "mujoco.MjModel", payload: Payload) -> None:
     """Give the body beyond the flange another payload."""
     load = model.body(LOAD).id
@@ -133,9 +131,7 @@ def settle(
     description: RobotDescription, model: "mujoco.MjModel", data: "mujoco.MjData", q: Floats
 ) -> Floats:
     """Set static equilibrium with the motors at q; return the torques of gravity on the joints, shape (n,) [N m]."""
-    numbers, flexes = range(description.joints), places(model, flex_names(description))
-    joints = places(model, [joint_name(number) for number in numbers])
-    motors = places(model, [motor_name(number) for number in numbers])
+    joints, motors, flexes = Hinges.of(description, model)
     mujoco.mj_resetData(model, data)
     gravity = np.zeros(model.nv)
     for _ in range(20):
@@ -152,14 +148,3 @@ def add_mass(body: "mujoco.MjsBody", mass: float, com: tuple[float, float, float
     xx, xy, xz, yy, yz, zz = inertia
     body.mass, body.ipos, body.fullinertia = mass, list(com), [xx, yy, zz, xy, xz, yz]
     body.explicitinertial = True
-
-
-def _lump_places(
-    description: RobotDescription, number: int
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Return the positions of a bending link's two halves in its frame, the one nearer to its joint first."""
-    x, y, z = description.links.com[number]
-    arm = float(np.sqrt(description.links.inertia[number][3] / description.links.mass[number]))
-    joint = -description.kinematics.a[number]
-    near, far = sorted((x - arm, x + arm), key=lambda place: abs(place - joint))
-    return (near, y, z), (far, y, z)

@@ -58,9 +58,6 @@ def add_pairs(spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names) -> Con
     """Add every pair of shapes that may touch; those of the arm, by their names, do not touch one another.
 
     All shapes of the world have names; the model is the same world, compiled.
-
-    Raises:
-        SceneError: There are too many.
     """
     own = {frozenset((pair.geomname1, pair.geomname2)) for pair in spec.pairs}
     apart = {frozenset((one.bodyname1, one.bodyname2)) for one in spec.excludes}
@@ -88,7 +85,8 @@ def add_pairs(spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names) -> Con
 
 def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
     """Give each pair of `add_pairs` its spring and damper, for the masses that the world has now."""
-    _count_turning(model)
+    if given:
+        _count_turning(model)
     for number, (stiffness, damping) in enumerate(given):
         if model.pair_solimp[number][0] != IMPEDANCE:
             continue  # the scene's own pair is as its file says
@@ -96,7 +94,9 @@ def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
             continue  # no force moves either
         k = STIFFNESS if stiffness is None else stiffness
         c = 2.0 * DAMPING_RATIO * np.sqrt(k / inverse) if damping is None else damping
-        model.pair_solref[number] = np.array([-k * inverse, -c * inverse]) / _points(model, number)
+        kinds = {int(model.geom_type[geom]) for geom in (model.pair_geom1[number], model.pair_geom2[number])}
+        points = FACES if kinds <= _FLAT else 1
+        model.pair_solref[number] = np.array([-k * inverse, -c * inverse]) / points
         model.pair_solreffriction[number] = [0.0, -GRIP * IMPEDANCE]
 
 
@@ -115,11 +115,7 @@ def _count_turning(model: "mujoco.MjModel") -> None:
 
 
 def check_masses(model: "mujoco.MjModel", timestep: float) -> None:
-    """Check that no body is too light for the springs that it may touch.
-
-    Raises:
-        SceneError: One is; it would fly apart.
-    """
+    """Check that no body is too light for the springs that it may touch."""
     for number in range(model.npair):
         inverse = _inverse_mass(model, number)
         if inverse == 0.0:
@@ -138,12 +134,6 @@ def check_masses(model: "mujoco.MjModel", timestep: float) -> None:
                 )
 
 
-def _points(model: "mujoco.MjModel", pair: int) -> int:
-    """Number of points at which two shapes touch that share the stiffness."""
-    kinds = {int(model.geom_type[geom]) for geom in (model.pair_geom1[pair], model.pair_geom2[pair])}
-    return FACES if kinds <= _FLAT else 1
-
-
 def _inverse_mass(model: "mujoco.MjModel", pair: int) -> float:
     """MuJoCo's estimate of the inverse effective mass of a pair, Â [1/kg]."""
     geoms = model.pair_geom1[pair], model.pair_geom2[pair]
@@ -155,22 +145,18 @@ def _touching(
 ) -> Iterator[tuple["mujoco.MjsGeom", "mujoco.MjsGeom"]]:
     """Pairs of shapes by MuJoCo's own rules: one of them moves, and they are not of one body nor of neighbours."""
     fixed_to = model.body_weldid
+
+    def before(body: int) -> int:
+        return int(fixed_to[model.body_parentid[body]])
+
     for first, second in combinations(shapes, 2):
         one, other = (int(fixed_to[model.geom(shape.name).bodyid[0]]) for shape in (first, second))
-        if (
-            arm >= {first.name, second.name}
-            or one == other
-            or frozenset((first.parent.name, second.parent.name)) in apart
-        ):
-            continue
-        if one and other and (_joins(model, one, other) or _joins(model, other, one)):
+        neighbours = one and other and (before(one) == other or before(other) == one)
+        kept_apart = frozenset((first.parent.name, second.parent.name)) in apart
+        if arm >= {first.name, second.name} or one == other or kept_apart or neighbours:
             continue
         if first.contype & second.conaffinity or second.contype & first.conaffinity:
             yield first, second
-
-
-def _joins(model: "mujoco.MjModel", parent: int, child: int) -> bool:
-    return int(model.body_weldid[model.body_parentid[child]]) == parent
 
 
 def _in_series(first: "mujoco.MjsGeom", second: "mujoco.MjsGeom") -> tuple[float | None, float | None]:

@@ -21,16 +21,7 @@ from tvist_plant.model import FLANGE, Floats
 from tvist_plant.plant import PERIOD, Hand, Measurement, Plant, PlantError, PlantTruth, SimulatedArm, Things
 from tvist_plant.sensors import Accelerometer, ForceSensor
 from tvist_plant.world.apart import build_apart
-from tvist_plant.world.arm_form import (
-    LOAD,
-    arm_spec,
-    carry,
-    flex_names,
-    joint_name,
-    motor_name,
-    places,
-    settle,
-)
+from tvist_plant.world.arm_form import LOAD, Hinges, arm_spec, carry, settle
 from tvist_plant.world.contacts import PREFIX, set_contacts
 from tvist_plant.world.fingers import Fingers
 from tvist_plant.world.scene import World
@@ -101,14 +92,11 @@ class MujocoArm(SimulatedArm):
             raise ValueError(f"timestep is {timestep} s; {PERIOD} s must be a multiple of it")
         self._description, self._scene, self._timestep = description, scene, timestep
         drives, joints = description.drives, description.joints
-        K_d, K_p, K_i = (
-            np.array(gain) for gain in (drives.velocity_gain, drives.position_gain, drives.integral_gain)
-        )
+        K_d, K_p, K_i = map(np.array, (drives.velocity_gain, drives.position_gain, drives.integral_gain))
         friction = np.array(drives.coulomb_friction) * (not drives.linear_friction)
         width = np.full(joints, drives.friction_width)
         self._laws = np.array([K_d, K_d * (K_p + K_i), K_d * K_p * K_i, friction, width])
         self._s, self._command, self._felt = np.zeros(joints), np.zeros((3, joints)), np.zeros(6)
-        self._world: World | None = None
         self._fingers: Fingers | None = None
         self._build(payload, None)
         self._seed(0)
@@ -116,18 +104,13 @@ class MujocoArm(SimulatedArm):
     def _build(self, payload: Payload, hand: Hand | None) -> None:
         description, self.payload = self._description, payload
         if self._scene is None:
-            self._model = arm_spec(description, payload, self._timestep).compile()
+            self._world = World(arm_spec(description, payload, self._timestep).compile())
         else:
             self._world = build_apart((description, payload, self._scene, self._timestep, hand))
-            self._model = self._world.model
-        world = self._world
-        self._bodies = np.array(() if world is None else world.bodies, dtype=np.int64)
-        self._own = np.array(() if world is None else world.arm, dtype=np.int64)
-        model, numbers = self._model, range(description.joints)
+        self._model = model = self._world.model
+        self._bodies, self._own = (np.array(own, np.int64) for own in (self._world.bodies, self._world.arm))
         self._data = data = mujoco.MjData(model)
-        self._joints = places(model, [joint_name(number) for number in numbers])
-        self._motors = places(model, [motor_name(number) for number in numbers])
-        self._flexes = places(model, flex_names(description))
+        self._joints, self._motors, self._flexes = Hinges.of(description, model)
         self._flange, self._load = model.body(FLANGE).id, model.body(LOAD).id
         self._state = data.qpos, data.qvel, data.qfrc_applied
         self._place, self._turn = data.xpos[self._flange], data.xmat[self._flange]
@@ -146,11 +129,7 @@ class MujocoArm(SimulatedArm):
         return super().can(method) and (self._scene is not None or method not in _OF_HANDS)
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
-        """Put the arm at rest in static equilibrium under a command, and the things where the scene has them.
-
-        Raises:
-            PlantError: The arm would stand in something.
-        """
+        """Put the arm at rest in static equilibrium under a command, and the things where the scene has them."""
         self._seed(seed)
         if self._fingers is not None:
             self._fingers.open()
@@ -160,17 +139,12 @@ class MujocoArm(SimulatedArm):
         weight = settle(self._description, self._model, self._data, command.q)
         self._s = (weight - command.torque) / self._laws[2]
         measured = self._measure()
-        met = self._met(self._data)
-        if met is not None:
+        if (met := self._met(self._data)) is not None:
             raise PlantError(f"{met}: choose a posture in which the arm is clear")
         return measured
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Move the arm by one period.
-
-        Raises:
-            PlantError: The state is no longer finite.
-        """
+        """Move the arm by one period."""
         self.move(command)
         measured = self._measure()
         if not math.isfinite(self._force.dot(self._force)):
@@ -180,21 +154,19 @@ class MujocoArm(SimulatedArm):
         return measured
 
     def move(self, command: DriveCommand) -> None:
-        """Simulate 2 ms, in which the drives approach the command linearly, without measuring."""
+        """Simulate 2 ms, in which the drives approach the command linearly."""
         if self._fingers is not None:
             self._fingers.drive(self._data)
         start, end = self._command, np.array([command.q, command.qd, command.torque])
         model, data, steps, timestep = self._model, self._data, self._steps, self._timestep
-        motors, laws, s, step, (q, qd, applied) = (
-            self._motors, self._laws, self._s, mujoco.mj_step, self._state,
-        )  # fmt: skip
+        motors, laws, s, (q, qd, applied) = self._motors, self._laws, self._s, self._state
         for k in range(steps):
             drive(start, end, (k + 0.5) / steps, timestep, motors, laws, s, q, qd, applied)
             if self._evaluated:  # the first half of MuJoCo's step is done
                 mujoco.mj_step2(model, data)
                 self._evaluated = False
             else:
-                step(model, data)
+                mujoco.mj_step(model, data)
         self._command = end
 
     def _measure(self) -> Measurement:
@@ -212,7 +184,7 @@ class MujocoArm(SimulatedArm):
             qd=data.qvel[self._joints],
             moment=torque + (K_d * (qd_r - qd) + K * (q_r - q)) + K_s * self._s,
             accelerometer=self._accelerometer.read(self._force),
-            wrench=None if self._world is None else self._sensor.read(self._wrench()),
+            wrench=None if self._scene is None else self._sensor.read(self._wrench()),
         )
 
     def _wrench(self) -> Floats:
@@ -243,8 +215,7 @@ class MujocoArm(SimulatedArm):
         """Carry another payload from now on. Its shape in the world stays the first one's."""
         self.payload, self._evaluated = payload, False
         carry(self._model, payload)
-        if self._world is not None:
-            set_contacts(self._model, self._world.contacts)  # their stiffness is relative to the masses
+        set_contacts(self._model, self._world.contacts)  # their stiffness is relative to the masses
 
     def push(self, torque: Floats) -> None:
         """Apply external torques to the joints."""
@@ -258,7 +229,7 @@ class MujocoArm(SimulatedArm):
 
     def things(self) -> Things | None:
         """Return what stands around it."""
-        return None if self._world is None else self._world.things
+        return self._world.things
 
     def places(self) -> Floats:
         """Return the poses of the bodies that move, shape (bodies, 6) [m, rad]."""
@@ -281,16 +252,12 @@ class MujocoArm(SimulatedArm):
 
     def _met(self, data: "mujoco.MjData") -> str | None:
         """Say what the arm stands in; None if it is clear."""
-        model, world, scene = self._model, self._world, self._scene
-        if world is None or scene is None:
-            return None
         for touch in data.contact[: data.ncon]:
-            bodies = [int(model.geom_bodyid[geom]) for geom in touch.geom]
-            if touch.dist < -DEEPEST and any(body in world.arm or model.geom(geom).name.startswith("arm ")
-                                             for body, geom in zip(bodies, touch.geom, strict=True)):  # fmt: skip
-                first, second = (model.geom(geom).name.removeprefix(PREFIX) for geom in touch.geom)
-                depth = -1e3 * touch.dist
-                return f"world {scene.name}: {first} stands {depth:.3g} mm inside {second}"
+            geoms = [self._model.geom(geom) for geom in touch.geom]
+            ours = any(one.bodyid[0] in self._world.arm or one.name.startswith("arm ") for one in geoms)
+            if self._scene is not None and ours and touch.dist < -DEEPEST:
+                first, second = (one.name.removeprefix(PREFIX) for one in geoms)
+                return f"world {self._scene.name}: {first} stands {-1e3 * touch.dist:.3g} mm inside {second}"
         return None
 
     # ------------------------------------------------------------------ the gripper

@@ -1,6 +1,8 @@
 """A scene and the arm in it, as one model of MuJoCo."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -29,17 +31,17 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class World:
-    """An arm in a scene."""
+    """An arm in a scene, or alone."""
 
     model: "mujoco.MjModel"
     """Both, the arm first."""
-    contacts: Contacts
+    contacts: Contacts = ()
     """Result of `add_pairs`, for `set_contacts`."""
-    things: Things
+    things: Things | None = None
     """What there is besides the arm."""
-    bodies: tuple[int, ...]
+    bodies: tuple[int, ...] = ()
     """Numbers of the bodies of `things`."""
-    arm: tuple[int, ...]
+    arm: tuple[int, ...] = ()
     """Numbers of the arm's bodies, with what is mounted on it."""
 
 
@@ -49,9 +51,6 @@ def build(
     """Put an arm with its payload, and maybe a gripper, into a scene, whose origin is the arm's base.
 
     The time step is that of MuJoCo's integrator [s].
-
-    Raises:
-        SceneError: The file is no scene, or no arm can stand in it.
     """
     spec = arm_spec(description, payload, timestep)
     option = spec.option
@@ -97,9 +96,6 @@ def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody", alone: "mujoco.MjMode
 
     The load is the body beyond the flange. In `alone`, the scene compiled, poses and sizes are numbers
     however the file gives them.
-
-    Raises:
-        SceneError: It is more than shapes of primitive kinds.
     """
     if tool.joints or tool.bodies:
         raise SceneError(
@@ -125,34 +121,28 @@ def _add_capsules(
 
     They have no friction of their own: what they touch has.
     """
-    capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+
+    def add(
+        body: "mujoco.MjsBody", name: str, start: Sequence[float], end: Sequence[float], radius: float
+    ) -> None:
+        ends = [
+            *start,
+            *end[:2],
+            end[2] + (1e-6 if tuple(start) == tuple(end) else 0.0),
+        ]  # MuJoCo's must differ
+        body.add_geom(
+            name=f"arm {name}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[radius, 0, 0], fromto=ends, mass=0.0,
+            friction=[0, 0, 0], contype=ALL, conaffinity=ALL,
+        )  # fmt: skip
+
     for one in description.collision.bodies:
         body = spec.worldbody if one.link < 0 else spec.body(link_name(description, one.link))
-        ends = _ends(one.start, one.end)
-        body.add_geom(
-            name=f"arm {one.name}",
-            type=capsule,
-            size=[one.radius, 0, 0],
-            fromto=ends,
-            mass=0.0,
-            friction=[0, 0, 0],
-            contype=ALL,
-            conaffinity=ALL,
-        )
+        add(body, one.name, one.start, one.end, one.radius)
     radius, end = description.collision.payload_radius, 2.0 * np.array(payload.com)
     if hand is not None:  # the palm, as far as the fingers' roots
         radius, end = min(radius, 0.04), hand.root - 0.04 * hand.direction
     if not tooled and description.collision.bodies and (payload.mass or hand is not None):
-        ends = _ends((0.0, 0.0, 0.0), tuple(end.tolist()))
-        spec.body(LOAD).add_geom(
-            name="arm payload", type=capsule, size=[radius, 0, 0], fromto=ends, mass=0.0, friction=[0, 0, 0],
-            contype=ALL, conaffinity=ALL,
-        )  # fmt: skip
-
-
-def _ends(start: tuple[float, ...], end: tuple[float, ...]) -> list[float]:
-    """Both ends of a capsule, which MuJoCo wants to differ."""
-    return [*start, *end[:2], end[2] + (1e-6 if start == end else 0.0)]
+        add(spec.body(LOAD), "payload", (0.0, 0.0, 0.0), end.tolist(), radius)
 
 
 def _name_all(spec: "mujoco.MjSpec", whose: str) -> None:
@@ -164,41 +154,28 @@ def _name_all(spec: "mujoco.MjSpec", whose: str) -> None:
 
 
 def _things(name: str, model: "mujoco.MjModel", bodies: tuple[int, ...], arm: set[int]) -> Things:
-    shapes, unseen = [], 0
-    for number in range(model.ngeom):
-        body = int(model.geom_bodyid[number])
-        if body in arm or model.geom_rgba[number][3] == 0.0 or model.geom(number).name.startswith("arm "):
-            continue
-        kind = _KINDS.get(mujoco.mjtGeom(model.geom_type[number]))
-        if kind is None:
-            unseen += 1
-            continue
-        shapes.append(
-            _shape(model, kind, body, bodies, model.geom_size[number], model.geom_pos[number], model.geom_quat[number],
-                   model.geom_rgba[number])
-        )  # fmt: skip
-    areas = {
-        model.site(number).name.removeprefix(PREFIX): _shape(
-            model, _KINDS.get(mujoco.mjtGeom(model.site_type[number]), "box"), int(model.site_bodyid[number]), bodies,
-            model.site_size[number], model.site_pos[number], model.site_quat[number], model.site_rgba[number],
-        )
-        for number in range(model.nsite) if model.site(number).name
-    }  # fmt: skip
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+
+    def shape(one: Any, there: Any) -> Shape:
+        """A shape in the frame of the moving body that carries it, or in that of the base."""
+        place, turn, body = there.xpos, there.xmat.reshape(3, 3), int(one.bodyid[0])
+        if body in bodies:
+            place, turn = one.pos, pin.Quaternion(np.roll(one.quat, -1)).matrix()
+        vector = (*place.tolist(), *pin.log3(turn).tolist())
+        number = bodies.index(body) if body in bodies else None
+        kind = _KINDS.get(mujoco.mjtGeom(one.type[0]), "")
+        return Shape(kind, tuple(one.size.tolist()), vector, number, tuple(map(float, one.rgba)))
+
+    geoms = [model.geom(number) for number in range(model.ngeom)]
+    seen = [
+        shape(one, data.geom(one.id))
+        for one in geoms
+        if int(one.bodyid[0]) not in arm and one.rgba[3] != 0.0 and not one.name.startswith("arm ")
+    ]
+    shapes = tuple(one for one in seen if one.kind)
+    sites = [model.site(number) for number in range(model.nsite)]
+    areas = {one.name.removeprefix(PREFIX): shape(one, data.site(one.id)) for one in sites if one.name}
     own = (model.body(body).name.removeprefix(PREFIX) for body in bodies)
     names = tuple(TOOL if one == LOAD else one for one in own)
-    return Things(name, names, tuple(shapes), areas, unseen)
-
-
-def _shape(
-    model: "mujoco.MjModel", kind: str, body: int, bodies: tuple[int, ...],
-    size: np.ndarray, pos: np.ndarray, quat: np.ndarray, rgba: np.ndarray,
-) -> Shape:  # fmt: skip
-    """A shape in the frame of the moving body that carries it, or in that of the base."""
-    place = pin.SE3(pin.Quaternion(np.roll(quat, -1)).matrix(), np.array(pos))
-    while body and body not in bodies:
-        turn = pin.Quaternion(np.roll(model.body_quat[body], -1)).matrix()
-        place = pin.SE3(turn, np.array(model.body_pos[body])) * place
-        body = int(model.body_parentid[body])
-    vector = (*place.translation.tolist(), *pin.log3(place.rotation).tolist())
-    number = bodies.index(body) if body else None
-    return Shape(kind, tuple(size.tolist()), vector, number, tuple(map(float, rgba)))
+    return Things(name, names, shapes, areas, len(seen) - len(shapes))

@@ -36,11 +36,7 @@ def scenes() -> list[str]:
 
 
 def find_scene(name: str) -> SceneFile:
-    """Find a scene: one of `scenes`, or the path of a file in MuJoCo's format (MJCF).
-
-    Raises:
-        SceneError: There is no such file, or it is none of MuJoCo's.
-    """
+    """Find a scene: one of `scenes`, or the path of a file in MuJoCo's format (MJCF)."""
     path = SCENES / f"{name}.xml" if name in scenes() else Path(name)
     try:
         content = read_bytes(path, "world")
@@ -53,7 +49,10 @@ def find_scene(name: str) -> SceneFile:
         raise SceneError(str(error)) from error
     try:
         root = xml(content)
-        others = [_hash(file) for file in _named(root, path.parent)]
+        others = []
+        for file in _named(root, path.parent):
+            with file.open("rb") as stream:
+                others.append(file_digest(stream, "sha256").hexdigest())
     except (UserFileError, OSError) as error:
         raise SceneError(f"world {name}: {one_line(str(error))}") from error
     if root.tag != "mujoco":
@@ -92,8 +91,3 @@ def _named(root: Element, folder: Path) -> list[Path]:
     if sum(place.stat().st_size for place in found) > LARGEST_FILES:
         raise UserFileError(f"the files that it names have more than {LARGEST_FILES >> 20} MiB")
     return found
-
-
-def _hash(file: Path) -> str:
-    with file.open("rb") as stream:
-        return file_digest(stream, "sha256").hexdigest()

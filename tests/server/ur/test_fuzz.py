@@ -13,8 +13,8 @@ import pytest
 from tests.controller.robots import UR5E, Robot
 
 from tvist_controller.host import Host
+from tvist_controller.instruments.sink import Sink
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.reporting.sink import Sink
 from tvist_protocol.codec import encode
 from tvist_server.gateways.ur.dashboard.commands import COMMANDS
 from tvist_server.gateways.ur.dashboard.session import DashboardSession

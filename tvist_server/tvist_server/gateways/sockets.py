@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from typing import Final
 
+from tvist_controller.instruments.sink import Topic
 from tvist_controller.programs.socket_traffic import (
     Close,
     Expire,
@@ -19,7 +20,6 @@ from tvist_controller.programs.socket_traffic import (
     Wait,
     Waited,
 )
-from tvist_controller.reporting.sink import Topic
 from tvist_protocol.journal import SocketChange
 from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.gateways.base import Gateway, Message

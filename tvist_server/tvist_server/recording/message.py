@@ -1,6 +1,6 @@
 """What a recording keeps."""
 
-from tvist_controller.reporting.report import Report
+from tvist_controller.instruments.report import Report
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, Truth

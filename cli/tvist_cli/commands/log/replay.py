@@ -68,14 +68,15 @@ def replay(
 
 
 def _run_again(file: Path, output: Path | None, shaper: list[str], plant: str | None, *, json: bool) -> None:
-    from tvist_controller.sources.own_plants import OwnPlantError, load_plant
+    from tvist_controller.sources.own_files import OwnFileError
+    from tvist_controller.sources.own_plants import load_plant
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read_checked
     from tvist_lab.replay import ReplayError, replay_file
     from tvist_server.recording import RecorderError
 
     own = [load_given(place) for place in shaper]
-    with told(OwnPlantError, code=2):
+    with told(OwnFileError, code=2):
         arm = None if plant is None else load_plant(plant)
     with told(RecordingError, ReplayError, RecorderError, ValueError):
         content = read_checked(file)

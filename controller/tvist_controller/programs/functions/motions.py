@@ -5,7 +5,6 @@ from typing import Annotated, Final
 
 import numpy as np
 
-from tvist_controller.commands.refusal import SLOWEST, RefusalError, check_joints
 from tvist_controller.line.differentiator import STILL, Floats
 from tvist_controller.programs.arguments import (
     Bit,
@@ -22,6 +21,7 @@ from tvist_controller.programs.arguments import (
 from tvist_controller.programs.force_mode_moves import TURN, ForceModeMoves, approach
 from tvist_controller.programs.functions.family import Family, Parts
 from tvist_controller.programs.journey import Turns
+from tvist_controller.refusal import SLOWEST, RefusalError, check_joints
 from tvist_controller.trajectory import Guided, Speed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, Segment

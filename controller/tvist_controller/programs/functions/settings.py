@@ -2,12 +2,12 @@
 
 from typing import Annotated
 
-from tvist_controller.commands.refusal import RefusalError
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import OWN_TOKEN
 from tvist_controller.programs.arguments import Vector3, pose, several, within
 from tvist_controller.programs.functions.family import Family
 from tvist_controller.programs.journey import DELAY, Turns
+from tvist_controller.refusal import RefusalError
 from tvist_plant.plant import PERIOD
 from tvist_plant.robot_checks import lacking_inertia
 from tvist_plant.robot_tables import Tensor

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.commands.refusal import RefusalError, check_joints
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.instruments.variables import READERS
 from tvist_controller.line.differentiator import Floats
@@ -24,6 +23,7 @@ from tvist_controller.programs.arguments import (
 )
 from tvist_controller.programs.functions.family import Family, Parts
 from tvist_controller.programs.functions.settings import ToolPose
+from tvist_controller.refusal import RefusalError, check_joints
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
 from tvist_protocol.stream import State
@@ -173,7 +173,7 @@ class StateFunctions(Family):
 
     def is_steady(self) -> bool:
         """Return whether the target has been at rest for 500 ms."""
-        return self._access.steadiness.steady
+        return self._access.motion.steady
 
     def get_tool_current(self) -> float:
         """Return the current of the tool's supply [A]: 0, since nothing draws any."""
@@ -200,9 +200,9 @@ class StateFunctions(Family):
     @costs(4)
     def get_actual_joint_positions_history(self, steps: object = 0) -> Array:
         """Return the measured joint positions a number of ticks ago [rad]."""
-        past = self._access.steadiness
-        ago = integer("steps", steps, 0, max(past.known - 1, 0))
-        return a_list(past.past(ago) if past.known else self._access.latest().actual_q)
+        past = self._access.motion.past
+        ago = integer("steps", steps, 0, max(len(past) - 1, 0))
+        return a_list(past[-1 - ago].tolist() if past else self._access.latest().actual_q)
 
     def _speed(self, q: list[float], qd: list[float]) -> Array:
         return a_list((self._kinematics.jacobian(np.array(q)) @ np.array(qd)).tolist())

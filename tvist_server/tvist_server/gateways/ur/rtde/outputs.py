@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from tvist_controller.instruments.joint_lists import JOINT_LISTS
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_controller.instruments.variables import VARIABLES
+from tvist_controller.instruments.wrench import JOINT_LISTS
 from tvist_server.gateways.ur.rtde.registers import KINDS, SINGLE_BITS, registers
 from tvist_server.rtde.wire import Wire
 

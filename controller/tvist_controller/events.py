@@ -1,5 +1,6 @@
-"""Types for events on their way to the clients."""
+"""Events on their way to the clients, and counts of what has reached a controller."""
 
+from dataclasses import dataclass
 from typing import Protocol, TypedDict, Unpack
 
 from tvist_protocol.replies import Code
@@ -34,3 +35,14 @@ class Emit(Protocol):
 
     def __call__(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
         """Emit an event of the tick that is being computed, or of the next one between two ticks."""
+
+
+@dataclass
+class Counters:
+    """Counts since the start."""
+
+    commands: int = 0
+    refused: int = 0
+    setpoints_received: int = 0
+    setpoints_refused: int = 0
+    missed_ticks: int = 0

@@ -47,14 +47,28 @@ def out_of_turn(command: str, activity: Activity) -> RefusalError:
 
 def check_joints(q: Sequence[float], description: RobotDescription, where: str = "q") -> None:
     """Refuse a posture with a wrong number of joints or outside their range."""
-    if len(q) != description.joints:
-        why = f"{where} has {len(q)} angles; the arm has {description.joints}"
-        raise RefusalError("out_of_range", where, why, description.joints)
-    for number, (angle, limit) in enumerate(zip(q, description.limits.position, strict=True)):
-        if not abs(angle) <= limit:
+    limits = description.limits.position
+    _check_each(q, limits, "limit_position", where, "angles; the arm has {}", "rad; the joint goes to ±{:g}")
+
+
+def check_speeds(qd: Sequence[float], description: RobotDescription) -> None:
+    """Refuse velocities with a wrong number of joints or above their limits."""
+    limits = description.limits.velocity
+    has, goes = "velocities; the arm has {} joints", "rad/s; the joint's limit is {:g}"
+    _check_each(qd, limits, "limit_velocity", "qd", has, goes)
+
+
+def _check_each(
+    values: Sequence[float], limits: Sequence[float], code: Code, where: str, has: str, goes: str
+) -> None:
+    """Refuse values that are not one for each joint, or beyond a limit."""
+    count = len(limits)
+    if len(values) != count:
+        raise RefusalError("out_of_range", where, f"{where} has {len(values)} {has.format(count)}", count)
+    for number, (value, limit) in enumerate(zip(values, limits, strict=True)):
+        if not abs(value) <= limit:
             field = f"{where}[{number}]"
-            why = f"{field} is {angle:g} rad; the joint goes to ±{limit:g}"
-            raise RefusalError("limit_position", field, why, limit)
+            raise RefusalError(code, field, f"{field} is {value:g} {goes.format(limit)}", limit)
 
 
 def check_motion(
@@ -78,21 +92,14 @@ def _check_limit(code: Code, name: str, value: float, highest: float, unit: str,
     if value > highest:
         why = f"{where} is {value:g} {unit}; the arm's limit is {highest:g}"
         raise RefusalError(code, where, why, highest)
+    _check_least(name, value, unit, prefix)
+
+
+def _check_least(name: str, value: float, unit: str, prefix: str) -> None:
     if value < (lowest := SLOWEST[name]):
+        where = f"{prefix}{name}"
         why = f"{where} is {value:g} {unit}; it must be at least {lowest:g}"
         raise RefusalError("out_of_range", where, why, lowest)
-
-
-def check_speeds(qd: Sequence[float], description: RobotDescription) -> None:
-    """Refuse velocities with a wrong number of joints or above their limits."""
-    if len(qd) != description.joints:
-        why = f"qd has {len(qd)} velocities; the arm has {description.joints} joints"
-        raise RefusalError("out_of_range", "qd", why, description.joints)
-    for number, (speed, limit) in enumerate(zip(qd, description.limits.velocity, strict=True)):
-        if not abs(speed) <= limit:
-            field = f"qd[{number}]"
-            why = f"{field} is {speed:g} rad/s; the joint's limit is {limit:g}"
-            raise RefusalError("limit_velocity", field, why, limit)
 
 
 def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> None:
@@ -110,12 +117,6 @@ def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> No
 
 def check_pace(velocity: float, acceleration: float, jerk: float, where: str = "") -> None:
     """Refuse limits of a motion of the tool that are so low that it would hardly move."""
-    for name, value, unit in (
-        ("velocity", velocity, "m/s"),
-        ("acceleration", acceleration, "m/s²"),
-        ("jerk", jerk, "m/s³"),
-    ):
-        if value < (lowest := SLOWEST[name]):
-            field = f"{where}{name}"
-            why = f"{field} is {value:g} {unit}; it must be at least {lowest:g}"
-            raise RefusalError("out_of_range", field, why, lowest)
+    _check_least("velocity", velocity, "m/s", where)
+    _check_least("acceleration", acceleration, "m/s²", where)
+    _check_least("jerk", jerk, "m/s³", where)

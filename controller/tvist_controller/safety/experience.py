@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, Protocol
 
-from tvist_controller.experience.motion_record import Beliefs, MotionRecord, MotionRecorder
-from tvist_controller.experience.payload_student import PayloadStudent
 from tvist_controller.line.sample import Sample
+from tvist_controller.safety.motion_record import Beliefs, MotionRecord, MotionRecorder
+from tvist_controller.safety.payload_student import PayloadStudent
 from tvist_controller.setup import Setup
 from tvist_plant.user_file import named
 from tvist_protocol.lessons import PayloadLesson
@@ -77,29 +77,27 @@ class Experience:
     ) -> None:
         """Take a tick."""
         recorder = self._recorder
-        if placements != self._placements:
+        if placements != self._placements or not held:
             self._placements = placements
             recorder.forget()
         if not held:
-            recorder.forget()
             return
         known = beliefs() if recorder.begins and not sample.mode.at_rest else None
-        motion = recorder.take(sample, known)
-        if motion is None or len(self._under_way) >= WAITING:
+        record = recorder.take(sample, known)
+        if record is None or len(self._under_way) >= WAITING:
             return
         for student in self._students:
             learnt: list[Taught] = []
 
             def study(student: Student = student, learnt: list[Taught] = learnt) -> None:
                 try:
-                    lesson, plan = student.study(motion.record), None
-                    if lesson is not None and self._plan is not None:
-                        plan = self._plan(lesson, motion.beliefs)
+                    motion = record()
+                    lesson = student.study(motion)
+                    if lesson is not None:
+                        plan = None if self._plan is None else self._plan(lesson, motion.beliefs)
+                        learnt.append(Taught(motion.beliefs, lesson, plan))
                 except Exception as error:  # noqa: BLE001  a robot goes on without the lesson, and says so
                     self._raised.append(error)
-                    return
-                if lesson is not None:
-                    learnt.append(Taught(motion.beliefs, lesson, plan))
 
             self._under_way.append((self._later(study), learnt))
 

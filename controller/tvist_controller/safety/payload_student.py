@@ -15,8 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_controller._compiled import compiled
-from tvist_controller.experience.motion_record import MotionRecord
 from tvist_controller.line.differentiator import Floats
+from tvist_controller.safety.motion_record import MotionRecord
 from tvist_plant.chain import BODY, SCRATCH, chain_of, torques
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription

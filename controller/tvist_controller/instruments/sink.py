@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from tvist_controller.reporting.report import Report
+from tvist_controller.instruments.report import Report
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Truth

@@ -3,37 +3,21 @@
 import numpy as np
 from msgspec import Struct
 
+from tvist_controller.instruments.state_layout import Layout, width, write_state
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.rotation import rotation_vector
 from tvist_controller.line.differentiator import Floats, middle_of
 from tvist_controller.line.sample import Sample
-from tvist_controller.reporting.state_layout import Layout, width, write_state
-from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD, Plant, PlantTruth
 from tvist_protocol.codec import decode_state, encode
 from tvist_protocol.stream import State, Truth
-from tvist_shaping.base import Filter
 
 Key = tuple[object, ...]
-NO_MODES: dict[str, list[float]] = {"f_d": [], "zeta": [], "participation": []}
+MODES = ("f_d", "zeta", "participation")
 TRUE_MODES_EVERY = 50
 """Ticks between two computations of the arm's true modes, whose eigenvalue problem takes a good part of a tick."""
 NOTHING: Floats = np.empty((0, 0))
 NOWHERE: Floats = np.empty(0)
-
-
-class Layouts:
-    """The layout of the last state, which is usually that of the next."""
-
-    def __init__(self) -> None:
-        self._known: tuple[Key, Layout] | None = None
-
-    def of(self, key: Key, report: "Report") -> Layout:
-        """Return the layout of a report's state, which depends on nothing but the key."""
-        known = self._known
-        if known is None or known[0] != key:
-            known = self._known = key, Layout.of(report.state)
-        return known[1]
 
 
 class Report(Struct, gc=False):
@@ -61,8 +45,8 @@ class Report(Struct, gc=False):
     """Number of ticks that began too late."""
     arm: Arm
     """The arm with its tool, which must not change."""
-    layouts: Layouts
-    """Layouts of such states."""
+    layouts: dict[Key, Layout]
+    """The layout of the last state, by all that it depends on; it is usually that of the next."""
     made: State | None = None
     written: bytes | None = None
 
@@ -88,7 +72,12 @@ class Report(Struct, gc=False):
             unshaped is None, motors is not None and motors.limited, motors is None, len(f_d),
             sample.wrench is None,
         )  # fmt: skip
-        template, places, integers = self.layouts.of(key, self)
+        layout = self.layouts.get(key)
+        if layout is None:
+            layout = Layout.of(self.state)
+            self.layouts.clear()
+            self.layouts[key] = layout
+        template, places, integers = layout
         before, middle, last = unshaped or (NOWHERE, NOWHERE, NOWHERE)
         out = template.copy()
         write_state(
@@ -140,70 +129,30 @@ class Report(Struct, gc=False):
         )
 
 
-class Reporter:
-    """Creates reports, and truths of the plant."""
+def true_modes(plant: Plant, joints: int) -> dict[str, list[float]]:
+    """Return the arm's true modes, as many as joints, which takes half a tick; empty lists if the plant has none."""
+    modes = plant.modes()
+    return {name: [] if modes is None else getattr(modes, name)[:joints].tolist() for name in MODES}
 
-    def __init__(self, description: RobotDescription, plant: Plant) -> None:
-        self._joints = description.joints
-        self._arm = Arm(description)
-        self._layouts = Layouts()
-        self._true_modes: dict[str, list[float]] = {}
-        self._plant = plant
-        self._in_world = plant.things() is not None
 
-    def report(
-        self,
-        tick: int,
-        sample: Sample,
-        tvist: Filter,
-        drive_delay: float,
-        modes: tuple[int, int, int],
-        speed: float,
-        setpoint_sequence: int | None,
-        missed_ticks: int,
-    ) -> Report:
-        """Return the report of a tick; every tick needs one."""
-        return Report(
-            tick, sample, modes, speed, tvist.f_d, tvist.zeta, tvist.delay + drive_delay,
-            tvist.clipped, setpoint_sequence, missed_ticks, self._arm, self._layouts,
-        )  # fmt: skip
-
-    def set_tcp(self, offset: tuple[float, ...]) -> None:
-        """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
-        self._arm = self._arm.with_tool(offset)
-
-    def truth(self, tick: int, *, with_modes: bool) -> Truth:
-        """Return what a real robot cannot measure; a `ValueError` says that the plant does not provide it.
-
-        Its modes take half a tick to compute, so they are updated every `TRUE_MODES_EVERY` ticks if wanted;
-        they are empty lists if the plant does not provide them.
-        """
-        if with_modes and (not self._true_modes or tick % TRUE_MODES_EVERY == 0):
-            modes = self._plant.modes()
-            self._true_modes = {
-                name: [] if modes is None else getattr(modes, name)[: self._joints].tolist()
-                for name in ("f_d", "zeta", "participation")
-            }
-        truth, plant = truth_of(self._plant), self._plant
-        return Truth(
-            tick=tick,
-            timestamp=tick * PERIOD,
-            motor_q=truth.motor_q.tolist(),
-            motor_qd=truth.motor_qd.tolist(),
-            gear_deflection=truth.gear_deflection.tolist(),
-            link_deflection=truth.link_deflection.tolist(),
-            flange_pose=truth.flange_position.tolist() + rotation_vector(truth.flange_rotation),
-            tool_acceleration=truth.specific_force.tolist(),
-            static_gear_deflection=_listed(truth.static_gear_deflection),
-            static_link_deflection=_listed(truth.static_link_deflection),
-            body_poses=plant.places().ravel().tolist(),
-            contact_force=plant.contact().tolist() if self._in_world else [],
-            **(self._true_modes or NO_MODES),
-        )
-
-    def forget_modes(self) -> None:
-        """Have the modes computed anew, since the arm was placed elsewhere."""
-        self._true_modes = {}
+def truth_message(plant: Plant, tick: int, modes: dict[str, list[float]]) -> Truth:
+    """Return what a real robot cannot measure, with its true modes; a `ValueError` says that the plant has no truth."""
+    truth = truth_of(plant)
+    return Truth(
+        tick=tick,
+        timestamp=tick * PERIOD,
+        motor_q=truth.motor_q.tolist(),
+        motor_qd=truth.motor_qd.tolist(),
+        gear_deflection=truth.gear_deflection.tolist(),
+        link_deflection=truth.link_deflection.tolist(),
+        flange_pose=truth.flange_position.tolist() + rotation_vector(truth.flange_rotation),
+        tool_acceleration=truth.specific_force.tolist(),
+        static_gear_deflection=_listed(truth.static_gear_deflection),
+        static_link_deflection=_listed(truth.static_link_deflection),
+        body_poses=plant.places().ravel().tolist(),
+        contact_force=[] if plant.things() is None else plant.contact().tolist(),
+        **(modes or {name: [] for name in MODES}),
+    )
 
 
 def truth_of(plant: Plant) -> PlantTruth:

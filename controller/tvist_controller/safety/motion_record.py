@@ -1,8 +1,8 @@
 """A motion from rest to rest, and what the arm's own sensors said meanwhile."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -44,30 +44,15 @@ class MotionRecord:
     """What the controller took the arm for."""
 
 
-@dataclass(frozen=True)
-class Recorded:
-    """A motion as its ticks left it: whoever studies it makes the arrays, which takes longer than a tick has."""
+Record = Callable[[], MotionRecord]
+"""Makes the record of a motion that has ended, which takes longer than a tick has."""
 
-    samples: Sequence[Sample]
-    """Its ticks."""
-    stop: int
-    """See `MotionRecord`."""
-    whole: bool
-    """See `MotionRecord`."""
-    beliefs: Beliefs
-    """See `MotionRecord`."""
 
-    @cached_property
-    def record(self) -> MotionRecord:
-        """The motion."""
-        measured = [sample.measured for sample in self.samples]
-        return MotionRecord(
-            q=np.array([one.q for one in measured]),
-            moments=np.array([one.moment for one in measured]),
-            stop=self.stop,
-            whole=self.whole,
-            beliefs=self.beliefs,
-        )
+def record_of(samples: Sequence[Sample], stop: int, whole: bool, beliefs: Beliefs) -> MotionRecord:
+    """Return the record of a motion from its ticks; see `MotionRecord`."""
+    measured = [sample.measured for sample in samples]
+    q, moments = (np.array(values) for values in zip(*((one.q, one.moment) for one in measured), strict=True))
+    return MotionRecord(q, moments, stop, whole, beliefs)
 
 
 class MotionRecorder:
@@ -84,7 +69,7 @@ class MotionRecorder:
         """Whether the next tick in motion is the first one of a record, which needs to know what is believed."""
         return not self._moves or self._stop > 0
 
-    def take(self, sample: Sample, beliefs: Beliefs | None = None) -> Recorded | None:
+    def take(self, sample: Sample, beliefs: Beliefs | None = None) -> Record | None:
         """Take a tick in which the drives hold or move the arm; return the motion that is complete with it.
 
         That may be one that the next one has cut short; None if there is none. What the controller takes the
@@ -113,7 +98,7 @@ class MotionRecorder:
         """Drop the present motion, since the drives do not hold the arm, or it was placed elsewhere."""
         self._moves, self._samples, self._ticks, self._stop = False, [], 0, 0
 
-    def _finished(self) -> Recorded | None:
+    def _finished(self) -> Record | None:
         if not self._stop or self._stop > LONGEST or self._beliefs is None:
             return None
-        return Recorded(self._samples, self._stop, self._whole, self._beliefs)
+        return partial(record_of, self._samples, self._stop, self._whole, self._beliefs)

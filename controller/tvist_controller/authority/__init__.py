@@ -1,1 +1,0 @@
-"""Who may do what: control by lease, the clock, and who is there."""

@@ -1,1 +1,0 @@
-"""What commands and their answers have in common."""

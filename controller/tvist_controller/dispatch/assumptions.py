@@ -1,0 +1,190 @@
+"""What the control line assumes: the payload that is declared or learnt, and the filter with the modes for it."""
+
+from collections.abc import Callable
+from typing import Any
+
+from tvist_controller.events import Emit
+from tvist_controller.instruments.peripherals import Peripherals
+from tvist_controller.line.inverse_dynamics import SLEW
+from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_controller.planning.plan import Plan
+from tvist_controller.planning.snapshot import FilterState
+from tvist_controller.refusal import RefusalError
+from tvist_controller.safety.motion_record import Beliefs
+from tvist_controller.safety.payload_monitor import PayloadMonitor
+from tvist_controller.setup import body
+from tvist_controller.sources.calibrations import fits
+from tvist_controller.sources.mode_source import ModeSource
+from tvist_plant.plant import PERIOD
+from tvist_protocol.commands import SetPayload
+from tvist_protocol.lessons import PayloadLesson
+from tvist_protocol.modes import RobotMode
+from tvist_protocol.values import Payload
+from tvist_shaping.base import Filter
+
+
+def payload_of(command: SetPayload) -> Payload:
+    """Return the payload that a command declares."""
+    return Payload(mass=command.mass, com=command.com, inertia=command.inertia)
+
+
+class Assumptions:
+    """The control line's payload and filter, whose changes must not spoil the robot's motion.
+
+    Args:
+        payload: Initial payload.
+        source: Source of the first filter's modes.
+        motion: The arm's motion, and with it the control line.
+        peripherals: Tells clients what is assumed.
+        plan: Plans what a lesson changes.
+        emit: Emits events.
+        follows: Whether the robot follows its payload.
+    """
+
+    def __init__(
+        self,
+        payload: Payload,
+        source: ModeSource,
+        motion: MotionControl,
+        peripherals: Peripherals,
+        plan: Callable[[PayloadLesson, FilterState], Plan],
+        emit: Emit,
+        *,
+        follows: bool,
+    ) -> None:
+        self.declared = payload
+        """Declared payload."""
+        self.assumed = payload
+        """Payload that dynamics and modes are computed with: the declared one, or what the robot has learnt."""
+        self.source = source
+        """Source of the filter's modes."""
+        self._motion, self._cycle, self._peripherals = motion, motion.cycle, peripherals
+        self._plan, self._emit = plan, emit
+        self.monitor = PayloadMonitor(motion.cycle.description, body(payload), follows=follows)
+        """Compares the payload with what the drives feel."""
+        self._warn_of_payload()
+        self._warn_of_arm()
+
+    @property
+    def present(self) -> FilterState:
+        """The present state that a new filter depends on."""
+        tvist = self._cycle.tvist
+        return FilterState(tvist.name, tvist.estimator.modes, self.source, self.assumed, self.declared)
+
+    # ------------------------------------------------------------------ filter
+
+    def choose(self, chosen: PlannedFilter) -> None:
+        """Shape with a filter from now on, unless the rest of the motion would not be clear with it."""
+        self._motion.ahead.check_filter(chosen.tvist)
+        self.use(chosen)
+
+    def estimate(self, chosen: PlannedFilter) -> None:
+        """Shape with other modes from now on; else as `choose`."""
+        self.choose(chosen)
+        self._warn_of_payload()
+
+    def use(self, chosen: PlannedFilter) -> None:
+        """Shape with a filter from now on."""
+        before, idle = self.source, self._idle
+        self.source = chosen.source
+        self._cycle.drives.compensate(chosen.law)
+        self._cycle.use(chosen.tvist, chosen.elastic)
+        self._motion.motions.keep_rate()
+        self._emit("shaper_changed", why=f"{chosen.tvist.name} with estimator {self.source.name}")
+        if self.source is not before:
+            self._warn_of_arm()
+        if idle:
+            self._warn_of_payload()
+
+    # ------------------------------------------------------------------ payload
+
+    @property
+    def held(self) -> bool:
+        """Whether the drives hold or move the arm, so that a payload can be learnt from its motions."""
+        return self._motion.robot_mode is RobotMode.RUNNING
+
+    def beliefs(self) -> Beliefs:
+        """Return what the robot takes its arm for."""
+        return Beliefs(self.assumed, self.present)
+
+    def learn(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
+        """Take a lesson at rest; a plan that was made for it beforehand is used if it still holds."""
+        present = self.present
+        if plan is None or plan.state != {"filter": present}:
+            plan = self._plan(lesson, present)
+        found: Any = plan.found
+        if isinstance(found, RefusalError):
+            self._emit("warning", why=f"{lesson.why}; it is not assumed: {found.reply.why}")
+            return
+        self._assume(lesson.payload, found, SLEW, told=lesson.beyond)
+        self._emit("learnt", why=lesson.why)
+        if lesson.beyond:
+            self._emit("warning", code="payload_mismatch", why=lesson.why)
+        self._peripherals.changed = True
+
+    def declare(self, command: SetPayload, tvist: Filter | None) -> None:
+        """Take another payload, with the filter that is planned for it."""
+        payload = payload_of(command)
+        self._clear_with(payload, tvist)
+        self.declared = payload
+        self._assume(payload, tvist, max(round(command.transition_time / PERIOD), SLEW))
+
+    def forget(self, planned: Callable[[], Any]) -> None:
+        """Assume what was declared again, with the filter that is planned for it."""
+        if self.assumed == self.declared:
+            return
+        tvist = planned()
+        self._clear_with(self.declared, tvist)
+        self._assume(self.declared, tvist, SLEW)
+        self._emit("learnt", why=f"the declared {self.declared.mass:g} kg are assumed again")
+
+    def _clear_with(self, payload: Payload, tvist: Filter | None) -> None:
+        """Put a payload into the collision model, unless the rest of the motion would not be clear with it."""
+        self._motion.ahead.check_payload(body(payload), tvist, self._motion.motions.coming)
+
+    def _assume(self, payload: Payload, tvist: Filter | None, ticks: int, *, told: bool = False) -> None:
+        """Compute dynamics and modes with a payload.
+
+        Args:
+            payload: The payload.
+            tvist: Filter for it; None if its modes are not known to differ.
+            ticks: Number of ticks in which it is phased in.
+            told: Whether a warning tells that the arm carries more, which is above its rating.
+        """
+        self.assumed, carried = payload, body(payload)
+        self._cycle.dynamics.declare(carried, ticks)
+        if tvist is not None:
+            self._cycle.use(tvist, self._cycle.drives.wanted)
+            self._motion.motions.keep_rate()
+        self._warn_of_payload()
+        self.monitor.declare(carried, ticks, found=payload is not self.declared, told=told)
+
+    @property
+    def _idle(self) -> bool:
+        """True if there is no shaper, so that the modes do not matter."""
+        return self._cycle.tvist.name == "none"
+
+    def _warn_of_payload(self) -> None:
+        """Warn if a shaper uses modes that belong to another payload."""
+        assumed, word = self.assumed, "declared" if self.assumed == self.declared else "carried"
+        calibration = self.source.calibration
+        if not self._idle and calibration is not None and not fits(calibration, assumed, self.source.name):
+            self._emit(
+                "warning",
+                code="payload_mismatch",
+                why=f"calibration {calibration.name!r} was made with "
+                f"{calibration.payload.mass:g} kg; {assumed.mass:g} kg is {word}: "
+                "the shaper's frequencies will be wrong. Take a modal calibration, which knows any payload, or "
+                "identify the arm with this one",
+            )
+
+    def _warn_of_arm(self) -> None:
+        """Warn if the modes belong to another arm of the same model."""
+        calibration = self.source.calibration
+        if calibration is not None and self.source.fits_arm is False:
+            why = (
+                f"calibration {calibration.name!r} was measured on a different arm than the one in the robot file: "
+                "the shaper's frequencies will be wrong; measure this arm with tvist identify"
+            )
+            self._emit("warning", why=why)

@@ -1,0 +1,293 @@
+"""Control of the arm by lease, the right to advance time, and who is there; the time is an argument."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from tvist_controller.events import Emit
+from tvist_controller.refusal import RefusalError
+from tvist_protocol.replies import Code, Refused
+from tvist_protocol.simulation import SimulationStep
+
+
+class Lease(NamedTuple):
+    """Control, or the clock, that one client holds."""
+
+    client: str
+    token: str
+    session: str | None
+    """Session whose end ends it; empty if the client's token does not name it, None if it had no token."""
+    seconds: float = math.inf
+    """Duration without renewal [s]; infinite for the clock, since nothing times out when a client advances time."""
+
+
+class _Words(NamedTuple):
+    """What refusals say of one of the two rights."""
+
+    nobody: str
+    whose: str
+    taken: str
+    where: str
+
+
+CONTROL = _Words(
+    "no client has control: send take_control first",
+    "the current lease",
+    "control is held by {!r}: wait until it releases control or its lease ends",
+    "token",
+)
+CLOCK = _Words(
+    "no client holds the clock: send take_clock first",
+    "the clock",
+    "the clock is held by {!r} until it releases it",
+    "client",
+)
+
+
+class NoControlError(Exception):
+    """A command that needs control came from a client without it."""
+
+    def __init__(self, code: Code, why: str, where: str = "token") -> None:
+        super().__init__(why)
+        self.reply = Refused(code=code, where=where, why=why)
+
+
+def check_token(held: Lease | None, token: str, where: str = "token", words: _Words = CONTROL) -> Lease:
+    """Return the lease, or with `CLOCK` the hold of the clock, that a token names.
+
+    Raises:
+        NoControlError: No client has it, or the token is another client's or an old one.
+    """
+    if held is None:
+        raise NoControlError("no_control", words.nobody, where)
+    if token != held.token:
+        why = f"{where} is not that of {words.whose}, held by {held.client!r}"
+        raise NoControlError("stale_token", why, where)
+    return held
+
+
+def is_holders(lease: Lease | None, token: str | None) -> bool:
+    """Return whether a token is that of the client in control."""
+    return lease is not None and token == lease.token
+
+
+def check_free(held: Lease | None, client: str, words: _Words = CONTROL) -> None:
+    """Check that a client may take control, or the clock.
+
+    Raises:
+        NoControlError: Another client has it.
+    """
+    if held is not None and held.client != client:
+        raise NoControlError("no_control", words.taken.format(held.client), words.where)
+
+
+def may_step(clock: Lease | None, lease: Lease | None, token: str) -> bool:
+    """Return whether a token may advance time: the clock's token if a client holds the clock, else the lease's."""
+    return is_holders(lease if clock is None else clock, token)
+
+
+def check_step_token(clock: Lease | None, lease: Lease | None, token: str) -> str:
+    """Return the name of the client whose token it is, if it may advance time.
+
+    Raises:
+        NoControlError: It may not.
+    """
+    if clock is None:
+        return check_token(lease, token).client
+    if is_holders(lease, token):
+        why = f"the clock is held by {clock.client!r}: a client with control cannot step until the clock is released"
+        raise NoControlError("no_control", why)
+    return check_token(clock, token, words=CLOCK).client
+
+
+def check_step(clock: Lease | None, lease: Lease | None, step: SimulationStep) -> str:
+    """Return the name of the client that steps; advancing time and sending set-points are separate rights.
+
+    Raises:
+        NoControlError: A token is missing or does not give the required right.
+    """
+    client = check_step_token(clock, lease, step.token)
+    if step.motion_token is not None:
+        check_token(lease, step.motion_token, "motion_token")
+    elif step.setpoints and clock is not None:
+        why = "motion_token is missing: set-points need control, and the clock's token does not give it"
+        raise NoControlError("missing_field", why, "motion_token")
+    return client
+
+
+class Standing(NamedTuple):
+    """Who has rights between two ticks; a new one replaces it, so that any thread may read it."""
+
+    lease: Lease | None
+    """Lease of the client that has control."""
+    clock: Lease | None
+    """Hold of the client that has the clock."""
+
+    def sessions_of(self, client: str) -> set[str | None]:
+        """Sessions whose end takes control or the clock from a client; empty if it has neither."""
+        return {right.session for right in self if right is not None and right.client == client}
+
+
+class Authority:
+    """The lease of a robot, with which motion ends, and the hold of its clock: one client each at a time.
+
+    The instance is part of every token, different after each restart, so that no token of before is valid
+    again; empty where equal runs have to give equal tokens.
+    """
+
+    def __init__(
+        self,
+        interrupt: Callable[[str], None],  # ends motion, for a reason
+        emit: Emit,
+        *,
+        realtime: bool,  # whether time passes by itself: leases time out, and no client may advance time
+        instance: str = "",
+    ) -> None:
+        self._interrupt, self._emit, self._realtime = interrupt, emit, realtime
+        self._prefix = f"{instance}." if instance else ""
+        self._granted = self._granted_clocks = 0
+        self._ends = math.inf
+        self.lease: Lease | None = None
+        """Lease of the client that has control."""
+        self.clock: Lease | None = None
+        """Hold of the client that has the clock."""
+
+    def take(self, client: str, seconds: float, now: float, session: str | None = None) -> Lease:
+        """Give control to a client for so many seconds; one that already has it gets a new lease.
+
+        The end of the session ends the lease; None if its end will not be reported.
+
+        Raises:
+            NoControlError: Another client has control.
+        """
+        check_free(self.lease, client)
+        return self._grant(client, seconds, now, session)
+
+    def renew(self, token: str, now: float) -> Lease:
+        """Check a token and renew its lease.
+
+        Raises:
+            NoControlError: See `check_token`.
+        """
+        lease = check_token(self.lease, token)
+        self._ends = now + lease.seconds
+        return lease
+
+    def hand_over(self, client: str, now: float, session: str | None = None) -> None:
+        """Reserve the lease for another client, which only has to take it; the session is as in `take`."""
+        if self.lease is not None:
+            self._grant(client, self.lease.seconds, now, session)
+
+    def _grant(self, client: str, seconds: float, now: float, session: str | None) -> Lease:
+        self._granted += 1
+        self._ends = now + seconds
+        self.lease = lease = Lease(client, f"{client}#{self._prefix}{self._granted}", session, seconds)
+        return lease
+
+    @property
+    def ends(self) -> float:
+        """Time at which the lease runs out if it is not renewed [s]; infinite if it does not."""
+        return self._ends if self._realtime and self.lease is not None else math.inf
+
+    def watch(self, now: float) -> None:
+        """End a lease that was not renewed in time."""
+        if now >= self.ends:
+            self._lose("the lease expired: no command renewed it")
+
+    def end_rights(self, client: str, session: str) -> None:
+        """End the rights of a client whose session has ended: motion ends with control, and the clock becomes free."""
+        if self.clock is not None and (self.clock.client, self.clock.session) == (client, session):
+            self.clock = None
+        if self.lease is not None and (self.lease.client, self.lease.session) == (client, session):
+            self._lose(f"client {client!r} is gone")
+
+    def release(self) -> None:
+        """End the lease, and with it motion, since its holder asks for that."""
+        self.lease = None
+        self._interrupt("control was released")
+
+    def _lose(self, why: str) -> None:
+        self.lease = None
+        self._emit("lease_lost", why=why)
+        self._interrupt(why)
+
+    def take_clock(self, client: str, session: str | None = None) -> str:
+        """Give the clock to a client, and return its token; one that already holds it gets a new one.
+
+        Raises:
+            NoControlError: Another client holds it.
+            RefusalError: See `check_step`.
+        """
+        self._check_steppable()
+        check_free(self.clock, client, CLOCK)
+        self._granted_clocks += 1
+        # A lease's token has a number in this place, so the two kinds of tokens cannot be confused.
+        self.clock = Lease(client, f"{client}#clock{self._granted_clocks}", session)
+        return self.clock.token
+
+    def release_clock(self, token: str) -> None:
+        """Release the clock.
+
+        Raises:
+            NoControlError: See `check_token`.
+        """
+        check_token(self.clock, token, words=CLOCK)
+        self.clock = None
+
+    def check_step(self, step: SimulationStep, now: float) -> None:
+        """Check that a step's sender may advance time, and may send the set-points in it.
+
+        Raises:
+            NoControlError: The sender has no such right.
+            RefusalError: Time passes by itself with this clock.
+        """
+        check_step(self.clock, self.lease, step)
+        if self.clock is None:
+            self.renew(step.token, now)
+        self._check_steppable()
+
+    def _check_steppable(self) -> None:
+        if self._realtime:
+            why = "the robot runs in real time: start it with --clock lockstep to step"
+            raise RefusalError("wrong_mode", "type", why)
+
+
+class Presence:
+    """Sessions of clients, by client name."""
+
+    def __init__(self) -> None:
+        self._sessions: dict[str, set[str]] = {}
+
+    def seen(self, client: str, session: str) -> None:
+        """Note that a client's liveliness token has appeared; the session is empty if it names none."""
+        self._sessions.setdefault(client, set()).add(session)
+
+    def gone(self, client: str, session: str) -> None:
+        """Note that a client's liveliness token has disappeared."""
+        there = self._sessions.get(client, set())
+        there.discard(session)
+        if not there:
+            self._sessions.pop(client, None)
+
+    def clients_of(self, session: str) -> list[str]:
+        """Names of the clients that a session declares."""
+        return [client for client, there in self._sessions.items() if session in there]
+
+    def has(self, client: str, session: str) -> bool:
+        """Return whether a client's token is present."""
+        return session in self._sessions.get(client, ())
+
+    def session_of(self, client: str) -> str | None:
+        """Return the session of a client that requests control; None if it has no token.
+
+        Raises:
+            NoControlError: Several sessions use this name, and a command does not say which one sent it.
+        """
+        there = self._sessions.get(client, set())
+        if len(there) > 1:
+            why = (
+                f"{len(there)} programs are connected as {client!r}, and the server cannot tell which of them sent "
+                "this: give each its own name; a program that has lost its connection is forgotten within about 10 s"
+            )
+            raise NoControlError("no_control", why, "client")
+        return next(iter(there), None)

@@ -1,0 +1,212 @@
+"""The parts of one robot, and what they need of one another."""
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+from typing import Unpack
+
+import numpy as np
+
+from tvist_controller.cell.live_cell import LiveCell
+from tvist_controller.dispatch.assumptions import Assumptions
+from tvist_controller.dispatch.rights import Authority
+from tvist_controller.events import Counters, Fields
+from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.instruments.peripherals import Peripherals
+from tvist_controller.instruments.report import Key, Report, truth_of
+from tvist_controller.instruments.state_layout import Layout
+from tvist_controller.instruments.tool_forces import ToolForces
+from tvist_controller.line.cycle import ControlCycle
+from tvist_controller.line.sample import Sample
+from tvist_controller.motion.activity_control import MotionControl
+from tvist_controller.motion.force_control import ForceControl
+from tvist_controller.motion.guidance import Guidance
+from tvist_controller.motion.monitor import Monitor
+from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_controller.planning.plan import MakesPlans, Order, Plan, Plans
+from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.programs.access import Access
+from tvist_controller.programs.player import ProgramPlayer
+from tvist_controller.safety.faults import Faults
+from tvist_controller.safety.monitors import Overload, ShaperMonitor
+from tvist_controller.safety.own_controller import Supervision, Watching
+from tvist_controller.safety.robot_modes import RobotModes
+from tvist_controller.safety.safety_control import SafetyControl
+from tvist_controller.setup import Setup, body
+from tvist_plant.description import fingerprint
+from tvist_plant.plant import PERIOD, Plant, PlantError, RealArm
+from tvist_protocol import commands as c
+from tvist_protocol.io import Io
+from tvist_protocol.replies import Reply
+from tvist_protocol.stream import Event, EventKind, State
+from tvist_protocol.values import Payload
+
+
+class Robot(ABC):
+    """The parts of one robot, on which commands act.
+
+    Args:
+        setup: Initial setup, with the posture in which an arm stands that cannot be placed.
+        plant: Plant to control; None for the flexible arm that the setup describes.
+        planner: Plans what takes longer than a tick can wait.
+        order: Has commands of programs planned beside the ticks; None to plan them in the ticks.
+
+    Raises:
+        ValueError: The plant does not fit the setup.
+    """
+
+    def __init__(self, setup: Setup, plant: Plant | None, planner: MakesPlans, order: Order | None) -> None:
+        self.setup = setup
+        """Initial setup; of an arm that cannot be placed, with the posture in which it stood."""
+        self.tick_number = 0
+        self.counters = Counters()
+        self.events: list[Event] = []
+        """Events of the tick that is being computed, or of the next one between two ticks."""
+        self.plans = Plans(planner.plan, self.snapshot, order)
+        """The way to plans."""
+        first, timeouts, description = planner.filters.first(), setup.clock == "realtime", setup.description
+        self.cycle = _cycle(setup, first, plant)
+        plant = self.cycle.plant
+        self.seed = setup.seed
+        """Seed with which a simulated arm is placed next."""
+        # What only watches has no power to move anything, whatever is asked of it.
+        mode = "POWER_OFF" if plant.watched else setup.mode
+        collisions = CollisionModel(description, body(setup.payload))
+        self.motion = motion = MotionControl(self.cycle, collisions, self.emit, mode)
+        self.modes = RobotModes(motion)
+        """Robot mode, safety mode and runtime state."""
+        self.session = Authority(self._interrupt, self.emit, realtime=timeouts, instance=setup.instance)
+        """Rights to control the robot and to advance time."""
+        self.safety = safety = SafetyControl(motion, self.emit)
+        self.faults = Faults(motion, safety)
+        self.peripherals = Peripherals(motion.set_tcp)
+        self.watching: Watching | None = None
+        self.supervision: Supervision | None = None
+        """The robot's own controller, which is only watched, or through which the robot is moved; None for neither."""
+        if isinstance(plant, RealArm) and plant.watched:
+            self.watching = Watching(plant, self.peripherals, self.emit, self.cycle, self.modes)
+        elif isinstance(plant, RealArm) and plant.supervised:
+            self.supervision = Supervision(plant, self.peripherals, self.emit, motion, safety)
+        self.forces = ToolForces(description, self.peripherals, lambda: self.latest, lambda: self.declared)
+        """Forces and torques on the arm."""
+        self.cell = None
+        """What stands around the robot; None for nothing."""
+        if setup.cell is not None:
+            self.cell = LiveCell(setup.cell, description, plant, self.peripherals, self.emit)
+        self.guidance = Guidance(motion)
+        """Guided motions."""
+        self.force_control = ForceControl(self.guidance, self.forces, timeouts=timeouts)
+        self.programs = ProgramPlayer(self._access(), safety)
+        self.assumed = Assumptions(
+            setup.payload, first.source, motion, self.peripherals, planner.for_lesson, self.emit,
+            follows=setup.adapt == "payload",
+        )  # fmt: skip
+        """What it carries, and how it shapes."""
+        safety.monitors = self._monitors()
+        self.true_modes: dict[str, list[float]] = {}
+        """The arm's true modes, which are computed now and then; empty if the next truth needs them anew."""
+        self._layouts: dict[Key, Layout] = {}
+        self.report = self.reported(self.cycle.sample)
+        """Report of the last tick, or of the arm at rest if it has not ticked yet or was placed somewhere since."""
+
+    def _monitors(self) -> tuple[Monitor, ...]:
+        """Return all that judges the signals of a tick, in this order."""
+        description = self.setup.description
+        overload = Overload(description.robot.joints, description.limits.torque)
+        # An arm with a controller of its own is watched by that; here its torques may be guessed from currents.
+        drives = () if self.cycle.plant.supervised else (overload,)
+        return *drives, ShaperMonitor(self.cycle), self.force_control, self.assumed.monitor
+
+    def _access(self) -> Access:
+        """What programs may use of the robot."""
+        return Access(
+            description=self.setup.description, motion=self.motion, guidance=self.guidance,
+            peripherals=self.peripherals, emit=self.emit, send=self.carry_out, plans=self.plans,
+            latest=lambda: self.latest, io=lambda: self.io(wrench=False), declared=lambda: self.declared,
+            force=self.force_control, forces=self.forces, shape_guided=self.setup.shape_servo, cell=self.cell,
+        )  # fmt: skip
+
+    @abstractmethod
+    def carry_out(self, command: c.Command, plan: Plan | None = None) -> Reply | None:
+        """Carry out a command of a program; see `Controller.receive`."""
+
+    @property
+    def latest(self) -> State:
+        """State of the last tick; see `report`."""
+        return self.report.state
+
+    @property
+    def declared(self) -> Payload:
+        """Declared payload; that of a robot that is watched, if it says so."""
+        declared = self.assumed.declared
+        return declared if self.watching is None else self.watching.declared(declared)
+
+    @property
+    def now(self) -> float:
+        """Time of the present tick [s], which only ticks advance."""
+        return self.tick_number * PERIOD
+
+    @cached_property
+    def arm(self) -> str:
+        """Fingerprint of the arm that the robot file describes."""
+        return fingerprint(self.setup.description)
+
+    def snapshot(self, time: float | None = None) -> Snapshot:
+        """The present state that plans depend on; for a time, that of a path that goes on from the running motion."""
+        return self.motion.snapshot(self.assumed.present, self.programs.statements.last, time)
+
+    def io(self, *, wrench: bool = True) -> Io:
+        """Return inputs, outputs and registers as they are for the next tick.
+
+        Args:
+            wrench: Whether to compute the wrench at the tool, which takes a third of a tick.
+        """
+        said, payload = self.watching or self.supervision, self.assumed
+        io = self.peripherals.io(
+            self.tick_number + 1, payload.declared, self.motion.motions.asked_speed, self.programs.published,
+            self.forces.wrench() if wrench and said is None else None,
+            None if payload.assumed == payload.declared else payload.assumed,
+        )  # fmt: skip
+        return io if said is None else said.io(io, force=wrench)
+
+    def reported(self, sample: Sample) -> Report:
+        """Return the report of a tick."""
+        motion, cycle, tvist = self.motion, self.cycle, self.cycle.tvist
+        stream = motion.streams.stream
+        return Report(
+            self.tick_number, sample, self.modes.now,
+            motion.motions.speed if self.watching is None else self.watching.speed,
+            tvist.f_d, tvist.zeta, tvist.delay + cycle.drives.delay, tvist.clipped,
+            None if stream is None else stream.sequence,
+            self.counters.missed_ticks, motion.tool, self._layouts,
+        )  # fmt: skip
+
+    def emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
+        """Store an event of the tick that is being computed, or of the next one between two ticks."""
+        event = Event(tick=self.tick_number + 1, kind=kind, **fields)
+        self.events.append(event)
+        self.modes.hear(event)
+        self.programs.hear(event)
+
+    def _interrupt(self, why: str) -> None:
+        """End the activities that need control, when no client has control any more."""
+        self.programs.end(why)
+        self.motion.interrupt(why)
+
+
+def _cycle(setup: Setup, first: PlannedFilter, plant: Plant | None) -> ControlCycle:
+    """The control line with its arm.
+
+    Raises:
+        ValueError: The arm cannot be where it is to begin, or has no truth to report.
+    """
+    try:
+        cycle = ControlCycle(
+            setup.description, first.tvist, elastic=first.elastic, q=np.array(setup.q, dtype=float),
+            declared=body(setup.payload), carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
+            compensate_sag=setup.compensate_sag, law=first.law,
+        )  # fmt: skip
+    except PlantError as error:
+        raise ValueError(str(error)) from error
+    if setup.truth:
+        truth_of(cycle.plant)  # raises now, not at the first tick
+    return cycle

@@ -1,0 +1,89 @@
+"""Set-points of the client in control, which are not answered, and the stream that they feed."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from tvist_controller.refusal import RefusalError, check_joints
+from tvist_controller.trajectory import SetpointStream
+from tvist_plant.description import RobotDescription
+from tvist_protocol.commands import Setpoint
+
+TIMEOUT = 0.25
+"""Time without set-points after which a stream is stopped [s]."""
+
+
+class Unreadable(NamedTuple):
+    """A set-point that cannot be decoded."""
+
+    token: str | None
+    """Token in it, if one is found."""
+    why: str
+    """A sentence with field, value and limit."""
+
+
+class Setpoints:
+    """Feeds one stream at a time, and counts for all."""
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._description = description
+        self.stream: SetpointStream | None = None
+        """The present stream."""
+        self._heard = 0.0
+        self._refused: str | None = None
+        self._ended = 0, 0, 0
+
+    def begin(self, stream: SetpointStream, now: float) -> None:
+        """Feed a stream from the present time on [s]."""
+        self.stream, self._heard, self._refused = stream, now, None
+
+    def take(self, setpoint: Setpoint | Unreadable, now: float) -> bool:
+        """Take a set-point of the client in control, and return whether the stream accepts it."""
+        if isinstance(setpoint, Unreadable):
+            self.refuse(setpoint.why)
+            return False
+        try:
+            check_joints(setpoint.q, self._description)
+        except RefusalError as refusal:
+            self.refuse(refusal.reply.why)
+            return False
+        if self.stream is None:
+            return False
+        self._heard, self._refused = now, None
+        self.stream.offer(setpoint.sequence, np.array(setpoint.q, dtype=float))
+        return True
+
+    def refuse(self, why: str) -> None:
+        """Remember why a set-point was rejected, to be reported if no valid one follows."""
+        self._refused = why
+
+    @property
+    def silent_at(self) -> float:
+        """Time at which the stream counts as silent unless a set-point comes [s]; infinite without one."""
+        # A little early, since sums round: `silence` decides.
+        return math.inf if self.stream is None else self._heard + TIMEOUT - 1e-6
+
+    def silence(self, now: float) -> str | None:
+        """Return a sentence if set-points have stopped coming; None while they come."""
+        if self.stream is None or now - self._heard < TIMEOUT:
+            return None
+        refused = "" if self._refused is None else f"; the last one was refused: {self._refused}"
+        return f"no set-point for {TIMEOUT:g} s{refused}"
+
+    def end(self) -> bool:
+        """Stop feeding the stream, and add up its counts; return whether there was one."""
+        there, self._ended = self.stream is not None, self.counters()
+        self.stream = None
+        return there
+
+    def counters(self) -> tuple[int, int, int]:
+        """Late, lost and limited set-points since the start, including the present stream's."""
+        late, lost, limited = self._ended
+        if self.stream is not None:
+            late, lost, limited = (
+                late + self.stream.late,
+                lost + self.stream.lost,
+                limited + self.stream.limited,
+            )
+        return late, lost, limited

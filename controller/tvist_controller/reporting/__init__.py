@@ -1,1 +1,0 @@
-"""What clients are told: states, truths and stops."""
