@@ -248,7 +248,7 @@ def balance(arm: ArmMemory, moment: Floats) -> None:
     The former become the arm's `qdd`; the latter, `moment`, have shape (n,) [N m].
     """
     n, links, qdd = arm.joints.shape[1], arm.qdd.shape[0], arm.qdd
-    y, v, _, s, z, _, _ = rows(arm.state, n)
+    y, v, s, z = arm.state[0], arm.state[1], arm.state[3], arm.state[4]
     command, M, springs, S = arm.commands[NOW], arm.dynamics[NOW], arm.springs, arm.factor
     for i in range(links):
         qdd[i] = -M[links, i] - springs[0, i] * y[i] - springs[1, i] * v[i]

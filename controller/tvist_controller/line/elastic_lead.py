@@ -19,7 +19,7 @@ import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.kinematics.least_squares import put, solve_in_place
-from tvist_controller.line.joint_controllers import LAWS, friction_at, stiction_at
+from tvist_controller.line.joint_controllers import LAWS, friction_at, sticks, stiction_at
 from tvist_kernels.compiling import inlined
 from tvist_plant.chain import SCRATCH, WIDTH, torques
 from tvist_plant.model import Floats
@@ -253,7 +253,7 @@ def follow(
 
 
 @compiled_for_ticks
-def command_motors(  # noqa: C901  a kernel: its branches are loops
+def command_motors(  # noqa: C901, PLR0912  a kernel: its branches are loops
     memory: Floats,  # see `parts`
     target: Floats,  # see `lead_of`
     ticks: int,  # number of targets before this one; the first three leads are as wanted
@@ -287,7 +287,8 @@ def command_motors(  # noqa: C901  a kernel: its branches are loops
         speed = motors[1, j] if with_torques else late[1, j]
         if memory[WITH_LAW] > 0.0:
             law, load = drives[LAW:], late[3, j] - drives[ROTOR, j] * late[2, j]
-            drives[STICTION, j] = stiction_at(law, j, drives[STICTION, j], period, speed, load)
+            if sticks(law, j):
+                drives[STICTION, j] = stiction_at(law, j, drives[STICTION, j], period, speed, load)
             motors[3, j] = late[3, j] + friction_at(law, j, speed) + drives[STICTION, j]
         else:
             share = speed if memory[LINEAR] > 0.0 else np.tanh(speed / memory[FRICTION_WIDTH])

@@ -41,12 +41,15 @@ def friction_at(law: Floats, j: int, speed: float) -> float:
 def stiction_at(law: Floats, j: int, d: float, period: float, speed: float, load: float) -> float:
     """Return the stiction of a motor that had d and turns at a speed for a period, under a load in its gear [N m].
 
-    This is the plant's equation along the commanded motion. Without stiction in the law d stays as it is, since a
-    torque that ended would shake an arm at rest.
+    This is the plant's equation along the commanded motion.
     """
-    if law[5, j] == 0.0 and law[6, j] == 0.0:
-        return d
     return stiction_after(d, period * speed, speed, load, law[5, j], law[6, j], law[7, j], law[8, j])
+
+
+@compiled_for_ticks
+def sticks(law: Floats, j: int) -> bool:
+    """Whether a law has stiction; otherwise that of the last tick stays, since a torque that ends shakes the arm."""
+    return bool(law[5, j] > 0.0 or law[6, j] > 0.0)
 
 
 @inlined
@@ -67,14 +70,16 @@ def command_drives(
     - Sag: the twist by gravity itself, g/K_g, is left, as on the paper's robot, or the motor leads by all of it, so
       that the link rests on its reference. g(q*) has neither feedback nor a delay, and is as smooth as q*.
     """
+    law = joints[LAW:]
     for j in range(q.shape[0]):
         windup = joints[COMPLIANCE, j] * (torque[j] - gravity[j]) + joints[YIELDING, j] * gravity[j]
         speed = (windup - joints[WINDUP, j]) * joints[PER_SECOND, j]
         joints[WINDUP, j] = windup
-        law, d, period = joints[LAW:], joints[STICTION, j], 1.0 / joints[PER_SECOND, j]
-        joints[STICTION, j] = stiction_at(law, j, d, period, rates[0, j] + speed, torque[j])
-        if joints[LAW + 3, j] > 0.0:
-            friction = friction_at(joints[LAW:], j, rates[0, j] + speed)
+        if sticks(law, j):
+            d, period = joints[STICTION, j], 1.0 / joints[PER_SECOND, j]
+            joints[STICTION, j] = stiction_at(law, j, d, period, rates[0, j] + speed, torque[j])
+        if law[3, j] > 0.0:
+            friction = friction_at(law, j, rates[0, j] + speed)
         else:
             friction = joints[VISCOUS, j] * rates[0, j]
             if joints[COULOMB, j] > 0.0:
