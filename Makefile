@@ -136,7 +136,7 @@ release:
 	.venv-release/bin/bump-my-version bump --new-version $(VERSION)
 
 schemas: setup
-	$(BIN)/python -m tools.blocking
+	$(BIN)/python -m tools.stubs
 	$(BIN)/python -m tvist_protocol.generate
 
 clean:

@@ -30,7 +30,7 @@ def ask(session: zenoh.Session, leaf: str, **message: object) -> dict[str, Any]:
     payload = msgpack.packb(message) if message else None
     for reply in session.get(f"tvist/{ROBOT}/{leaf}", payload=payload, timeout=10.0):
         if reply.ok:
-            answer = msgpack.unpackb(reply.ok.payload.to_bytes())
+            answer: dict[str, Any] = msgpack.unpackb(reply.ok.payload.to_bytes())
             if answer["type"] == "refused":
                 sys.exit(f"refused, {answer['code']}: {answer['why']}")
             return answer
@@ -83,13 +83,14 @@ def main() -> None:
         answer = median_ms(lambda: ask(session, "info"))
 
         # Zenoh calls back in its own thread, where we only fill a queue.
-        inbox = queue.SimpleQueue()
+        inbox: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         session.declare_subscriber(
             f"tvist/{ROBOT}/state", lambda sample: inbox.put(sample.payload.to_bytes())
         )
 
         def next_state() -> dict[str, Any]:
-            return msgpack.unpackb(inbox.get(timeout=5.0))
+            state: dict[str, Any] = msgpack.unpackb(inbox.get(timeout=5.0))
+            return state
 
         # This token tells the robot that we are present: if we die, control ends at once. The session's id
         # distinguishes us from another program with the same client name.
@@ -113,7 +114,7 @@ def main() -> None:
         while states[-1]["tick"] <= stopped or states[-1]["runtime_state"] != 1:  # 1: stopped
             states.append(next_state())
         ask(session, "command", type="release_control", token=token)
-        alive.undeclare()
+        alive.undeclare()  # type: ignore[no-untyped-call]
 
     lag = delay([s["reference_q"][0] for s in states], [s["target_q"][0] for s in states])
     still = states[0]["actual_tool_accelerometer"]  # gravity, which a rotation of the base does not change

@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from tvist_client.arguments import make_payload
     from tvist_client.arm import Arm
     from tvist_client.errors import (
         AnswerTimeoutError,
@@ -17,12 +18,10 @@ if TYPE_CHECKING:
         StreamStoppedError,
         UnexpectedReplyError,
     )
+    from tvist_client.feed import Stream
     from tvist_client.motion import Motion
-    from tvist_client.payload import make_payload
-    from tvist_client.robot import Robot
+    from tvist_client.robot import Robot, Stepper
     from tvist_client.servo import Servo
-    from tvist_client.stepper import Stepper
-    from tvist_client.stream import Stream
     from tvist_client.transports import InProcessRobot, LoopbackTransport, Transport, ZenohTransport
     from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
     from tvist_protocol.info import Info
@@ -39,43 +38,24 @@ __all__ = [
     "Telemetry", "Transport", "Truth", "TvistError", "UnexpectedReplyError", "ZenohTransport", "make_payload",
 ]  # fmt: skip
 
-_PLACES = {
-    "AnswerTimeoutError": "tvist_client.errors",
-    "ArcSegment": "tvist_protocol.motions",
-    "ArgumentError": "tvist_client.errors",
-    "Arm": "tvist_client.arm",
-    "ClientError": "tvist_client.errors",
-    "DeniedError": "tvist_client.errors",
-    "Event": "tvist_protocol.stream",
-    "InProcessRobot": "tvist_client.transports",
-    "Info": "tvist_protocol.info",
-    "JointSegment": "tvist_protocol.motions",
-    "LineSegment": "tvist_protocol.motions",
-    "LoopbackTransport": "tvist_client.transports",
-    "MisuseError": "tvist_client.errors",
-    "Motion": "tvist_client.motion",
-    "MotionStoppedError": "tvist_client.errors",
-    "NotConnectedError": "tvist_client.errors",
-    "Payload": "tvist_protocol.values",
-    "ProcessSegment": "tvist_protocol.motions",
-    "ProtectiveStopError": "tvist_client.errors",
-    "ProtocolError": "tvist_protocol.errors",
-    "RefusedError": "tvist_protocol.errors",
-    "Robot": "tvist_client.robot",
-    "Servo": "tvist_client.servo",
-    "State": "tvist_protocol.stream",
-    "Stepper": "tvist_client.stepper",
-    "Stream": "tvist_client.stream",
-    "StreamStoppedError": "tvist_client.errors",
-    "Telemetry": "tvist_protocol.stream",
-    "Transport": "tvist_client.transports",
-    "Truth": "tvist_protocol.stream",
-    "TvistError": "tvist_protocol.errors",
-    "UnexpectedReplyError": "tvist_client.errors",
-    "ZenohTransport": "tvist_client.transports",
-    "make_payload": "tvist_client.payload",
+_NAMES = {
+    "tvist_client.arguments": "make_payload",
+    "tvist_client.arm": "Arm",
+    "tvist_client.errors": "AnswerTimeoutError ArgumentError ClientError DeniedError MisuseError "
+    "MotionStoppedError NotConnectedError ProtectiveStopError StreamStoppedError UnexpectedReplyError",
+    "tvist_client.feed": "Stream",
+    "tvist_client.motion": "Motion",
+    "tvist_client.robot": "Robot Stepper",
+    "tvist_client.servo": "Servo",
+    "tvist_client.transports": "InProcessRobot LoopbackTransport Transport ZenohTransport",
+    "tvist_protocol.errors": "ProtocolError RefusedError TvistError",
+    "tvist_protocol.info": "Info",
+    "tvist_protocol.motions": "ArcSegment JointSegment LineSegment ProcessSegment",
+    "tvist_protocol.stream": "Event State Telemetry Truth",
+    "tvist_protocol.values": "Payload",
 }
-"""Module of each name, which is imported when the name is first used: a program pays only for what it uses."""
+"""Names by module, which is imported when one of them is first used: a program pays only for what it uses."""
+_PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 
 def __getattr__(name: str) -> object:

@@ -1,29 +1,49 @@
-"""A session with all robots of a network, whatever their namespaces; what is seen of them is said by subclasses."""
+"""Sessions with all robots of a network, whatever their namespaces: the newest states of many, by one subscription."""
 
 import asyncio
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 import zenoh
+from zenoh.handlers import Callback
 
+from tvist_client.errors import MisuseError
 from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
+from tvist_client.transports.inbox import wake
 from tvist_client.transports.session import close_session, open_session
 from tvist_protocol import keys
+from tvist_protocol.codec import decode_state
+from tvist_protocol.errors import ProtocolError
+from tvist_protocol.stream import State
+
+
+class Place(NamedTuple):
+    """A robot's namespace, which is empty if it has none, and its name."""
+
+    namespace: str
+    robot: str
+
+    def __str__(self) -> str:
+        """Namespace and name as one path, `hall-3/ur5e-1`."""
+        return keys.within(self.namespace, self.robot)
+
+    def key(self, leaf: Callable[[str], str]) -> str:
+        """Key of the robot, such as its `keys.command`."""
+        return keys.within(self.namespace, leaf(self.robot))
+
+
+def place_of(text: str) -> Place:
+    """Read `NAMESPACE/NAME`, or `NAME` alone."""
+    namespace, _, robot = text.rpartition("/")
+    return Place(keys.check_namespace(namespace) if namespace else "", keys.check_robot_name(robot))
 
 
 class Across(ABC):
-    """A session without a namespace of its own. Use as an asynchronous context.
-
-    Args:
-        endpoint: Endpoint of a router, or of one server.
-        security: Folder with this client's certificate, for `tls/<host>:<port>`.
-        namespace: Namespace that the robots are in or below; empty: all namespaces.
-
-    Raises:
-        ProtocolError: The namespace is none.
-    """
+    """A session with the robots in or below a namespace, or in all of them. Use as an asynchronous context."""
 
     def __init__(
         self, endpoint: str = ENDPOINT, *, security: Folder | None = None, namespace: str = ""
@@ -34,11 +54,7 @@ class Across(ABC):
         self._loop: asyncio.AbstractEventLoop
 
     async def __aenter__(self) -> Self:
-        """Connect and subscribe.
-
-        Raises:
-            NotConnectedError: Nobody listens there, or the certificate is rejected.
-        """
+        """Connect and subscribe."""
         self._loop = asyncio.get_running_loop()
         self._session = await asyncio.to_thread(open_session, self._endpoint, self._security)
         await self._subscribe()
@@ -52,3 +68,68 @@ class Across(ABC):
     @abstractmethod
     async def _subscribe(self) -> None:
         """Subscribe to what is to be seen; called once the session is open."""
+
+
+class Newest(NamedTuple):
+    """The newest state of a robot."""
+
+    state: State
+    received: int
+    """Number of its states since the last look."""
+    at: float
+    """Time at which it came, on the loop's clock [s]."""
+
+
+class ManyStates(Across):
+    """States of all robots that a key selects. Use as an asynchronous context.
+
+    Only the newest state of each robot is kept, and decoded when it is looked at.
+
+    Args:
+        selector: Key with wildcards that ends in `/state`: `tvist/*/state`, or `**/tvist/*/state` for all namespaces.
+        endpoint: Endpoint of a router, or of one server.
+        security: Folder with this client's certificate, for `tls/<host>:<port>`.
+        namespace: Namespace that precedes the key.
+
+    Raises:
+        MisuseError: The selector does not end in `/state`, or is no key.
+    """
+
+    def __init__(
+        self, selector: str, endpoint: str = ENDPOINT, *, security: Folder | None = None, namespace: str = ""
+    ) -> None:
+        leaf = f"/{keys.state('r').rpartition('/')[2]}"
+        if not selector.endswith(leaf):
+            raise MisuseError(
+                f"{selector} is not a key of states: it must end in {leaf}, such as tvist/*{leaf}"
+            )
+        try:
+            zenoh.KeyExpr(selector)
+        except zenoh.ZError as error:
+            raise MisuseError(f"{selector} is not a key: write tvist/*{leaf}, or tvist/NAME{leaf}") from error
+        super().__init__(endpoint, security=security, namespace=namespace)
+        self._key = keys.within(self._within, selector)
+        self._newest: dict[Place, tuple[bytes, int, float]] = {}
+
+    async def _subscribe(self) -> None:
+        self._session.declare_subscriber(self._key, Callback(self._on_sample, indirect=False))
+
+    def look(self) -> dict[Place, Newest]:
+        """Return the newest state of each robot that has ever sent one."""
+        found: dict[Place, Newest] = {}
+        for place, (data, received, at) in sorted(self._newest.items()):
+            try:
+                found[place] = Newest(decode_state(data), received, at)
+            except ProtocolError:  # another version's
+                continue
+            self._newest[place] = (data, 0, at)
+        return found
+
+    def _on_sample(self, sample: zenoh.Sample) -> None:
+        place = keys.place(str(sample.key_expr))
+        if place is not None:
+            wake(self._loop, partial(self._keep, Place(*place), sample.payload.to_bytes()))
+
+    def _keep(self, place: Place, data: bytes) -> None:
+        before = self._newest.get(place, (b"", 0, 0.0))
+        self._newest[place] = (data, before[1] + 1, self._loop.time())

@@ -4,66 +4,20 @@
         arm.move_j(q)
 
 A call waits for its answer; Ctrl-C ends the wait. Callbacks run in the loop's thread and must not block.
+`blocking.pyi`, which `make schemas` writes, says the arguments of all methods.
 """
 
-from types import TracebackType
-from typing import Self
-
-from tvist_client import blocking_classes
-from tvist_client import robot as asynchronous_robot
-from tvist_client.blocking_classes import Arm, Motion, Servo, Stepper
-from tvist_client.blocking_stream import Stream
-from tvist_client.portal import Portal
-from tvist_client.robot import ENDPOINT, NAME
-from tvist_client.transports.base import Transport
-from tvist_client.transports.certificates import Folder
+from tvist_client import arm, motion, robot, servo
+from tvist_client.waiting import Opened, Stream, without_await
 
 __all__ = ["Arm", "Motion", "Robot", "Servo", "Stepper", "Stream"]
 
-
-class Robot(blocking_classes.Robot):
-    """One robot; see `tvist_client.robot.Robot` for the arguments of `connect`."""
-
-    @classmethod
-    def connect(
-        cls,
-        endpoint: str = ENDPOINT,
-        name: str = NAME,
-        *,
-        security: Folder | None = None,
-        namespace: str = "",
-    ) -> Self:
-        """Connect over Zenoh and check that the robot answers."""
-        portal = Portal()
-        try:
-            robot = portal.call(
-                lambda: asynchronous_robot.Robot.connect(
-                    endpoint, name, security=security, namespace=namespace
-                )
-            )
-        except BaseException:
-            portal.close()
-            raise
-        return cls(portal, robot)
-
-    @classmethod
-    def over(cls, transport: Transport) -> Self:
-        """Use a robot over a transport that is not yet bound to an event loop, such as the loopback's."""
-        portal = Portal()
-        return cls(portal, portal.run(lambda: asynchronous_robot.Robot.over(transport)))
-
-    def close(self) -> None:
-        """Close the connection and end the loop's thread; a second call does nothing."""
-        if not self._portal.closed:
-            try:
-                self._portal.call(self._robot.close)
-            finally:
-                self._portal.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
+Motion = without_await(motion.Motion, "on_event", "fail", "wait_event")
+Servo = without_await(servo.Servo, "check")
+Stepper = without_await(robot.Stepper, "robot")
+Arm = without_await(arm.Arm, "robot", "keep_alive_every")
+Robot = without_await(
+    robot.Robot,
+    *("arm", "stepper", "clock_token", "pass_time", "put_setpoint", "until", "watch"),
+    base=Opened,
+)

@@ -91,17 +91,10 @@ def check(
 ) -> CheckReport:
     """Connect to a robot, receive a state, have a command refused, and ask whether the robot may be moved.
 
-    The check changes nothing.
-
-    Args:
-        endpoint: Endpoint of the server, `tcp/<host>:<port>`.
-        name: Name of the robot; None: `ur5e` if it is there, otherwise the first robot at the endpoint.
-        alive: Check only that the server answers and, in real time, ticks. An orchestrator that uses this does not
-            kill a robot that has stopped and is about to be unlocked.
-        security: Folder with this client's certificate, for `tls/<host>:<port>`.
-        namespace: Namespace of the robot.
-        wait: Longest time to try again while no robot answers, or it is starting [s].
-        tell: Called before each further try with what the one before has found, for people.
+    The check changes nothing. With `alive` it only checks that the server answers and, in real time, ticks: an
+    orchestrator that uses this does not kill a robot that has stopped and is about to be unlocked. While no robot
+    answers, or it is starting, it tries again for `wait` seconds, and tells before each try what the one before has
+    found. Without a name, it is `ur5e` if that is there, otherwise the first robot at the endpoint.
     """
     deadline = time.monotonic() + wait
     while True:

@@ -16,6 +16,8 @@ TvistError
     └── MisuseError          called at the wrong time
 """
 
+from typing import ClassVar
+
 from tvist_protocol.errors import TvistError
 from tvist_protocol.stream import Event
 
@@ -70,33 +72,27 @@ class StoppedError(ClientError):
         event: The event.
     """
 
+    _what: ClassVar = "the robot stopped"
+
     def __init__(self, event: Event) -> None:
         super().__init__(event)
         self.event = event
 
     def __str__(self) -> str:
         why = f": {self.event.why}" if self.event.why else ""
-        return f"{self._what} at tick {self.event.tick}{why}"
-
-    @property
-    def _what(self) -> str:
-        return "the robot stopped"
+        return f"{self._what.format(self.event.id)} at tick {self.event.tick}{why}"
 
 
 class MotionStoppedError(StoppedError):
     """A motion ended before its target; the event is the robot's `motion_stopped`."""
 
-    @property
-    def _what(self) -> str:
-        return f"motion {self.event.id} was stopped"
+    _what = "motion {} was stopped"
 
 
 class StreamStoppedError(StoppedError):
     """The robot ended the stream of set-points; `servo` begins a new one. The event is the robot's `stream_stopped`."""
 
-    @property
-    def _what(self) -> str:
-        return "the stream of set-points was ended"
+    _what = "the stream of set-points was ended"
 
 
 class ProtectiveStopError(StoppedError):
@@ -105,6 +101,4 @@ class ProtectiveStopError(StoppedError):
     The event is the robot's `protective_stop`.
     """
 
-    @property
-    def _what(self) -> str:
-        return "the robot made another protective stop"
+    _what = "the robot made another protective stop"

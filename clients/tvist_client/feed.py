@@ -3,11 +3,11 @@
 import asyncio
 import logging
 import weakref
-from collections.abc import Callable
+from collections import deque
+from collections.abc import AsyncIterator, Callable
 from typing import Generic, Protocol, TypeVar
 
 from tvist_client.errors import AnswerTimeoutError, ArgumentError, ClientError, NotConnectedError
-from tvist_client.stream import Stream
 from tvist_client.transports.base import Topic, Transport
 from tvist_client.values import whole
 from tvist_protocol.errors import ProtocolError, quoted
@@ -24,17 +24,62 @@ class Ticked(Protocol):
 
 
 M = TypeVar("M", bound=Ticked)
+Item = TypeVar("Item")
+
+
+class Stream(AsyncIterator[Item], Generic[Item]):
+    """Messages in order, from the creation of this iterator on.
+
+    If the reader is slower than the robot, the oldest messages are dropped and counted, so that messages are never
+    older than the buffer. The iterator ends when the robot's connection is closed.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.dropped = 0
+        """Number of messages that were dropped because the reader was too slow."""
+        self._waiting: deque[Item] = deque(maxlen=size)
+        self._news = asyncio.Event()
+        self._error: ClientError | None = None
+        self._finished = False
+
+    @property
+    def ready(self) -> bool:
+        """True if the next message, or the end, is there already."""
+        return bool(self._waiting) or self._finished or self._error is not None
+
+    def push(self, message: Item) -> None:
+        """Add a message; if the buffer is full, the oldest is dropped and counted."""
+        if len(self._waiting) == self._waiting.maxlen:
+            self.dropped += 1
+        self._waiting.append(message)
+        self._news.set()
+
+    def fail(self, error: ClientError) -> None:
+        """Raise an error in the reader, once, after the waiting messages."""
+        self._error = error
+        self._news.set()
+
+    def finish(self) -> None:
+        """End after the waiting messages."""
+        self._finished = True
+        self._news.set()
+
+    async def __anext__(self) -> Item:
+        while not self._waiting:
+            if self._error is not None:
+                error, self._error = self._error, None
+                raise error
+            if self._finished:
+                raise StopAsyncIteration
+            self._news.clear()
+            await self._news.wait()
+        return self._waiting.popleft()
 
 
 class Feed(Generic[M]):
     """Messages of one topic. Subscribes with its first listener.
 
-    Args:
-        transport: Transport that delivers the messages.
-        topic: Topic to subscribe to.
-        decode: Converts bytes to a message.
-        once_a_tick: Whether there is one message per tick; a message that is not newer than the last is then dropped
-            as a repetition.
+    Where there is one message per tick (`once_a_tick`), one that is not newer than the last is dropped as a repetition.
     """
 
     def __init__(
@@ -55,11 +100,7 @@ class Feed(Generic[M]):
         self._waiting: dict[asyncio.Future[M], Callable[[M], bool]] = {}
 
     def subscribe(self) -> None:
-        """Subscribe to the topic; from then on `latest` is updated.
-
-        Raises:
-            NotConnectedError: The connection is closed.
-        """
+        """Subscribe to the topic; from then on `latest` is updated."""
         if self._finished:
             raise NotConnectedError("the connection is closed: open another one")
         if not self._subscribed:
@@ -67,12 +108,7 @@ class Feed(Generic[M]):
             self._subscribed = True
 
     def listen(self, callback: Callable[[M], object]) -> Callable[[], None]:
-        """Call a function with every message; the function returned ends that.
-
-        Raises:
-            ArgumentError: What is given is not a function.
-            NotConnectedError: The connection is closed.
-        """
+        """Call a function with every message; the function returned ends that."""
         if not callable(callback):
             raise ArgumentError(
                 "callback", f"callback is {quoted(callback)}: must be a function of one {self._topic} message"
@@ -82,15 +118,7 @@ class Feed(Generic[M]):
         return lambda: self._listeners.remove(callback)
 
     def stream(self, buffer: int) -> Stream[M]:
-        """Return an iterator over every message from now on; it is dropped when it is no longer referenced.
-
-        Args:
-            buffer: Number of messages that may wait, at least 1.
-
-        Raises:
-            ArgumentError: The buffer has no such number of places.
-            NotConnectedError: The connection is closed.
-        """
+        """Return an iterator over every message from now on; it is dropped when it is no longer referenced."""
         size = whole(buffer, "buffer", 1)
         self.subscribe()
         stream: Stream[M] = Stream(size)
@@ -98,12 +126,7 @@ class Feed(Generic[M]):
         return stream
 
     async def next(self, wanted: Callable[[M], bool], timeout_s: float) -> M:
-        """Return the next message that satisfies a condition.
-
-        Raises:
-            AnswerTimeoutError: No such message arrived in time.
-            NotConnectedError: The robot disconnected.
-        """
+        """Return the next message that satisfies a condition."""
         self.subscribe()
         message: asyncio.Future[M] = asyncio.get_running_loop().create_future()
         self._waiting[message] = wanted

@@ -8,19 +8,18 @@ import asyncio
 import re
 from collections.abc import Callable, Collection
 from functools import partial
-from typing import NamedTuple
 
 import msgspec
 import zenoh
 from zenoh.handlers import Callback
 
-from tvist_client.across import Across
+from tvist_client.across import Across, Place
+from tvist_client.connection import understood
 from tvist_client.errors import ClientError, NotConnectedError
 from tvist_client.readiness import RELIEVE, readiness
 from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
-from tvist_client.understood import understood
 from tvist_protocol import keys
 from tvist_protocol.codec import decode_info, decode_reply, decode_telemetry, encode
 from tvist_protocol.commands import Stop
@@ -36,31 +35,6 @@ SETTLE_S = 0.3
 LISTEN_S = 1.3
 """Time in which every robot in real time publishes its telemetry at least once [s]."""
 _DIGITS = re.compile(r"(\d+)")
-
-
-class Place(NamedTuple):
-    """A robot's namespace, which is empty if it has none, and its name."""
-
-    namespace: str
-    robot: str
-
-    def __str__(self) -> str:
-        """Namespace and name as one path, `hall-3/ur5e-1`."""
-        return keys.within(self.namespace, self.robot)
-
-    def key(self, leaf: Callable[[str], str]) -> str:
-        """Key of the robot, such as its `keys.command`."""
-        return keys.within(self.namespace, leaf(self.robot))
-
-
-def place_of(text: str) -> Place:
-    """Read `NAMESPACE/NAME`, or `NAME` alone.
-
-    Raises:
-        ProtocolError: It is neither.
-    """
-    namespace, _, robot = text.rpartition("/")
-    return Place(keys.check_namespace(namespace) if namespace else "", keys.check_robot_name(robot))
 
 
 class FleetRobot(msgspec.Struct, frozen=True):

@@ -41,15 +41,7 @@ def halt(
 ) -> HaltReport:
     """Send `stop` without control, and wait until the arm is at rest; in lockstep, a client has to step time.
 
-    Args:
-        endpoint: Endpoint of the server, `tcp/<host>:<port>`.
-        name: Name of the robot; None: the only one at the endpoint, or `ur5e`.
-        security: Folder with this client's certificate, for `tls/<host>:<port>`.
-        namespace: Namespace of the robot.
-
-    Raises:
-        NotConnectedError: No server listens there, there is no such robot, or there are several and no name was given.
-        DeniedError: This client's certificate is not an operator's.
+    Without a name, it is the only robot at the endpoint, or `ur5e`.
     """
     return asyncio.run(_halt(endpoint, name, security, namespace))
 

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable, Generator
-from typing import Any
+from typing import Any, Self
 
 from tvist_client.errors import ClientError, MotionStoppedError
 from tvist_protocol.stream import Event
@@ -36,7 +36,7 @@ class Motion:
         """Whether the motion has ended, or the connection that would report its end is lost."""
         return self._ended.is_set()
 
-    async def wait(self) -> "Motion":
+    async def wait(self) -> Self:
         """Wait for the end; in lockstep and free, step time until then.
 
         Raises:
@@ -50,7 +50,7 @@ class Motion:
             raise MotionStoppedError(self.stopped)
         return self
 
-    def __await__(self) -> Generator[Any, None, "Motion"]:
+    def __await__(self) -> Generator[Any, None, Self]:
         """Make `await motion` equivalent to `await motion.wait()`."""
         return self.wait().__await__()
 
@@ -77,11 +77,7 @@ class Motion:
 
 
 class MotionsByNumber:
-    """The motions of one robot by number; each is created by its answer or its first event, whichever comes first.
-
-    Args:
-        pass_time: Steps time until a motion has ended.
-    """
+    """The motions of one robot by number; each is created by its answer or its first event, whichever comes first."""
 
     def __init__(self, pass_time: Callable[[Motion], Awaitable[None]]) -> None:
         self._pass_time = pass_time

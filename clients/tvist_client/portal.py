@@ -62,11 +62,6 @@ class Portal:
 
         return self.call(called)
 
-    def subscription(self, subscribe: Callable[[], Callable[[], None]]) -> Callable[[], None]:
-        """Call a function that returns a function to undo it; both run on the loop."""
-        undo = self.run(subscribe)
-        return lambda: self.run(undo)
-
     @contextlib.contextmanager
     def enter(self, context: AbstractAsyncContextManager[T]) -> Iterator[T]:
         """Enter an asynchronous context manager, and leave it with the block's error if there is one."""

@@ -54,12 +54,7 @@ class Readiness(Struct, frozen=True):
 
 
 async def look(robot: Robot, unlock: str = "tvist unlock") -> Readiness:
-    """Ask a robot whether it is ready to move.
-
-    Args:
-        robot: The robot.
-        unlock: The command that unlocks it.
-    """
+    """Ask a robot whether it is ready to move; `unlock` is the command that unlocks it."""
     info, state = await robot.info(), None
     if info.robot_mode is None and (info.clock == "realtime" or info.tick > 0):
         state = await robot.state()
@@ -67,13 +62,7 @@ async def look(robot: Robot, unlock: str = "tvist unlock") -> Readiness:
 
 
 def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> Readiness:
-    """Judge readiness from the robot's own messages.
-
-    Args:
-        info: Present description of the robot.
-        state: Its newest state, for a server whose `info` lacks the modes; None if not needed or not available.
-        unlock: The command that unlocks this robot.
-    """
+    """Judge readiness from the robot's own messages; the state is for a server whose `info` lacks the modes."""
     robot = info.robot_mode if info.robot_mode is not None or state is None else state.robot_mode
     safety = info.safety_mode if info.safety_mode is not None or state is None else state.safety_mode
     if robot is None or safety is None:

@@ -2,47 +2,36 @@
 
 from collections.abc import Iterable, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
+from tvist_client.command import TICK
+from tvist_client.connection import MAX_STEP, Connection, step
 from tvist_client.errors import MisuseError, StreamStoppedError
-from tvist_client.stepper import MAX_STEP
 from tvist_client.values import JointRange
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Setpoint
 from tvist_protocol.simulation import StepSetpoint
 from tvist_protocol.stream import Event
 
-if TYPE_CHECKING:
-    from tvist_client.simulation import Simulation
-
-TICK = 0.002
-"""Control period [s]."""
-
 
 class Servo:
-    """The stream that `Arm.servo` yields: numbers set-points from 0 and checks them, since a robot does not answer.
-
-    Args:
-        arm: Arm to stream to.
-        period: Time between two set-points [s].
-        joints: The joint angles that the robot accepts.
-    """
+    """The stream that `Arm.servo` yields: numbers set-points from 0 and checks them, since a robot does not answer."""
 
     period: float
     """Time between two set-points [s]."""
     sequence: int
     """Number of the next set-point."""
 
-    def __init__(self, arm: "Simulation", period: float, joints: JointRange) -> None:
+    def __init__(self, robot: Connection, token: str, period: float, joints: JointRange) -> None:
         self.period = period
         self.sequence = 0
-        self._arm = arm
+        self._robot, self._token = robot, token
         self._joints = joints
         self._left = False
         self._stopped: Event | None = None
 
     def __enter__(self) -> Self:
-        self._forget = self._arm.robot.on_event(self._on_event)
+        self._forget = self._robot.on_event(self._on_event)
         return self
 
     def __exit__(
@@ -69,8 +58,8 @@ class Servo:
         """
         self.check()
         sequence = self.sequence
-        setpoint = Setpoint(token=self._arm.token, sequence=sequence, q=self._joints.check(q))
-        self._arm.robot.put_setpoint(encode(setpoint))
+        setpoint = Setpoint(token=self._token, sequence=sequence, q=self._joints.check(q))
+        self._robot.put_setpoint(encode(setpoint))
         self.sequence += 1
         return sequence
 
@@ -88,8 +77,7 @@ class Servo:
             MisuseError: Time passes by itself here, or there are no set-points.
             StreamStoppedError: The robot has ended the stream.
         """
-        robot = self._arm.robot
-        if await robot.clock() == "realtime":
+        if await self._robot.clock() == "realtime":
             raise MisuseError("this robot runs in real time: call set(q) once per period")
         setpoints = [
             StepSetpoint(sequence=self.sequence + place, q=self._joints.check(q, f"qs[{place}]"))
@@ -104,7 +92,7 @@ class Servo:
         for first in range(0, len(setpoints), together):
             self.check()
             played: Sequence[StepSetpoint] = setpoints[first : first + together]
-            tick = await self._arm.step(ticks * len(played), played)
+            tick = await step(self._robot, self._token, ticks * len(played), played)
             self.sequence += len(played)
         return tick
 

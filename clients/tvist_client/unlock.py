@@ -54,19 +54,8 @@ def unlock(
 ) -> UnlockReport:
     """Take control, release what a client can release, and check that the robot does not stop again.
 
-    A robot that is ready is not changed. In lockstep, time advances by some hundred ticks.
-
-    Args:
-        endpoint: Endpoint of the server, `tcp/<host>:<port>`.
-        name: Name of the robot; None: the only one at the endpoint, or `ur5e`.
-        power_on: Whether to power on the arm and release its brakes if it is off.
-        security: Folder with this client's certificate, for `tls/<host>:<port>`.
-        namespace: Namespace of the robot.
-
-    Raises:
-        NotConnectedError: No server listens there, there is no such robot, or there are several and no name was given.
-        RefusedError: Another client has control.
-        ClientError: The robot is only watched.
+    A robot that is ready is not changed. In lockstep, time advances by some hundred ticks. Without a name, it is
+    the only robot at the endpoint, or `ur5e`.
     """
     return asyncio.run(_unlock(endpoint, name, security, namespace, power_on=power_on))
 
@@ -74,13 +63,7 @@ def unlock(
 async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[str]:
     """Restart the safety system, unlock a protective stop and power on the arm, as far as needed and possible.
 
-    Args:
-        robot: The robot.
-        arm: Control of the robot.
-        power_on: Whether to power on the arm and release its brakes.
-
-    Returns:
-        What was done, as sentences without a subject. `readiness.look` says whether the robot is then ready.
+    Returns what was done, as sentences without a subject. `readiness.look` says whether the robot is then ready.
     """
     done: list[str] = []
     found = await look(robot)

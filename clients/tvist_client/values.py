@@ -3,8 +3,8 @@
 import contextlib
 import math
 import operator
-from collections.abc import Iterable
-from typing import TypeVar
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
 
 from tvist_client.errors import ArgumentError
 from tvist_protocol.errors import quoted
@@ -12,19 +12,10 @@ from tvist_protocol.info import Info
 
 T = TypeVar("T")
 Joints = tuple[float, ...]
-Six = tuple[float, float, float, float, float, float]
 
 
 def number(value: float, where: str) -> float:
-    """Convert a value to a float; its range is checked by the robot.
-
-    Args:
-        value: Anything that represents one number.
-        where: Name of the argument, for error messages.
-
-    Raises:
-        ArgumentError: The value has the wrong type or length.
-    """
+    """Convert a value to a float; its range is checked by the robot."""
     # `float` would also parse text, which cannot be intended here.
     if not isinstance(value, str | bytes):
         with contextlib.suppress(TypeError, ValueError, OverflowError):
@@ -32,17 +23,8 @@ def number(value: float, where: str) -> float:
     raise ArgumentError(where, f"{where} is {quoted(value)}: must be a number")
 
 
-def optional_number(value: float | None, where: str) -> float | None:
-    """Convert a value to a float, and leave None as it is; see `number`."""
-    return None if value is None else number(value, where)
-
-
 def positive(value: float, where: str) -> float:
-    """Convert a value to a finite float above 0.
-
-    Raises:
-        ArgumentError: The value is not such a number.
-    """
+    """Convert a value to a finite float above 0."""
     found = number(value, where)
     if not 0.0 < found < math.inf:
         raise ArgumentError(where, f"{where} is {found:g}: must be more than 0, and finite", 0.0)
@@ -50,17 +32,7 @@ def positive(value: float, where: str) -> float:
 
 
 def whole(value: int, where: str, low: int, high: int | None = None) -> int:
-    """Convert a value to an integer within bounds.
-
-    Args:
-        value: Anything that represents an integer.
-        where: Name of the argument, for error messages.
-        low: Smallest permitted value.
-        high: Largest permitted value; None for no bound.
-
-    Raises:
-        ArgumentError: The value is not a number, or out of range.
-    """
+    """Convert a value to an integer within bounds."""
     allowed = f"at least {low}" if high is None else f"from {low} to {high}"
     try:
         found = operator.index(value)
@@ -71,80 +43,38 @@ def whole(value: int, where: str, low: int, high: int | None = None) -> int:
     return found
 
 
-def floats(values: Iterable[float], where: str, meaning: str | None = None) -> Joints:
-    """Convert a sequence of numbers to floats.
-
-    Args:
-        values: List, tuple or array.
-        where: Name of the argument, for error messages.
-        meaning: One word for each number, if their count is known here; otherwise the robot checks it.
-
-    Raises:
-        ArgumentError: A value is not a number, or their count is wrong.
-    """
-    listed = entries(values, where)
-    if meaning is not None and len(listed) != (count := len(meaning.split())):
-        why = f"{where} has {len(listed)} numbers: must have {count}, {meaning}"
-        raise ArgumentError(where, why, count)
-    return tuple(number(entry, f"{where}[{place}]") for place, entry in enumerate(listed))
-
-
-def pose_of(values: Iterable[float], where: str) -> Six:
-    """Convert x y z [m] and a rotation vector [rad] to floats; see `floats`."""
-    x, y, z, rx, ry, rz = floats(values, where, "x y z rx ry rz")
-    return x, y, z, rx, ry, rz
-
-
-def optional_pose(values: Iterable[float] | None, where: str) -> Six | None:
-    """Convert a pose to floats, and leave None as it is; see `pose_of`."""
-    return None if values is None else pose_of(values, where)
-
-
-def twist_of(values: Iterable[float], where: str) -> Six:
-    """Convert a velocity [m/s] and an angular velocity [rad/s] to floats; see `floats`."""
-    vx, vy, vz, wx, wy, wz = floats(values, where, "vx vy vz wx wy wz")
-    return vx, vy, vz, wx, wy, wz
-
-
-def entries(values: Iterable[T], where: str, of: str = "numbers") -> tuple[T, ...]:
-    """Return the entries of a sequence unchanged.
-
-    Args:
-        values: List, tuple or array.
-        where: Name of the argument, for error messages.
-        of: What the entries are, for error messages.
-
-    Raises:
-        ArgumentError: The value is not a sequence.
-    """
+def listed(
+    values: Iterable[Any],
+    where: str,
+    convert: Callable[[Any, str], T],
+    *,
+    of: str = "numbers",
+    count: int | None = None,
+    meaning: str | None = None,
+) -> tuple[T, ...]:
+    """Convert the entries of a sequence, whose count is checked here only if it is known, with a word for each."""
+    entries = None
     if not isinstance(values, str | bytes):
         with contextlib.suppress(TypeError):
-            return tuple(values)
-    raise ArgumentError(where, f"{where} is {quoted(values)}: must be a list of {of}")
+            entries = tuple(values)
+    if entries is None:
+        raise ArgumentError(where, f"{where} is {quoted(values)}: must be a list of {of}")
+    if count is not None and len(entries) != count:
+        must = f"must have {count}" if meaning is None else f"must have {count}, {meaning}"
+        raise ArgumentError(where, f"{where} has {len(entries)} {of}: {must}", count)
+    return tuple(convert(entry, f"{where}[{place}]") for place, entry in enumerate(entries))
 
 
 class JointRange:
-    """The joint angles that a robot accepts; set-points are checked here because the robot does not answer them.
-
-    Args:
-        info: Description of the robot.
-    """
+    """The joint angles that a robot accepts; set-points are checked here because the robot does not answer them."""
 
     def __init__(self, info: Info) -> None:
         self._joints = info.joints
         self._ranges = info.limits.position
 
     def check(self, q: Iterable[float], where: str = "q") -> Joints:
-        """Convert joint angles to floats, and check that the robot accepts them.
-
-        Args:
-            q: One angle per joint [rad].
-            where: Name of the argument, for error messages.
-
-        Raises:
-            ArgumentError: An angle is not a number, not finite or outside its joint's range, or their count is wrong.
-        """
-        angles = floats(q, where)
+        """Convert joint angles to floats, and check that the robot accepts them."""
+        angles = listed(q, where, number)
         joints, ranges = self._joints, self._ranges
         if len(angles) != len(joints):
             why = f"{where} has {len(angles)} angles; this arm has {len(joints)} joints: give one per joint"

@@ -6,7 +6,7 @@ A constructor does not validate; `tvist_protocol.codec.check` does, and the serv
 from math import isfinite
 from typing import Any, Literal
 
-from tvist_protocol.client_message import ClientMessage
+from tvist_protocol.client_message import ClientMessage, Leased
 from tvist_protocol.errors import ProtocolError, short
 from tvist_protocol.forces import EndForceMode, ForceMode, Freedrive, SetExternalWrench, ZeroFtsensor
 from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
@@ -62,25 +62,17 @@ class TakeControl(ClientMessage, frozen=True, kw_only=True, tag="take_control"):
     """Version of the protocol the client speaks."""
 
 
-class KeepAlive(ClientMessage, frozen=True, kw_only=True, tag="keep_alive"):
+class KeepAlive(Leased, frozen=True, kw_only=True, tag="keep_alive"):
     """Renew the lease; send one every `lease_s`/3."""
 
-    token: Token
-    """Token of the lease."""
 
-
-class ReleaseControl(ClientMessage, frozen=True, kw_only=True, tag="release_control"):
+class ReleaseControl(Leased, frozen=True, kw_only=True, tag="release_control"):
     """Give the lease back."""
 
-    token: Token
-    """Token of the lease."""
 
-
-class HandOver(ClientMessage, frozen=True, kw_only=True, tag="hand_over"):
+class HandOver(Leased, frozen=True, kw_only=True, tag="hand_over"):
     """Give the lease directly to another client, so that no third client can take it."""
 
-    token: Token
-    """Token of the lease."""
     client: ClientName
     """Name of the client that gets control."""
 
@@ -101,11 +93,9 @@ class ReleaseClock(ClientMessage, frozen=True, kw_only=True, tag="release_clock"
     """Token of the clock."""
 
 
-class MoveJ(ClientMessage, frozen=True, kw_only=True, tag="move_j"):
+class MoveJ(Leased, frozen=True, kw_only=True, tag="move_j"):
     """Move to a joint configuration, all joints in phase; answered by `accepted` with `id`, then events."""
 
-    token: Token
-    """Token of the lease."""
     q: Joints
     """Target, one angle per joint [rad]."""
     velocity: Velocity = 1.5
@@ -119,11 +109,9 @@ class MoveJ(ClientMessage, frozen=True, kw_only=True, tag="move_j"):
     the arm takes longer."""
 
 
-class ServoStart(ClientMessage, frozen=True, kw_only=True, tag="servo_start"):
+class ServoStart(Leased, frozen=True, kw_only=True, tag="servo_start"):
     """Begin to follow a stream of set-points."""
 
-    token: Token
-    """Token of the lease."""
     period: Period = 0.002
     """Time between two set-points [s]."""
     velocity: Velocity = 1.5
@@ -134,11 +122,8 @@ class ServoStart(ClientMessage, frozen=True, kw_only=True, tag="servo_start"):
     """Jerk to which every joint is limited [rad/s³]."""
 
 
-class ServoStop(ClientMessage, frozen=True, kw_only=True, tag="servo_stop"):
+class ServoStop(Leased, frozen=True, kw_only=True, tag="servo_stop"):
     """End the stream of set-points and come to rest."""
-
-    token: Token
-    """Token of the lease."""
 
 
 class Stop(ClientMessage, frozen=True, kw_only=True, tag="stop"):
@@ -150,36 +135,26 @@ class Stop(ClientMessage, frozen=True, kw_only=True, tag="stop"):
     """Largest deceleration of any joint [rad/s²]; null: as much as the torque limits allow."""
 
 
-class Pause(ClientMessage, frozen=True, kw_only=True, tag="pause"):
+class Pause(Leased, frozen=True, kw_only=True, tag="pause"):
     """Pause the motion, so that it can be resumed."""
 
-    token: Token
-    """Token of the lease."""
 
-
-class Resume(ClientMessage, frozen=True, kw_only=True, tag="resume"):
+class Resume(Leased, frozen=True, kw_only=True, tag="resume"):
     """Continue a paused motion."""
 
-    token: Token
-    """Token of the lease."""
 
-
-class SetShaper(ClientMessage, frozen=True, kw_only=True, tag="set_shaper"):
+class SetShaper(Leased, frozen=True, kw_only=True, tag="set_shaper"):
     """Choose the input shaper."""
 
-    token: Token
-    """Token of the lease."""
     name: Name
     """Name of the shaper, one of those in `info`; `none` does not shape."""
     modes: ModeCount = 1
     """Number of modes to suppress, the lowest first."""
 
 
-class SetEstimator(ClientMessage, frozen=True, kw_only=True, tag="set_estimator", gc=True):
+class SetEstimator(Leased, frozen=True, kw_only=True, tag="set_estimator", gc=True):
     """Choose the estimator that gives the shaper frequency and damping ratio."""
 
-    token: Token
-    """Token of the lease."""
     name: Name
     """`fixed` (with `f_d` and `zeta`), `polynomial` or `modal` (with `calibration`)."""
     f_d: Frequencies | None = None
@@ -200,11 +175,9 @@ class SetEstimator(ClientMessage, frozen=True, kw_only=True, tag="set_estimator"
             _check_plain(self.calibration, "calibration", CALIBRATION_DEPTH)
 
 
-class SetPayload(ClientMessage, frozen=True, kw_only=True, tag="set_payload", omit_defaults=True):
+class SetPayload(Leased, frozen=True, kw_only=True, tag="set_payload", omit_defaults=True):
     """Declare the payload to the controller; this does not change what the simulated arm carries."""
 
-    token: Token
-    """Token of the lease."""
     mass: Mass
     """Mass [kg]."""
     com: Vec3
@@ -215,52 +188,37 @@ class SetPayload(ClientMessage, frozen=True, kw_only=True, tag="set_payload", om
     """Time in which the torques change over to it; a shorter one than 0.5 s takes 0.5 s [s]."""
 
 
-class Forget(ClientMessage, frozen=True, kw_only=True, tag="forget"):
+class Forget(Leased, frozen=True, kw_only=True, tag="forget"):
     """Undo what the robot has learnt of its payload."""
 
-    token: Token
-    """Token of the lease."""
     what: Literal["payload"]
     """What to forget: the payload that it assumes instead of the declared one."""
 
 
-class SetSpeed(ClientMessage, frozen=True, kw_only=True, tag="set_speed"):
+class SetSpeed(Leased, frozen=True, kw_only=True, tag="set_speed"):
     """Scale the speed of motions."""
 
-    token: Token
-    """Token of the lease."""
     fraction: Fraction
     """Share of the programmed speed [-]."""
 
 
-class PowerOn(ClientMessage, frozen=True, kw_only=True, tag="power_on"):
+class PowerOn(Leased, frozen=True, kw_only=True, tag="power_on"):
     """Power the arm and release its brakes."""
 
-    token: Token
-    """Token of the lease."""
     release_brakes: bool = True
     """False: only switch the power on, and leave the brakes closed."""
 
 
-class PowerOff(ClientMessage, frozen=True, kw_only=True, tag="power_off"):
+class PowerOff(Leased, frozen=True, kw_only=True, tag="power_off"):
     """Switch the arm's power off; a motion is stopped first."""
 
-    token: Token
-    """Token of the lease."""
 
-
-class UnlockProtectiveStop(ClientMessage, frozen=True, kw_only=True, tag="unlock_protective_stop"):
+class UnlockProtectiveStop(Leased, frozen=True, kw_only=True, tag="unlock_protective_stop"):
     """Leave a protective stop; the arm must be at rest."""
 
-    token: Token
-    """Token of the lease."""
 
-
-class RestartSafety(ClientMessage, frozen=True, kw_only=True, tag="restart_safety"):
+class RestartSafety(Leased, frozen=True, kw_only=True, tag="restart_safety"):
     """Restart the safety system after a violation or a fault; afterwards the arm has no power."""
-
-    token: Token
-    """Token of the lease."""
 
 
 Command = (
@@ -318,11 +276,9 @@ Command = (
 )
 
 
-class Setpoint(ClientMessage, frozen=True, kw_only=True, tag="setpoint"):
+class Setpoint(Leased, frozen=True, kw_only=True, tag="setpoint"):
     """One set-point of a stream; it is put and not answered."""
 
-    token: Token
-    """Token of the lease."""
     sequence: Sequence
     """Number of the set-point, from 0 after each `servo_start`; gaps are allowed."""
     q: Joints

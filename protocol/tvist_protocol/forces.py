@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from tvist_protocol.client_message import ClientMessage
-from tvist_protocol.values import Fraction, Pose, Token
+from tvist_protocol.client_message import Leased
+from tvist_protocol.values import Fraction, Pose
 
 Push = Annotated[float, Meta(ge=-1e4, le=1e4)]
 Wrench = tuple[Push, Push, Push, Push, Push, Push]
@@ -20,15 +20,13 @@ FrameType = Literal[1, 2, 3]
 """Whether axes are turned, as URScript numbers it; see `ForceMode`."""
 
 
-class ForceMode(ClientMessage, frozen=True, kw_only=True, tag="force_mode"):
+class ForceMode(Leased, frozen=True, kw_only=True, tag="force_mode"):
     """Give way along and about the compliant axes until a wrench is reached, until another command ends it.
 
     In the other axes the arm stands, or moves by `servo_j`, `speed_j` and `speed_l`. The command may be repeated with
     other fields; it is answered by `accepted` with the number of the motion.
     """
 
-    token: Token
-    """Token of the lease."""
     compliant: Choices
     """Which axes of the frame give way."""
     wrench: Wrench
@@ -49,38 +47,28 @@ class ForceMode(ClientMessage, frozen=True, kw_only=True, tag="force_mode"):
     """Factor of the difference between wanted and felt wrench [-]; above 1 the arm may shake on hard surfaces."""
 
 
-class Freedrive(ClientMessage, frozen=True, kw_only=True, tag="freedrive"):
+class Freedrive(Leased, frozen=True, kw_only=True, tag="freedrive"):
     """Let people move the arm by hand; answered as `force_mode` is."""
 
-    token: Token
-    """Token of the lease."""
     free: Choices = (True,) * 6
     """Along and about which axes of the frame the arm can be moved."""
     frame: Pose | Literal["base", "tool"] = "base"
     """The frame: that of the base or of the tool, or a pose in the base frame."""
 
 
-class EndForceMode(ClientMessage, frozen=True, kw_only=True, tag="end_force_mode"):
+class EndForceMode(Leased, frozen=True, kw_only=True, tag="end_force_mode"):
     """End `force_mode` or `freedrive`: the arm comes to rest and holds its position."""
 
-    token: Token
-    """Token of the lease."""
 
-
-class ZeroFtsensor(ClientMessage, frozen=True, kw_only=True, tag="zero_ftsensor"):
+class ZeroFtsensor(Leased, frozen=True, kw_only=True, tag="zero_ftsensor"):
     """Take the present force and torque at the tool as zero."""
 
-    token: Token
-    """Token of the lease."""
 
-
-class SetExternalWrench(ClientMessage, frozen=True, kw_only=True, tag="set_external_wrench"):
+class SetExternalWrench(Leased, frozen=True, kw_only=True, tag="set_external_wrench"):
     """Tell what a force sensor of one's own measures; it counts once a program has called `ft_rtde_input_enable`.
 
     Force mode does not begin before the first value, and ends when none comes for 100 ms, unless a client steps time.
     """
 
-    token: Token
-    """Token of the lease."""
     wrench: Wrench
     """Force [N] and torque [N m] in the directions of the flange frame, with the weight of what the sensor carries."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from tvist_protocol.client_message import ClientMessage
+from tvist_protocol.client_message import ClientMessage, Leased
 from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
 from tvist_protocol.values import Fraction, Payload, Token
 
@@ -101,11 +101,9 @@ Turn = Annotated[float, Meta(ge=-10, le=10)]
 """[rad]"""
 
 
-class SetIo(ClientMessage, frozen=True, kw_only=True, tag="set_io"):
+class SetIo(Leased, frozen=True, kw_only=True, tag="set_io"):
     """Set the outputs that a mask selects."""
 
-    token: Token
-    """Token of the lease."""
     digital_output_mask: DigitalBits = 0
     """Digital outputs to set: bits 0–7 standard, 8–15 configurable, 16–17 tool."""
     digital_outputs: DigitalBits = 0
@@ -146,20 +144,16 @@ class SetRegisters(ClientMessage, frozen=True, kw_only=True, tag="set_registers"
     """Further registers; programs never see some of them written and others not."""
 
 
-class SetTcp(ClientMessage, frozen=True, kw_only=True, tag="set_tcp"):
+class SetTcp(Leased, frozen=True, kw_only=True, tag="set_tcp"):
     """Set the tool centre point."""
 
-    token: Token
-    """Token of the lease."""
-    offset: tuple[Length, Length, Length, Turn, Turn, Turn]
+    offset: Annotated[tuple[Length, Length, Length, Turn, Turn, Turn], "x y z rx ry rz"]
     """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
 
 
-class SimulationSetInputs(ClientMessage, frozen=True, kw_only=True, tag="simulation.set_inputs"):
+class SimulationSetInputs(Leased, frozen=True, kw_only=True, tag="simulation.set_inputs"):
     """Simulate signals at the inputs."""
 
-    token: Token
-    """Token of the lease."""
     digital_input_mask: DigitalBits = 0
     """Digital inputs to set: bits 0–7 standard, 8–15 configurable, 16–17 tool."""
     digital_inputs: DigitalBits = 0

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from tvist_protocol.client_message import ClientMessage
+from tvist_protocol.client_message import Leased
 from tvist_protocol.values import (
     Acceleration,
     Blend,
@@ -12,7 +12,6 @@ from tvist_protocol.values import (
     Joints,
     JointSpeeds,
     Pose,
-    Token,
     ToolAcceleration,
     ToolJerk,
     ToolSpeed,
@@ -27,11 +26,9 @@ MAX_SEGMENTS = 500
 """Largest number of segments of a path."""
 
 
-class MoveL(ClientMessage, frozen=True, kw_only=True, tag="move_l"):
+class MoveL(Leased, frozen=True, kw_only=True, tag="move_l"):
     """Move the tool centre point on a straight line and turn it by the shortest way; answered as `move_j` is."""
 
-    token: Token
-    """Token of the lease."""
     pose: Pose
     """Target of the tool centre point: x y z [m] and rotation vector [rad]."""
     frame: Pose | None = None
@@ -47,11 +44,9 @@ class MoveL(ClientMessage, frozen=True, kw_only=True, tag="move_l"):
     the arm takes longer."""
 
 
-class MoveC(ClientMessage, frozen=True, kw_only=True, tag="move_c"):
+class MoveC(Leased, frozen=True, kw_only=True, tag="move_c"):
     """Move the tool centre point on the circular arc through `via` and `pose`; answered as `move_j` is."""
 
-    token: Token
-    """Token of the lease."""
     via: Pose
     """A pose on the arc, of which only the position counts: x y z [m] and rotation vector [rad]."""
     pose: Pose
@@ -148,11 +143,9 @@ class ArcSegment(PathSegment, frozen=True, kw_only=True, tag="arc"):
 Segment = JointSegment | LineSegment | ProcessSegment | ArcSegment
 
 
-class MovePath(ClientMessage, frozen=True, kw_only=True, tag="move_path", omit_defaults=True):
+class MovePath(Leased, frozen=True, kw_only=True, tag="move_path", omit_defaults=True):
     """Move along a path of several parts without stopping where they are blended; answered as `move_j` is."""
 
-    token: Token
-    """Token of the lease."""
     segments: Annotated[tuple[Segment, ...], Meta(min_length=1, max_length=MAX_SEGMENTS)]
     """Parts of the path in their order; each begins where the previous one ends."""
     frame: Pose | None = None
@@ -161,15 +154,13 @@ class MovePath(ClientMessage, frozen=True, kw_only=True, tag="move_path", omit_d
     """Largest jerk of the tool [m/s³]; of the joints on joint segments, four times the number [rad/s³]."""
 
 
-class ServoJ(ClientMessage, frozen=True, kw_only=True, tag="servo_j"):
+class ServoJ(Leased, frozen=True, kw_only=True, tag="servo_j"):
     """Follow a posture with a lag, until another command comes; send one after the other to follow a moving posture.
 
     It begins at rest or takes over any motion at once. Answered by `accepted` with the `id` that it shares with its
     successors until the arm rests.
     """
 
-    token: Token
-    """Token of the lease."""
     q: Joints
     """Posture, one angle per joint [rad]."""
     lookahead: Annotated[float, Meta(gt=0, le=10)] = 0.1
@@ -181,11 +172,9 @@ class ServoJ(ClientMessage, frozen=True, kw_only=True, tag="servo_j"):
     """Whether the shaper is used; only for a motion that begins at rest."""
 
 
-class SpeedJ(ClientMessage, frozen=True, kw_only=True, tag="speed_j"):
+class SpeedJ(Leased, frozen=True, kw_only=True, tag="speed_j"):
     """Accelerate to velocities of the joints and keep them, until another command comes; see `servo_j`."""
 
-    token: Token
-    """Token of the lease."""
     qd: JointSpeeds
     """Velocities, one per joint [rad/s]."""
     acceleration: Acceleration = 1.4
@@ -194,11 +183,9 @@ class SpeedJ(ClientMessage, frozen=True, kw_only=True, tag="speed_j"):
     """Whether the shaper is used; only for a motion that begins at rest."""
 
 
-class SpeedL(ClientMessage, frozen=True, kw_only=True, tag="speed_l"):
+class SpeedL(Leased, frozen=True, kw_only=True, tag="speed_l"):
     """Accelerate to a velocity of the tool and keep it, until another command comes; see `servo_j`."""
 
-    token: Token
-    """Token of the lease."""
     xd: Twist
     """Velocity [m/s] and angular velocity [rad/s] of the tool centre point in the base frame."""
     acceleration: ToolAcceleration = 1.2
@@ -209,20 +196,16 @@ class SpeedL(ClientMessage, frozen=True, kw_only=True, tag="speed_l"):
     """Whether the shaper is used; only for a motion that begins at rest."""
 
 
-class StopJ(ClientMessage, frozen=True, kw_only=True, tag="stop_j"):
+class StopJ(Leased, frozen=True, kw_only=True, tag="stop_j"):
     """Come to rest with a deceleration of the joints; a planned motion stays on its path."""
 
-    token: Token
-    """Token of the lease."""
     acceleration: Acceleration = 2.0
     """Deceleration of the joint that is fastest [rad/s²]."""
 
 
-class StopL(ClientMessage, frozen=True, kw_only=True, tag="stop_l"):
+class StopL(Leased, frozen=True, kw_only=True, tag="stop_l"):
     """Come to rest with a deceleration of the tool; a planned motion stays on its path."""
 
-    token: Token
-    """Token of the lease."""
     acceleration: ToolAcceleration = 1.2
     """Deceleration of the tool [m/s²]."""
     angular_acceleration: Acceleration | None = None

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from tvist_protocol.client_message import ClientMessage
+from tvist_protocol.client_message import ClientMessage, Leased
 from tvist_protocol.values import PROGRAM_NAME_PATTERN, Token
 
 ProgramState = Literal["STOPPED", "PLAYING", "PAUSED"]
@@ -29,36 +29,30 @@ class ProgramLoad(ClientMessage, frozen=True, kw_only=True, tag="program.load", 
     """Token of the lease, if the client has one."""
 
 
-class ProgramRun(ClientMessage, frozen=True, kw_only=True, tag="program.run"):
+class ProgramRun(Leased, frozen=True, kw_only=True, tag="program.run"):
     """Start a program in URScript at once.
 
     It replaces a running program, unless it is secondary (`sec`): then it runs beside that. It ends with the lease.
     """
 
-    token: Token
-    """Token of the lease."""
     text: Script
     """Text of the program, which names it."""
 
 
-class ProgramInterpret(ClientMessage, frozen=True, kw_only=True, tag="program.interpret"):
+class ProgramInterpret(Leased, frozen=True, kw_only=True, tag="program.interpret"):
     """Add a statement to the running program, which has to call `interpreter_mode` somewhere.
 
     The reply has its number. The program carries out statements in their order while it waits in that function. Several
     statements may follow each other on a line.
     """
 
-    token: Token
-    """Token of the lease."""
     text: Script
     """Text of the statement, or of a function for later ones; it can use what the program and its statements define."""
 
 
-class ProgramSkip(ClientMessage, frozen=True, kw_only=True, tag="program.skip"):
+class ProgramSkip(Leased, frozen=True, kw_only=True, tag="program.skip"):
     """Skip something in a program that waits for statements."""
 
-    token: Token
-    """Token of the lease."""
     what: Literal["statements", "move"]
     """All statements that have not begun, or the rest of the planned motion that the program makes now."""
 
@@ -89,18 +83,12 @@ class ProgramClosePopup(ClientMessage, frozen=True, kw_only=True, tag="program.c
     """Close the message that a program shows, for which it may be waiting. Any client may send this."""
 
 
-class ProgramPlay(ClientMessage, frozen=True, kw_only=True, tag="program.play"):
+class ProgramPlay(Leased, frozen=True, kw_only=True, tag="program.play"):
     """Start the loaded program, or continue it if it is paused. It ends with the lease."""
 
-    token: Token
-    """Token of the lease."""
 
-
-class ProgramPause(ClientMessage, frozen=True, kw_only=True, tag="program.pause"):
+class ProgramPause(Leased, frozen=True, kw_only=True, tag="program.pause"):
     """Pause the program and its motion, so that they can be continued."""
-
-    token: Token
-    """Token of the lease."""
 
 
 class ProgramStop(ClientMessage, frozen=True, kw_only=True, tag="program.stop"):

@@ -41,9 +41,10 @@ def components(
 
 @cache
 def field_docs(described: type) -> dict[str, str]:
-    """Return the docstring under each field of a struct or member of an enumeration, in their order."""
+    """Return the docstring under each field of a struct, those of its base first, or member of an enumeration."""
+    base = described.__base__
+    docs = {} if base is None or not base.__module__.startswith("tvist_") else dict(field_docs(base))
     body = _classes(described.__module__)[described.__name__]
-    docs: dict[str, str] = {}
     for field, below in zip(body.body, body.body[1:], strict=False):
         match field, below:
             case (

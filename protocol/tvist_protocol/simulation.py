@@ -4,15 +4,13 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from tvist_protocol.client_message import ClientMessage
+from tvist_protocol.client_message import ClientMessage, Leased
 from tvist_protocol.values import Joints, Name, Payload, ResetMode, Seed, Sequence, Ticks, Token
 
 
-class SimulationReset(ClientMessage, frozen=True, kw_only=True, tag="simulation.reset"):
+class SimulationReset(Leased, frozen=True, kw_only=True, tag="simulation.reset"):
     """Put the simulated arm at rest in a given state; null fields do not change. Stops motion, keeps lease and tick."""
 
-    token: Token
-    """Token of the lease."""
     q: Joints | None = None
     """Configuration to put the arm into, one angle per joint [rad]; refused if bodies would meet there."""
     seed: Seed | None = None
@@ -47,11 +45,9 @@ class SimulationStep(ClientMessage, frozen=True, kw_only=True, tag="simulation.s
     """Token of the lease; `setpoints` need it if `token` is that of the clock."""
 
 
-class SimulationInject(ClientMessage, frozen=True, kw_only=True, tag="simulation.inject"):
+class SimulationInject(Leased, frozen=True, kw_only=True, tag="simulation.inject"):
     """Cause one of the faults on purpose."""
 
-    token: Token
-    """Token of the lease."""
     fault: Name
     """Name of the fault."""
     joint: Annotated[int, Meta(ge=0, le=6)] | None = None

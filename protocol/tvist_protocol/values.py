@@ -1,7 +1,7 @@
 """Types of the values in messages: SI units, radians, every number bounded.
 
 The bounds of the wire only exclude NaN, infinity and errors by orders of magnitude. The limits of the arm are in
-`info`, and the server checks them. An unbounded float would allow NaN.
+`info`, and the server checks them. An unbounded float would allow NaN. A text in a type has a word for each number.
 """
 
 from typing import Annotated, Literal
@@ -76,11 +76,11 @@ Mass = Annotated[float, Meta(ge=0, le=100)]
 """[kg]"""
 Offset = Annotated[float, Meta(ge=-2, le=2)]
 """[m]"""
-Vec3 = tuple[Offset, Offset, Offset]
+Vec3 = Annotated[tuple[Offset, Offset, Offset], "x y z"]
 """x y z in the flange frame [m]"""
 Coordinate = Annotated[float, Meta(ge=-1e3, le=1e3)]
 """[m]"""
-Pose = tuple[Coordinate, Coordinate, Coordinate, Angle, Angle, Angle]
+Pose = Annotated[tuple[Coordinate, Coordinate, Coordinate, Angle, Angle, Angle], "x y z rx ry rz"]
 """x y z [m] and rotation vector [rad]"""
 ToolSpeed = Annotated[float, Meta(gt=0, le=1e3)]
 """[m/s]"""
@@ -90,13 +90,15 @@ ToolJerk = Annotated[float, Meta(gt=0, le=1e7)]
 """[m/s³]"""
 Component = Annotated[float, Meta(ge=-1e3, le=1e3)]
 """[m/s]"""
-Twist = tuple[Component, Component, Component, JointSpeed, JointSpeed, JointSpeed]
+Twist = Annotated[
+    tuple[Component, Component, Component, JointSpeed, JointSpeed, JointSpeed], "vx vy vz wx wy wz"
+]
 """Velocity [m/s] and angular velocity [rad/s]"""
 Blend = Annotated[float, Meta(ge=0, le=10)]
 """[m]"""
 Moment = Annotated[float, Meta(ge=-10, le=10)]
 """[kg m²]"""
-Inertia6 = tuple[Moment, Moment, Moment, Moment, Moment, Moment]
+Inertia6 = Annotated[tuple[Moment, Moment, Moment, Moment, Moment, Moment], "xx xy xz yy yz zz"]
 """xx xy xz yy yz zz about the centre of mass, flange axes [kg m²]"""
 
 Sequence = Annotated[int, Meta(ge=0, extra_json_schema={"maximum": 2**64 - 1})]

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Generic, Self, TypeVar
 
-from tvist_client import blocking, stream
+from tvist_client import blocking, feed
 from tvist_client import robot as asynchronous_robot
+from tvist_client.connection import BUFFER
 from tvist_client.errors import AnswerTimeoutError
 from tvist_client.portal import Portal
-from tvist_client.published import BUFFER
 from tvist_protocol.stream import Event, State
 from tvist_testing.history import History
 from tvist_testing.robots import ServedRobot
@@ -38,13 +38,13 @@ class SteppingRobot(asynchronous_robot.Robot):
 class SteppingStream(blocking.Stream[M], Generic[M]):
     """Messages as an iterator that lets time pass while none is there."""
 
-    def __init__(self, portal: Portal, robot: SteppingRobot, messages: stream.Stream[M]) -> None:
+    def __init__(self, portal: Portal, robot: SteppingRobot, messages: feed.Stream[M]) -> None:
         super().__init__(portal, messages)
         self._robot = robot
 
     def __next__(self) -> M:
         for _ in range(LONGEST):
-            if self._portal.run(lambda: self._stream.ready):
+            if self._portal.run(lambda: self._inner.ready):
                 return super().__next__()
             self._portal.call(lambda: self._robot.pass_time(1))
         raise AnswerTimeoutError(f"nothing came within {LONGEST} ticks of simulation")
@@ -99,10 +99,10 @@ class FixtureRobot(blocking.Robot):
         self.on_truth(self.history.on_truth)
         self.on_state(self.history.on_state)
         self.on_event(self.history.on_event)
-        self._portal.run(self._robot._ios.subscribe)  # noqa: SLF001  so that `io` has something at once
+        self._portal.run(self._inner._ios.subscribe)  # noqa: SLF001  so that `io` has something at once
         self.info()  # answered after the robot has learnt of the subscriptions
         publish_state()
-        self._portal.call(lambda: self._robot.until(0))
+        self._portal.call(lambda: self._inner.until(0))
 
     def settle_messages(self) -> None:
         """Wait until everything has arrived that the robot published before now, such as the truth of the last tick."""
@@ -111,13 +111,13 @@ class FixtureRobot(blocking.Robot):
     def states(self, buffer: int = BUFFER) -> SteppingStream[State]:
         """Iterate over every state from now on; time passes by a tick for each."""
         return SteppingStream(
-            self._portal, self._stepping, self._portal.run(lambda: self._robot.states(buffer))
+            self._portal, self._stepping, self._portal.run(lambda: self._inner.states(buffer))
         )
 
     def events(self, buffer: int = BUFFER) -> SteppingStream[Event]:
         """Iterate over every event from now on; time passes until the next one."""
         return SteppingStream(
-            self._portal, self._stepping, self._portal.run(lambda: self._robot.events(buffer))
+            self._portal, self._stepping, self._portal.run(lambda: self._inner.events(buffer))
         )
 
 

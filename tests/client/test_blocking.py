@@ -5,7 +5,7 @@ import inspect
 import threading
 
 import pytest
-from tools import blocking as made
+from tools import stubs
 
 import tvist_client
 from tvist_client import LoopbackTransport, MotionStoppedError, NotConnectedError, RefusedError, blocking
@@ -44,8 +44,9 @@ def test_both_faces_have_the_same_methods_with_the_same_arguments(name):
         assert plain(parameters) == plain(theirs[method]), method
 
 
-def test_the_blocking_classes_are_those_that_are_made():
-    assert made.PATH.read_text(encoding="utf-8") == made.generated(), "run `make schemas`"
+def test_the_stubs_are_those_that_are_made():
+    for path, text in stubs.generated().items():
+        assert path.read_text(encoding="utf-8") == text, "run `make schemas`"
 
 
 def test_a_program_reads_as_it_should(fake, robot):
@@ -101,7 +102,7 @@ def test_iterators_end_with_the_connection(fake):
         arm.step(2)
     robot.close()
     robot.close()
-    assert list(events._stream._waiting) == []
+    assert list(events._inner._waiting) == []
     with pytest.raises(NotConnectedError, match="closed"):
         next(states)
     with pytest.raises(NotConnectedError, match="closed"):

@@ -115,7 +115,7 @@ def test_a_robot_of_another_protocol_is_not_well(realtime, endpoint):
 
 
 def test_a_robot_that_stands_still_is_neither_well_nor_alive(realtime, endpoint, monkeypatch):
-    monkeypatch.setattr("tvist_client.robot.STATE_S", 0.1)
+    monkeypatch.setattr("tvist_client.connection.STATE_S", 0.1)
     monkeypatch.setattr(realtime.robot, "pass_tick", lambda: None)
     report = check(endpoint)
     assert not report.ok

@@ -7,8 +7,7 @@ import threading
 import pytest
 
 from tvist_client import AnswerTimeoutError, ArgumentError, NotConnectedError
-from tvist_client.feed import Feed
-from tvist_client.stream import Stream
+from tvist_client.feed import Feed, Stream
 from tvist_client.transports.inbox import MAX_WAITING, Inbox
 from tvist_protocol.codec import decode_event, decode_state, encode
 from tvist_protocol.stream import Event

@@ -14,7 +14,7 @@ from tvist_client import (
     UnexpectedReplyError,
     make_payload,
 )
-from tvist_client.robot import CHUNK
+from tvist_client.connection import CHUNK
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import KeepAlive

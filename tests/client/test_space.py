@@ -16,7 +16,7 @@ from tvist_client import (
     UnexpectedReplyError,
 )
 from tvist_client.blocking import Robot as BlockingRobot
-from tvist_client.robot import CHUNK
+from tvist_client.connection import CHUNK
 from tvist_protocol import forces as f
 from tvist_protocol import kinematics as k
 from tvist_protocol import motions as m

@@ -73,7 +73,7 @@ COMMANDS = {
     "no segments": (lambda arm: arm.move_path([]), "segments has 0 entries: must have from 1 to 500"),
     "too many segments": (lambda arm: arm.move_path([LineSegment(pose=POSE)] * 501), "segments has 501 entries"),
     "one segment alone": (lambda arm: arm.move_path(LineSegment(pose=POSE)), "must be a list of segments"),
-    "a pose for a segment": (lambda arm: arm.move_path([POSE]), r"segments\[0\] is .*must be a LineSegment"),
+    "a pose for a segment": (lambda arm: arm.move_path([POSE]), r"segments\[0\] is .*must be a JointSegment"),
     "a short pose in a path": (
         lambda arm: arm.move_path([LineSegment(pose=POSE), ArcSegment(via=POSE, pose=POSE[:3])]),
         r"segments\[1\].pose has 3 numbers",
@@ -206,7 +206,7 @@ class TestBlocking:
                 arm.move_j([9.0] * 6)
             frames = traceback.extract_tb(raised.value.__traceback__)
             assert frames[0].line == "arm.move_j([9.0] * 6)"
-            assert [frame.name for frame in frames[1:]] == ["move_j", "call"]
+            assert [frame.name for frame in frames[1:]] == ["__call__", "call"]
             assert (raised.value.__cause__, raised.value.__suppress_context__) == (None, True)
 
     def test_a_callback_that_would_wait_for_itself_is_told_so(self, robot):

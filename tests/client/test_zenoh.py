@@ -15,8 +15,9 @@ from tvist_client import (
     StreamStoppedError,
     ZenohTransport,
 )
-from tvist_client.fleet import Fleet, Place
-from tvist_client.robot import CHUNK
+from tvist_client.across import Place
+from tvist_client.connection import CHUNK
+from tvist_client.fleet import Fleet
 from tvist_client.transports import zenoh as zenoh_transport
 from tvist_client.transports.zenoh import robots_at
 from tvist_protocol.codec import encode

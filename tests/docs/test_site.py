@@ -106,6 +106,11 @@ def site(tmp_path_factory):
 
 
 class TestBuilt:
+    @pytest.mark.parametrize("page", ["tvist_client-arm", "tvist_client.blocking"])
+    def test_the_reference_describes_methods_that_exist_only_at_run_time(self, site, page):
+        html = (site / "html" / "api" / f"{page}.html").read_text(encoding="utf-8")
+        assert "Largest jerk of any joint" in html
+
     def test_nothing_is_loaded_from_outside(self, site):
         for page in (site / "html").rglob("*.html"):
             for match in LOADED.finditer(page.read_text(encoding="utf-8")):

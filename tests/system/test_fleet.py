@@ -15,9 +15,9 @@ from tests.conformance.wire import Q1, Wire
 from zenoh.handlers import Callback
 
 from tvist_cli import main
+from tvist_client.across import ManyStates, Place
 from tvist_client.check import check
-from tvist_client.fleet import Fleet, Place
-from tvist_client.many_states import ManyStates
+from tvist_client.fleet import Fleet
 from tvist_server.gateways import network
 
 from .keyring import forge, free_tls_endpoint, made

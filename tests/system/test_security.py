@@ -12,9 +12,10 @@ from tests.conformance.wire import PATIENCE, Q1, Wire
 from zenoh.handlers import Callback
 
 from tvist_client import Robot
+from tvist_client.across import Place
 from tvist_client.blocking import Robot as BlockingRobot
 from tvist_client.errors import DeniedError, NotConnectedError
-from tvist_client.fleet import Fleet, Place
+from tvist_client.fleet import Fleet
 from tvist_client.transports.certificates import PROBE_S, why_refused
 from tvist_client.transports.session import open_session
 from tvist_server.gateways.network import CONFIG, GatewayError, Network

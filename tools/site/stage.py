@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import subprocess
 import tomllib
 from pathlib import Path
 
@@ -50,6 +51,11 @@ def stage(folder: Path) -> Path:
     _place(to / LOGO).write_bytes((ROOT / LOGO).read_bytes())
     _place(to / TRY.name).write_bytes(TRY.read_bytes())
     shutil.copytree(ASSETS, to / "assets")
+    # The methods of the client exist only at run time: its copy has them in writing.
+    described = folder / "described"
+    python = str(ROOT / ".venv" / "bin" / "python")
+    subprocess.run([python, "-m", "tools.stubs", str(described)], cwd=ROOT, check=True)
+    sources_of = {described if module.source == ROOT / "clients" else module.source for module in modules}
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     configuration = {
         "copyright": f"tvist {project['version']}, {project['license']}",
@@ -62,7 +68,7 @@ def stage(folder: Path) -> Path:
             "mkdocstrings": {
                 "handlers": {
                     "python": {
-                        "paths": sorted({str(module.source) for module in modules}),
+                        "paths": sorted(map(str, sources_of)),
                         # A package may export what another one defines.
                         "options": {"preload_modules": sorted({m.name.partition(".")[0] for m in modules})},
                     }

@@ -6,9 +6,9 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 from typing import Any
 
+from tvist_client.arguments import make_payload
 from tvist_client.arm import Arm
 from tvist_client.errors import ClientError, MisuseError, StreamStoppedError
-from tvist_client.payload import make_payload
 from tvist_client.readiness import look
 from tvist_client.robot import Robot
 from tvist_client.unlock import make_ready

@@ -41,7 +41,7 @@ def stop(
             raise Failure(f"give either --all or the robot {robot}", code=2)
         _stop_all(endpoint, namespace, security, json=json)
         return
-    from tvist_client.fleet import place_of
+    from tvist_client.across import place_of
     from tvist_client.halt import halt
 
     with told(code=2):

@@ -16,8 +16,7 @@ from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import out, print_json, waiting
 
 if TYPE_CHECKING:
-    from tvist_client.fleet import Place
-    from tvist_client.many_states import ManyStates
+    from tvist_client.across import ManyStates, Place
     from tvist_client.robot import Robot
     from tvist_protocol.stream import Event, State, Telemetry
 EVERY = 0.1
@@ -207,8 +206,8 @@ def _watch_many(
         seconds: Stop after this many seconds.
         json: Print one JSON object per line for each new state, ten times a second at most.
     """
+    from tvist_client.across import ManyStates
     from tvist_client.errors import MisuseError
-    from tvist_client.many_states import ManyStates
 
     with told(MisuseError, code=2):
         states = ManyStates(selector, endpoint, security=security, namespace=namespace)

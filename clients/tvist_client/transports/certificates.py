@@ -31,14 +31,9 @@ Folder = str | os.PathLike[str]
 
 
 def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
-    """Return the settings of a Zenoh session with this certificate, by path.
+    """Return the settings of a Zenoh session with the certificate in a client's folder, by path.
 
-    Args:
-        endpoint: Endpoint of the server.
-        security: The client's folder; None for a server without certificates.
-
-    Raises:
-        NotConnectedError: A file is missing, or folder and endpoint do not match.
+    Without a folder, they are those for a server without certificates.
     """
     encrypted = endpoint.startswith("tls/")
     if security is None:
@@ -68,15 +63,8 @@ def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
 def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") -> str | None:
     """Return why no session could be opened, judged by a handshake of our own, since Zenoh does not report it.
 
-    This blocks for at most three times `PROBE_S`.
-
-    Args:
-        endpoint: Endpoint of the server.
-        security: The client's folder; None for a client without one.
-        whose: What listens there, for the sentence.
-
-    Returns:
-        A reason and what to do; None if the cause is another one, such as that no server listens.
+    This blocks for at most three times `PROBE_S`. None is returned if the cause is another one, such as that no server
+    listens. `whose` says what listens there.
     """
     protocol, _, address = re.split("[?#]", endpoint)[0].partition("/")
     if protocol not in {"tcp", "tls"}:

@@ -18,9 +18,6 @@ class Inbox:
 
     There is one mailbox for all topics, since their order matters: events of a tick come before its state. The loop
     is woken once for all waiting messages, not once per message.
-
-    Args:
-        loop: The event loop.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
@@ -31,13 +28,7 @@ class Inbox:
         self._woken = False
 
     def put(self, callback: Callback, data: bytes, *, droppable: bool) -> None:
-        """Add a message. May be called from any thread; does not block.
-
-        Args:
-            callback: Called with the message on the loop.
-            data: The message.
-            droppable: Whether it may be dropped if there is no room; this holds for states, but not for events.
-        """
+        """Add a message, which may be dropped if there is no room (states, not events). Any thread may call this."""
         if droppable and len(self._waiting) >= MAX_WAITING:
             if not self.dropped:
                 log.warning("the event loop has been busy for too long: messages are being dropped")

@@ -27,17 +27,7 @@ CONFIG: Mapping[str, Any] = {
 
 
 def open_session(endpoint: str, security: Folder | None = None, namespace: str = "") -> zenoh.Session:
-    """Open a session. Blocks while it connects.
-
-    Args:
-        endpoint: Endpoint of the server.
-        security: Folder with the client's certificate, if the server requires one.
-        namespace: Namespace of the robots; the session's keys are those without it.
-
-    Raises:
-        ProtocolError: The namespace is none.
-        NotConnectedError: No server listens there, or the certificate is rejected.
-    """
+    """Open a session; its keys are those without the namespace. Blocks while it connects."""
     if not isinstance(endpoint, str) or not _ENDPOINT.fullmatch(endpoint):
         raise NotConnectedError(_no_endpoint(endpoint))
     config = zenoh.Config()

@@ -44,14 +44,7 @@ INFO_S = 10.0
 
 
 class ZenohTransport(Transport):
-    """A connection to one robot over Zenoh, created by `open`.
-
-    Args:
-        session: An open session, which `close` closes.
-        endpoint: Endpoint that it is connected to, for error messages.
-        robot: Name of the robot.
-        namespace: Namespace of the session, for error messages.
-    """
+    """A connection to one robot over Zenoh, created by `open`."""
 
     def __init__(self, session: zenoh.Session, endpoint: str, robot: str, namespace: str = "") -> None:
         self._session = session
@@ -275,16 +268,7 @@ class ZenohTransport(Transport):
 
 
 async def robots_at(endpoint: str, security: Folder | None = None, namespace: str = "") -> list[str]:
-    """Return the names of the robots at an endpoint, sorted.
-
-    Args:
-        endpoint: Endpoint of the server, `tcp/127.0.0.1:7447`.
-        security: Folder with this client's certificate, for `tls/<host>:<port>`.
-        namespace: Namespace of the robots.
-
-    Raises:
-        NotConnectedError: No server listens there.
-    """
+    """Return the names of the robots at an endpoint, sorted."""
     session = await _opened(endpoint, security, namespace)
     try:
         return await _robots(session)
@@ -293,17 +277,7 @@ async def robots_at(endpoint: str, security: Folder | None = None, namespace: st
 
 
 async def only_robot(endpoint: str, wanted: str, security: Folder | None = None, namespace: str = "") -> str:
-    """Choose a robot if no name is given: the preferred one, or if that is absent, the only one.
-
-    Args:
-        endpoint: Endpoint of the server, `tcp/127.0.0.1:7447`.
-        wanted: Name of the preferred robot.
-        security: Folder with this client's certificate, for `tls/<host>:<port>`.
-        namespace: Namespace of the robots.
-
-    Raises:
-        NotConnectedError: No server listens there, there is no robot, or there are several others.
-    """
+    """Choose a robot if no name is given: the preferred one, or if that is absent, the only one."""
     robots = await robots_at(endpoint, security, namespace)
     if wanted in robots or not robots:
         return wanted

@@ -51,7 +51,7 @@ def _check_of(annotation: Any, joints: int) -> Check | None:
         parts = get_args(annotation)
         inner = _check_of(parts[0], joints) if NoneType in parts else None
         return None if inner is None else lambda name, value: None if value is None else inner(name, value)
-    check: Any = get_args(annotation)[1]
+    check: Any = get_args(annotation)[-1]  # behind what the protocol says of the type
     if isinstance(check, Meta):
         return within(*bounds(annotation))
     found: Check = several(joints) if check == OF_JOINTS else check

@@ -5,7 +5,7 @@ import resource
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Self
 
-from tvist_client.fleet import Place, place_of
+from tvist_client.across import Place, place_of
 from tvist_client.transports.session import close_session
 from tvist_protocol import keys
 from tvist_server.gateways.exposure import check_endpoints, guarded_router
